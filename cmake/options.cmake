@@ -1,0 +1,41 @@
+# Compile options every target shares, and the two helpers that make a library or a test.
+
+add_library(upright_options INTERFACE)
+target_compile_options(upright_options INTERFACE -Wall -Wextra -Wpedantic -Wshadow -Wno-psabi)
+if(UPRIGHT_WERROR)
+  target_compile_options(upright_options INTERFACE -Werror)
+endif()
+if(UPRIGHT_SANITIZE)
+  target_compile_options(upright_options INTERFACE -fsanitize=${UPRIGHT_SANITIZE} -fno-omit-frame-pointer
+                         -fno-sanitize-recover=all)
+  target_link_options(upright_options INTERFACE -fsanitize=${UPRIGHT_SANITIZE})
+endif()
+
+# upright_library(NAME SOURCES... LINK PUBLIC-TARGETS... PRIVATE PRIVATE-TARGETS...)
+function(upright_library name)
+  cmake_parse_arguments(arg "" "" "SOURCES;LINK;PRIVATE" ${ARGN})
+  if(arg_SOURCES)
+    add_library(${name} STATIC ${arg_SOURCES})
+    target_include_directories(${name} PUBLIC ${PROJECT_SOURCE_DIR}/include)
+    target_link_libraries(${name} PUBLIC ${arg_LINK} PRIVATE ${arg_PRIVATE} upright_options)
+  else()
+    add_library(${name} INTERFACE)
+    target_include_directories(${name} INTERFACE ${PROJECT_SOURCE_DIR}/include)
+    target_link_libraries(${name} INTERFACE ${arg_LINK})
+  endif()
+endfunction()
+
+# upright_test(NAME SOURCES... LINK TARGETS... LABELS ...): one GoogleTest program, one ctest entry.
+function(upright_test name)
+  cmake_parse_arguments(arg "" "TIMEOUT" "SOURCES;LINK;LABELS" ${ARGN})
+  add_executable(${name} ${arg_SOURCES})
+  target_link_libraries(${name} PRIVATE ${arg_LINK} GTest::gtest_main upright_options)
+  target_compile_definitions(${name} PRIVATE UPRIGHT_SOURCE_DIR="${PROJECT_SOURCE_DIR}"
+                             UPRIGHT_BINARY="$<TARGET_FILE:upright>")
+  add_dependencies(${name} upright)
+  add_test(NAME ${name} COMMAND ${name})
+  if(NOT arg_TIMEOUT)
+    set(arg_TIMEOUT 120)
+  endif()
+  set_tests_properties(${name} PROPERTIES TIMEOUT ${arg_TIMEOUT} LABELS "${arg_LABELS}")
+endfunction()

@@ -1,0 +1,53 @@
+// The seam between the control loop and a rig: what every backend (simulated, modbus, gpio, comedi) implements.
+#pragma once
+
+#include <cstdint>
+
+namespace upright {
+
+/// What a reading is worth.
+enum class RigStatus : std::uint8_t {
+  fresh,  ///< counts that were taken for this call
+  stale,  ///< no new counts: those of an earlier sequence number, not to be used as new
+  fault,  ///< no counts at all; `fault` says why
+};
+
+/// Why a rig failed. One cause each, so that a stop can name it.
+enum class RigFault : std::uint8_t {
+  none,
+  link_timeout,      ///< no reply within the deadline
+  link_lost,         ///< the connection is gone
+  corrupt_reply,     ///< a reply failed its check sum or its format
+  device_restarted,  ///< the device came back with its counters or its watchdog reset
+  device_refused,    ///< the device answered with an exception
+  not_finite,        ///< a value that is not a finite number was about to be used
+  out_of_range,      ///< counts or volts outside what the hardware can mean
+  emergency_stop,
+  limit_switch,
+};
+
+/// One exchange with the encoders. Counts are the device's own, `width` bits wide, not unwrapped.
+struct RigReading {
+  std::int64_t cart_counts = 0;
+  std::int64_t pendulum_counts = 0;
+  std::int64_t time_ns = 0;    ///< when the counts were taken, on the clock the loop runs on
+  std::uint64_t sequence = 0;  ///< grows with each fresh reading
+  RigStatus status = RigStatus::fault;
+  RigFault fault = RigFault::none;
+};
+
+/// A rig as the loop sees it. `open` may throw Error and take its time; everything else is called from the real-time
+/// thread and neither allocates, locks, throws nor blocks beyond the deadline the backend was opened with.
+class Rig {
+ public:
+  virtual ~Rig() = default;
+  /// Connects, checks what can be checked, leaves the motor at zero volts.
+  virtual void open() = 0;
+  virtual RigReading read() noexcept = 0;
+  /// Commands a voltage that the limiter has passed. A value that is not finite is refused and becomes zero volts.
+  virtual RigFault write(double voltage_v) noexcept = 0;
+  /// Zero volts and output disabled, by every means the backend has. May be called again and from a signal's aftermath.
+  virtual void stop() noexcept = 0;
+};
+
+}  // namespace upright

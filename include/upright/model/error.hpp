@@ -1,0 +1,39 @@
+// The one exception type of set-up code. Nothing in the control loop throws.
+#pragma once
+
+#include <stdexcept>
+#include <string>
+
+namespace upright {
+
+/// Exit codes of every command.
+enum class ExitCode : int {
+  done = 0,
+  usage = 2,    ///< usage or configuration error: nothing moved
+  stopped = 3,  ///< the run ended by a safety stop, or the pendulum fell; its data are kept
+  device = 4,   ///< link or device error
+};
+
+/// One plain sentence, the remedy first, and the exit code the command ends with.
+class Error : public std::runtime_error {
+ public:
+  Error(ExitCode code, const std::string& sentence) : std::runtime_error(sentence), code_(code) {}
+  ExitCode code() const { return code_; }
+
+ private:
+  ExitCode code_;
+};
+
+/// A file, a flag or a value the user gave is wrong (exit code 2).
+class ConfigError : public Error {
+ public:
+  explicit ConfigError(const std::string& sentence) : Error(ExitCode::usage, sentence) {}
+};
+
+/// A link or a device failed at set-up (exit code 4).
+class DeviceError : public Error {
+ public:
+  explicit DeviceError(const std::string& sentence) : Error(ExitCode::device, sentence) {}
+};
+
+}  // namespace upright

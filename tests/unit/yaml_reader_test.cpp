@@ -1,0 +1,59 @@
+#include "upright/model/yaml_reader.hpp"
+
+#include <gtest/gtest.h>
+
+#include <functional>
+
+#include "upright/model/error.hpp"
+
+namespace upright {
+namespace {
+
+std::string message_of(const std::function<void()>& action) {
+  try {
+    action();
+  } catch (const ConfigError& error) {
+    return error.what();
+  }
+  return "no error";
+}
+
+TEST(YamlReader, ReadsNumbersExactlyAsWritten) {
+  const YamlMap map = YamlMap::from_text("a: 0.1\nb: 1e-3\nc: -2\n", "f.yaml");
+  EXPECT_EQ(map.number("a"), 0.1);
+  EXPECT_EQ(map.number("b"), 1e-3);
+  EXPECT_EQ(map.number("c"), -2.0);
+  map.finish();
+}
+
+TEST(YamlReader, ExactTextReadsBackToTheSameBits) {
+  for (const double value : {0.1, 1.0 / 3.0, 1e300, -5e-324, 3.0}) {
+    const YamlMap map = YamlMap::from_text("v: " + exact_text(value), "f.yaml");
+    EXPECT_EQ(map.number("v"), value);
+  }
+}
+
+TEST(YamlReader, UnknownKeyNamesTheNearestKnownOneWithFileAndLine) {
+  const YamlMap map = YamlMap::from_text("mass_kg: 1\nlenght_m: 2\n", "f.yaml");
+  map.number("mass_kg");
+  EXPECT_FALSE(map.has("length_m"));
+  EXPECT_EQ(message_of([&] { map.finish(); }),
+            "did you mean length_m? otherwise remove it: f.yaml:2: lenght_m is not a known key");
+}
+
+TEST(YamlReader, RefusesWhatIsNotAFiniteNumberInRange) {
+  for (const char* bad : {"v: .nan", "v: .inf", "v: abc", "v: 1e999", "v: '1'", "v: [1]", "v: -1", "v:", "v: 1 2"}) {
+    const YamlMap map = YamlMap::from_text(bad, "f.yaml");
+    EXPECT_THROW(map.number("v", Range::positive()), ConfigError) << bad;
+  }
+}
+
+TEST(YamlReader, RefusesDoubledKeysBrokenYamlAndDeepNesting) {
+  EXPECT_THROW(YamlMap::from_text("a: 1\na: 2\n", "f.yaml"), ConfigError);
+  EXPECT_THROW(YamlMap::from_text("a: [1\n", "f.yaml"), ConfigError);
+  EXPECT_THROW(YamlMap::from_text("- 1\n", "f.yaml"), ConfigError);
+  EXPECT_THROW(YamlMap::from_text(std::string(100000, '['), "f.yaml"), ConfigError);
+}
+
+}  // namespace
+}  // namespace upright
