@@ -2,6 +2,11 @@
 
 add_library(upright_options INTERFACE)
 target_compile_options(upright_options INTERFACE -Wall -Wextra -Wpedantic -Wshadow -Wno-psabi)
+# Built where it runs: the machine's own SIMD makes fits and sweeps several times faster. All targets share the flag,
+# since Eigen's alignment must be the same everywhere.
+if(UPRIGHT_NATIVE)
+  target_compile_options(upright_options INTERFACE -march=native -ffp-contract=off)
+endif()
 if(UPRIGHT_WERROR)
   target_compile_options(upright_options INTERFACE -Werror)
 endif()

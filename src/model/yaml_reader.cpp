@@ -57,7 +57,8 @@ std::optional<double> parse_number(const std::string& text) {
   return value;
 }
 
-/// yaml-cpp recurses over nested flow collections; refuse input that would exhaust the stack before it sees it.
+/// yaml-cpp recurses over nested flow collections; refuse input that would exhaust the stack before it sees
+/// it.
 void refuse_deep_nesting(const std::string& text, const std::filesystem::path& file) {
   int depth = 0;
   int line = 1;
@@ -131,7 +132,8 @@ struct YamlMap::Node {
                          const std::string& remedy) const {
     const YAML::Mark mark = at.IsDefined() ? at.Mark() : yaml.Mark();
     const int line = mark.line >= 0 ? mark.line + 1 : 1;
-    throw ConfigError(remedy + ": " + file.string() + ":" + std::to_string(line) + ": " + full_key(key) + " " + problem);
+    throw ConfigError(remedy + ": " + file.string() + ":" + std::to_string(line) + ": " + full_key(key) +
+                      " " + problem);
   }
 
   /// The node of a key, not defined when it is missing. Never inserts.
@@ -151,7 +153,8 @@ struct YamlMap::Node {
     const std::string remedy = "give " + key + " a number " + range.text();
     if (!node.IsScalar()) fail(node, key, "is not a number", remedy);
     const std::optional<double> value = parse_number(node.Scalar());
-    if (!value || node.Tag() == "!") fail(node, key, "is not a number but '" + shown(node.Scalar()) + "'", remedy);
+    if (!value || node.Tag() == "!")
+      fail(node, key, "is not a number but '" + shown(node.Scalar()) + "'", remedy);
     if (!std::isfinite(*value)) fail(node, key, "is not finite", remedy);
     if (!range.contains(*value)) fail(node, key, "is " + shown(node.Scalar()), remedy);
     return *value;
@@ -166,7 +169,8 @@ void refuse_bad_keys(const YAML::Node& map, const std::filesystem::path& file, c
   std::set<std::string> seen;
   for (const auto& entry : map) {
     const int line = entry.first.Mark().line + 1;
-    const std::string where = file.string() + ":" + std::to_string(line) + ": " + (path.empty() ? "" : path + ".");
+    const std::string where =
+        file.string() + ":" + std::to_string(line) + ": " + (path.empty() ? "" : path + ".");
     if (!entry.first.IsScalar())
       throw ConfigError("use plain words as keys: " + where + " has a key that is not one");
     if (!seen.insert(entry.first.Scalar()).second)
@@ -176,7 +180,8 @@ void refuse_bad_keys(const YAML::Node& map, const std::filesystem::path& file, c
 
 }  // namespace
 
-std::shared_ptr<YamlMap::Node> YamlMap::Node::child(const YAML::Node& node, const std::string& child_path) const {
+std::shared_ptr<YamlMap::Node> YamlMap::Node::child(const YAML::Node& node,
+                                                    const std::string& child_path) const {
   refuse_bad_keys(node, file, child_path);
   auto made = std::make_shared<Node>();
   made->yaml.reset(node);
@@ -210,7 +215,8 @@ YamlMap YamlMap::from_file(const std::filesystem::path& file) {
   if (std::filesystem::is_directory(file, problem))
     throw ConfigError("name a file: " + file.string() + " is a folder");
   const std::uintmax_t size = std::filesystem::file_size(file, problem);
-  if (problem) throw ConfigError("check the path: cannot read " + file.string() + " (" + problem.message() + ")");
+  if (problem)
+    throw ConfigError("check the path: cannot read " + file.string() + " (" + problem.message() + ")");
   if (size > largest_file_bytes)
     throw ConfigError("name a smaller file: " + file.string() + " is larger than 16 MiB");
   std::ifstream in(file, std::ios::binary);
@@ -219,7 +225,9 @@ YamlMap YamlMap::from_file(const std::filesystem::path& file) {
   return from_text(text, file);
 }
 
-bool YamlMap::has(const std::string& key) const { return node_->find(key).IsDefined(); }
+bool YamlMap::has(const std::string& key) const {
+  return node_->find(key).IsDefined();
+}
 
 double YamlMap::number(const std::string& key, const Range& range) const {
   return node_->number(node_->require(key, "a number " + range.text()), key, range);
@@ -238,7 +246,8 @@ std::int64_t YamlMap::integer(const std::string& key, std::int64_t low, std::int
   const std::string what = "a whole number " + range.text();
   const YAML::Node node = node_->require(key, what);
   const double value = node_->number(node, key, range);
-  if (value != std::floor(value)) node_->fail(node, key, "is " + shown(node.Scalar()), "give " + key + " " + what);
+  if (value != std::floor(value))
+    node_->fail(node, key, "is " + shown(node.Scalar()), "give " + key + " " + what);
   return static_cast<std::int64_t>(value);
 }
 
@@ -257,7 +266,8 @@ bool YamlMap::flag_or(const std::string& key, bool fallback) const {
 
 std::string YamlMap::text(const std::string& key) const {
   const YAML::Node node = node_->require(key, "a text");
-  if (!node.IsScalar() || node.Scalar().empty()) node_->fail(node, key, "is not a text", "give " + key + " a text");
+  if (!node.IsScalar() || node.Scalar().empty())
+    node_->fail(node, key, "is not a text", "give " + key + " a text");
   return node.Scalar();
 }
 
@@ -302,15 +312,22 @@ std::vector<YamlMap> YamlMap::maps(const std::string& key) const {
     const YAML::Node item = node[i];
     const std::string path = node_->full_key(key) + "[" + std::to_string(i) + "]";
     if (!item.IsMap())
-      node_->fail(item, key + "[" + std::to_string(i) + "]", "is not a map", "write each item as {key: value}");
+      node_->fail(item, key + "[" + std::to_string(i) + "]", "is not a map",
+                  "write each item as {key: value}");
     result.push_back(YamlMap(node_->child(item, path)));
   }
   return result;
 }
 
-bool YamlMap::is_scalar(const std::string& key) const { return node_->find(key).IsScalar(); }
-bool YamlMap::is_map(const std::string& key) const { return node_->find(key).IsMap(); }
-bool YamlMap::is_list(const std::string& key) const { return node_->find(key).IsSequence(); }
+bool YamlMap::is_scalar(const std::string& key) const {
+  return node_->find(key).IsScalar();
+}
+bool YamlMap::is_map(const std::string& key) const {
+  return node_->find(key).IsMap();
+}
+bool YamlMap::is_list(const std::string& key) const {
+  return node_->find(key).IsSequence();
+}
 
 std::vector<std::string> YamlMap::keys() const {
   std::vector<std::string> names;
@@ -334,7 +351,9 @@ void YamlMap::fail(const std::string& key, const std::string& problem, const std
   node_->fail(node.IsDefined() ? node : node_->yaml, key, problem, remedy);
 }
 
-const std::filesystem::path& YamlMap::file() const { return node_->file; }
+const std::filesystem::path& YamlMap::file() const {
+  return node_->file;
+}
 
 std::filesystem::path YamlMap::path(const std::string& key) const {
   const std::filesystem::path given = text(key);

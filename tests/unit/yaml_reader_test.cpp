@@ -42,7 +42,8 @@ TEST(YamlReader, UnknownKeyNamesTheNearestKnownOneWithFileAndLine) {
 }
 
 TEST(YamlReader, RefusesWhatIsNotAFiniteNumberInRange) {
-  for (const char* bad : {"v: .nan", "v: .inf", "v: abc", "v: 1e999", "v: '1'", "v: [1]", "v: -1", "v:", "v: 1 2"}) {
+  for (const char* bad :
+       {"v: .nan", "v: .inf", "v: abc", "v: 1e999", "v: '1'", "v: [1]", "v: -1", "v:", "v: 1 2"}) {
     const YamlMap map = YamlMap::from_text(bad, "f.yaml");
     EXPECT_THROW(map.number("v", Range::positive()), ConfigError) << bad;
   }

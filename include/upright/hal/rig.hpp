@@ -1,4 +1,5 @@
-// The seam between the control loop and a rig: what every backend (simulated, modbus, gpio, comedi) implements.
+// The seam between the control loop and a rig: what every backend (simulated, modbus, gpio, comedi)
+// implements.
 #pragma once
 
 #include <cstdint>
@@ -36,17 +37,20 @@ struct RigReading {
   RigFault fault = RigFault::none;
 };
 
-/// A rig as the loop sees it. `open` may throw Error and take its time; everything else is called from the real-time
-/// thread and neither allocates, locks, throws nor blocks beyond the deadline the backend was opened with.
+/// A rig as the loop sees it. `open` may throw Error and take its time; everything else is called from the
+/// real-time thread and neither allocates, locks, throws nor blocks beyond the deadline the backend was
+/// opened with.
 class Rig {
  public:
   virtual ~Rig() = default;
   /// Connects, checks what can be checked, leaves the motor at zero volts.
   virtual void open() = 0;
   virtual RigReading read() noexcept = 0;
-  /// Commands a voltage that the limiter has passed. A value that is not finite is refused and becomes zero volts.
+  /// Commands a voltage that the limiter has passed. A value that is not finite is refused and becomes zero
+  /// volts.
   virtual RigFault write(double voltage_v) noexcept = 0;
-  /// Zero volts and output disabled, by every means the backend has. May be called again and from a signal's aftermath.
+  /// Zero volts and output disabled, by every means the backend has. May be called again and from a signal's
+  /// aftermath.
   virtual void stop() noexcept = 0;
 };
 

@@ -1,5 +1,6 @@
-// Strict reading of YAML maps: every key is asked for by name with its type and range; whatever is missing, unknown,
-// doubled, of the wrong type, not finite or out of range is a ConfigError that gives remedy, file, line and key.
+// Strict reading of YAML maps: every key is asked for by name with its type and range; whatever is missing,
+// unknown, doubled, of the wrong type, not finite or out of range is a ConfigError that gives remedy, file,
+// line and key.
 #pragma once
 
 #include <cstdint>
@@ -19,12 +20,14 @@ struct Range {
   double high = std::numeric_limits<double>::infinity();
   bool low_open = false;  ///< the low end itself is refused
 
-  static Range any() { return {}; }
-  static Range positive() { return {0.0, std::numeric_limits<double>::infinity(), true}; }
-  static Range not_negative() { return {0.0, std::numeric_limits<double>::infinity(), false}; }
-  static Range within(double low, double high) { return {low, high, false}; }
+  static constexpr Range any() { return {}; }
+  static constexpr Range positive() { return {0.0, std::numeric_limits<double>::infinity(), true}; }
+  static constexpr Range not_negative() { return {0.0, std::numeric_limits<double>::infinity(), false}; }
+  static constexpr Range within(double low, double high) { return {low, high, false}; }
 
-  bool contains(double value) const { return (low_open ? value > low : value >= low) && value <= high; }
+  constexpr bool contains(double value) const {
+    return (low_open ? value > low : value >= low) && value <= high;
+  }
   std::string text() const;
 };
 
@@ -47,7 +50,8 @@ class YamlMap {
   double number_or(const std::string& key, double fallback, const Range& range = {}) const;
   std::optional<double> optional_number(const std::string& key, const Range& range = {}) const;
   std::int64_t integer(const std::string& key, std::int64_t low, std::int64_t high) const;
-  std::int64_t integer_or(const std::string& key, std::int64_t fallback, std::int64_t low, std::int64_t high) const;
+  std::int64_t integer_or(const std::string& key, std::int64_t fallback, std::int64_t low,
+                          std::int64_t high) const;
   bool flag_or(const std::string& key, bool fallback) const;
   std::string text(const std::string& key) const;
   std::string text_or(const std::string& key, const std::string& fallback) const;

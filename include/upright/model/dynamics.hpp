@@ -1,0 +1,349 @@
+// The physics, written once: equations (1) and (2) of the paper with a free inertia about the pivot, and
+// every effect through its hooks. No state, no events: engines decide which contact is sticking and call this
+// for the motion.
+//
+//   (M + m) x''      + m l cos(th) th'' = m l sin(th) th'^2 + F
+//   m l cos(th) x''  + J th''           = m g l sin(th) + T
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+
+#include "upright/model/plant_model.hpp"
+#include "upright/model/scalar.hpp"
+
+namespace upright {
+
+/// State of the plant. `motor_v` is used with motor_lag only, `bristle_m` with bristle_friction only.
+template <class S>
+struct PlantState {
+  S cart_m{};
+  S theta_rad{};
+  S cart_mps{};
+  S theta_radps{};
+  S motor_v{};
+  S bristle_m{};
+};
+
+/// A dry contact: at rest together, or sliding one way.
+enum class Contact : std::int8_t { slip_backward = -1, stick = 0, slip_forward = 1 };
+
+struct Contacts {
+  Contact cart = Contact::slip_forward;
+  Contact pivot = Contact::slip_forward;
+};
+
+/// The physics of one plant. `Present` is the set of its effects: EffectSet, or a StaticEffectSet for engines
+/// that compile it in. Numbers that do not change along a run are worked out once, here.
+template <class S, class Present = EffectSet>
+class Dynamics {
+ public:
+  explicit Dynamics(const PlantModel<S>& model, Present present = {})
+      : model_(model), base_(model.corrected()) {
+    if constexpr (std::is_same_v<Present, EffectSet>) {
+      present_ = model.present;
+    } else {
+      present_ = present;
+    }
+    total_mass_ = base_.cart_mass_kg;
+    coupling_ = S(0.0);
+    gravity_torque_ = S(0.0);
+    if (model.has_pendulum) {
+      total_mass_ = base_.cart_mass_kg + base_.pendulum_mass_kg;
+      coupling_ = base_.pendulum_mass_kg * base_.length_to_com_m;
+      gravity_torque_ = coupling_ * base_.gravity_mps2;
+    }
+    for_each_effect([&]<std::size_t I>() {
+      using E = EffectAt<I>;
+      if (!present_.template has<I>()) return;
+      if constexpr (has_bristles<E, S>) bristles_ = true;
+      if constexpr (has_cart_level<E, S>) cart_dry_ = true;
+      if constexpr (has_pivot_level<E, S>) pivot_dry_ = model.has_pendulum;
+      if constexpr (requires { E::kink_at_cart_rest; }) cart_kink_ = true;
+      if constexpr (requires { E::kink_at_pivot_rest; }) pivot_kink_ = model.has_pendulum;
+      if constexpr (requires { E::motor_time_constant_s(p<I>()); }) lag_ = true;
+    });
+  }
+
+  const PlantModel<S>& model() const { return model_; }
+  const BaseParameters<S>& base() const { return base_; }
+  bool cart_can_stick() const { return cart_dry_ && !bristles_ && model_.smoothing == 0.0; }
+  bool pivot_can_stick() const { return pivot_dry_ && model_.smoothing == 0.0; }
+  /// The force has a kink at zero velocity, so that engines should not step across it.
+  bool cart_has_kink() const { return cart_can_stick() || cart_kink_; }
+  bool pivot_has_kink() const { return pivot_can_stick() || pivot_kink_; }
+  bool has_motor_lag() const { return lag_; }
+  bool has_bristle_state() const { return bristles_; }
+  bool has_pendulum() const { return model_.has_pendulum; }
+  bool cart_locked() const { return model_.cart_locked; }
+
+  /// Voltage after dead zone, gain, offset and saturation; delay and lag are the engine's.
+  S actuate(S volts) const {
+    for (int stage = 1; stage <= 4; ++stage)
+      for_each_effect([&]<std::size_t I>() {
+        using E = EffectAt<I>;
+        if constexpr (requires { E::actuator_stage; })
+          if (E::actuator_stage == stage && present_.template has<I>()) volts = E::actuate(p<I>(), volts);
+      });
+    return volts;
+  }
+
+  S input_delay_s() const {
+    S delay(0.0);
+    for_each_effect([&]<std::size_t I>() {
+      using E = EffectAt<I>;
+      if constexpr (requires { E::input_delay_s(p<I>()); })
+        if (present_.template has<I>()) delay = delay + E::input_delay_s(p<I>());
+    });
+    return delay;
+  }
+
+  S motor_time_constant_s() const {
+    S constant(0.0);
+    for_each_effect([&]<std::size_t I>() {
+      using E = EffectAt<I>;
+      if constexpr (requires { E::motor_time_constant_s(p<I>()); })
+        if (present_.template has<I>()) constant = E::motor_time_constant_s(p<I>());
+    });
+    return constant;
+  }
+
+  /// What the sensors show of a state (before quantisation).
+  Outputs<S> measure(const PlantState<S>& state) const {
+    Outputs<S> outputs{state.cart_m, state.theta_rad};
+    for (int stage = 1; stage <= 2; ++stage)
+      for_each_effect([&]<std::size_t I>() {
+        using E = EffectAt<I>;
+        if constexpr (requires { E::sensor_stage; })
+          if (E::sensor_stage == stage && present_.template has<I>()) E::measure(p<I>(), outputs);
+      });
+    return outputs;
+  }
+
+  /// Dry level of the cart in direction +1 or -1 at a speed >= 0: what sliding costs, and at speed 0 what
+  /// rest holds.
+  S cart_dry_level(const S& x, const S& speed, const S& direction) const {
+    S level(0.0);
+    for_each_effect([&]<std::size_t I>() {
+      using E = EffectAt<I>;
+      if constexpr (has_cart_level<E, S>)
+        if (present_.template has<I>()) level = level + E::cart_dry_level(p<I>(), x, speed, direction);
+    });
+    return positive_part(level);
+  }
+
+  S pivot_dry_level() const {
+    S level(0.0);
+    for_each_effect([&]<std::size_t I>() {
+      using E = EffectAt<I>;
+      if constexpr (has_pivot_level<E, S>)
+        if (present_.template has<I>()) level = level + E::pivot_dry_level(p<I>());
+    });
+    return level;
+  }
+
+  /// Motor and every smooth force on the cart; dry friction and bristles are not in it.
+  S cart_smooth_force(const PlantState<S>& state, const S& motor_v) const {
+    S force = base_.force_per_volt_n * motor_v - base_.back_emf_n_per_mps * state.cart_mps;
+    for_each_effect([&]<std::size_t I>() {
+      using E = EffectAt<I>;
+      if constexpr (requires { E::cart_force(p<I>(), state.cart_m, state.cart_mps); })
+        if (present_.template has<I>()) force = force + E::cart_force(p<I>(), state.cart_m, state.cart_mps);
+    });
+    return force;
+  }
+
+  S pivot_smooth_torque(const S& omega) const {
+    S torque(0.0);
+    for_each_effect([&]<std::size_t I>() {
+      using E = EffectAt<I>;
+      if constexpr (requires { E::pivot_torque(p<I>(), omega); })
+        if (present_.template has<I>()) torque = torque + E::pivot_torque(p<I>(), omega);
+    });
+    return torque;
+  }
+
+  /// Time derivative of the state with the voltage at the motor (after the whole actuator chain) given. The
+  /// derivative of motor_v is left at zero: the lag is linear, so engines follow it exactly.
+  PlantState<S> derivative(const PlantState<S>& state, const S& motor_v, Contacts contacts) const {
+    PlantState<S> rate{};
+    S force = cart_smooth_force(state, motor_v);
+    if (bristles_) {
+      rate.bristle_m = bristle_rate(state);
+      force = force - bristle_stiffness() * state.bristle_m - bristle_damping() * rate.bristle_m;
+    } else if (cart_dry_) {
+      force = force + cart_sliding_force(state, contacts.cart);
+    }
+    S torque(0.0);
+    if (model_.has_pendulum) {
+      torque = pivot_smooth_torque(state.theta_radps);
+      if (pivot_dry_) torque = torque + pivot_sliding_torque(state.theta_radps, contacts.pivot);
+    }
+    const bool cart_rests = model_.cart_locked || (contacts.cart == Contact::stick && cart_can_stick());
+    const bool pivot_rests = !model_.has_pendulum || (contacts.pivot == Contact::stick && pivot_can_stick());
+    accelerate(state, force, torque, cart_rests, pivot_rests, rate);
+    rate.cart_m = cart_rests ? S(0.0) : state.cart_mps;
+    rate.theta_rad = pivot_rests ? S(0.0) : state.theta_radps;
+    return rate;
+  }
+
+  /// The force that dry friction would have to balance to hold a resting cart: motor, smooth forces and the
+  /// pendulum's reaction together, with the pivot as it is.
+  S cart_load(const PlantState<S>& state, const S& motor_v, Contact pivot) const {
+    PlantState<S> at_rest = state;
+    at_rest.cart_mps = S(0.0);
+    const S force = cart_smooth_force(at_rest, motor_v);
+    if (!model_.has_pendulum) return force;
+    using std::cos;
+    using std::sin;
+    const S s = sin(state.theta_rad);
+    S theta_acceleration(0.0);
+    if (!(pivot == Contact::stick && pivot_can_stick())) {
+      S torque = pivot_smooth_torque(state.theta_radps);
+      if (pivot_dry_) torque = torque + pivot_sliding_torque(state.theta_radps, pivot);
+      theta_acceleration = (gravity_torque_ * s + torque) / base_.inertia_about_pivot_kgm2;
+    }
+    return force + coupling_ * (s * state.theta_radps * state.theta_radps -
+                                cos(state.theta_rad) * theta_acceleration);
+  }
+
+  /// The torque that dry friction would have to balance to hold a resting pendulum, with the cart as it is.
+  S pivot_load(const PlantState<S>& state, const S& motor_v, Contact cart) const {
+    using std::cos;
+    using std::sin;
+    const S gravity = gravity_torque_ * sin(state.theta_rad);
+    const bool cart_rests = model_.cart_locked || (cart == Contact::stick && cart_can_stick());
+    if (cart_rests) return gravity;
+    PlantState<S> at_rest = state;
+    at_rest.theta_radps = S(0.0);
+    const PlantState<S> rate = derivative(at_rest, motor_v, {cart, Contact::stick});
+    return gravity - coupling_ * cos(state.theta_rad) * rate.cart_mps;
+  }
+
+  /// Fastest rate of the motion here [1/s]; engines keep their steps below a fraction of its inverse.
+  double fastest_rate_radps(const PlantState<S>& state) const {
+    const double mass = value_of(least_cart_inertia());
+    const double v = value_of(state.cart_mps);
+    double rate = value_of(base_.back_emf_n_per_mps) / mass + std::abs(value_of(state.theta_radps));
+    for_each_effect([&]<std::size_t I>() {
+      using E = EffectAt<I>;
+      if constexpr (requires(const double* q) { E::rate_radps(q, v, mass); })
+        if (present_.template has<I>()) {
+          std::array<double, parameter_count_of<I>> plain;
+          for (std::size_t i = 0; i < plain.size(); ++i) plain[i] = value_of(p<I>()[i]);
+          rate += E::rate_radps(plain.data(), v, mass);
+        }
+    });
+    if (bristles_) {
+      const double level =
+          value_of(cart_dry_level(state.cart_m, absolute(state.cart_mps), S(v < 0.0 ? -1.0 : 1.0)));
+      rate += value_of(bristle_stiffness()) * std::abs(v) / std::max(level, smallest_level_n);
+    }
+    return rate;
+  }
+
+  S bristle_stiffness() const { return sum_of_bristles<true>(); }
+  S bristle_damping() const { return sum_of_bristles<false>(); }
+
+  /// Smallest inertia that a force on the cart meets [kg].
+  S least_cart_inertia() const {
+    if (!model_.has_pendulum) return total_mass_;
+    return total_mass_ - coupling_ * coupling_ / base_.inertia_about_pivot_kgm2;
+  }
+
+ private:
+  /// A level that vanishes somewhere along the track lets the bristles slip freely, not divide by zero.
+  static constexpr double smallest_level_n = 1e-6;
+
+  template <class E, class T>
+  static constexpr bool has_cart_level = requires(const T* q, const T& x) {
+    E::cart_dry_level(q, x, x, x);
+  };
+  template <class E, class T>
+  static constexpr bool has_pivot_level = requires(const T* q) {
+    E::pivot_dry_level(q);
+  };
+  template <class E, class T>
+  static constexpr bool has_bristles = requires(const T* q) {
+    E::bristle_stiffness(q);
+  };
+
+  template <std::size_t I>
+  const S* p() const {
+    return &model_.parameters[parameter_offset<I>];
+  }
+
+  S bristle_rate(const PlantState<S>& state) const {
+    const S speed = absolute(state.cart_mps);
+    const S direction = select(state.cart_mps < S(0.0), S(-1.0), S(1.0));
+    const S level = cart_dry_level(state.cart_m, speed, direction);
+    const S safe = select(level > S(smallest_level_n), level, S(smallest_level_n));
+    return state.cart_mps - bristle_stiffness() * speed * state.bristle_m / safe;
+  }
+
+  S cart_sliding_force(const PlantState<S>& state, Contact contact) const {
+    using std::tanh;
+    if (model_.smoothing > 0.0) {
+      const S direction = tanh(S(model_.smoothing) * state.cart_mps);
+      return -cart_dry_level(state.cart_m, absolute(state.cart_mps), direction) * direction;
+    }
+    if (contact == Contact::stick) return S(0.0);
+    const S direction(static_cast<double>(contact));
+    return -cart_dry_level(state.cart_m, positive_part(S(direction * state.cart_mps)), direction) * direction;
+  }
+
+  S pivot_sliding_torque(const S& omega, Contact contact) const {
+    using std::tanh;
+    if (model_.smoothing > 0.0) return -pivot_dry_level() * tanh(S(model_.smoothing) * omega);
+    return -pivot_dry_level() * S(static_cast<double>(contact));
+  }
+
+  void accelerate(const PlantState<S>& state, const S& force, const S& torque, bool cart_rests,
+                  bool pivot_rests, PlantState<S>& rate) const {
+    using std::cos;
+    using std::sin;
+    rate.cart_mps = S(0.0);
+    rate.theta_radps = S(0.0);
+    if (!model_.has_pendulum) {
+      if (!cart_rests) rate.cart_mps = force / total_mass_;
+      return;
+    }
+    const S s = sin(state.theta_rad);
+    const S push = force + coupling_ * s * state.theta_radps * state.theta_radps;
+    if (pivot_rests) {
+      if (!cart_rests) rate.cart_mps = push / total_mass_;
+      return;
+    }
+    const S turn = gravity_torque_ * s + torque;
+    if (cart_rests) {
+      rate.theta_radps = turn / base_.inertia_about_pivot_kgm2;
+      return;
+    }
+    const S off_diagonal = coupling_ * cos(state.theta_rad);
+    const S determinant = total_mass_ * base_.inertia_about_pivot_kgm2 - off_diagonal * off_diagonal;
+    rate.cart_mps = (base_.inertia_about_pivot_kgm2 * push - off_diagonal * turn) / determinant;
+    rate.theta_radps = (total_mass_ * turn - off_diagonal * push) / determinant;
+  }
+
+  template <bool Stiffness>
+  S sum_of_bristles() const {
+    S sum(0.0);
+    for_each_effect([&]<std::size_t I>() {
+      using E = EffectAt<I>;
+      if constexpr (has_bristles<E, S>)
+        if (present_.template has<I>())
+          sum = sum + (Stiffness ? E::bristle_stiffness(p<I>()) : E::bristle_damping(p<I>()));
+    });
+    return sum;
+  }
+
+  PlantModel<S> model_;
+  BaseParameters<S> base_;
+  Present present_;
+  S total_mass_, coupling_, gravity_torque_;
+  bool bristles_ = false, cart_dry_ = false, pivot_dry_ = false, cart_kink_ = false, pivot_kink_ = false,
+       lag_ = false;
+};
+
+}  // namespace upright

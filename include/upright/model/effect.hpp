@@ -1,0 +1,86 @@
+// What an effect says of itself, and the hooks by which it enters the plant. One file per effect in effects/,
+// one line in effects/all.hpp; the registry, plant files, engines, candidates and documents follow from
+// there.
+//
+// An effect is a struct with `parameters` and `info`, and any of these static templates on the scalar S,
+// where p points at its own parameters in their declared order:
+//   S cart_force(p, x, v)                       force on the cart [N]
+//   S cart_dry_level(p, x, speed, direction)    its share of the dry level [N] in direction +1 or -1, speed =
+//   |v| S pivot_torque(p, omega)                    torque on the pendulum about the pivot [N m] S
+//   pivot_dry_level(p)                        dry level of the pivot [N m] S actuate(p, volts) one stage of
+//   the static actuator chain [V], by `actuator_stage` S input_delay_s(p), S motor_time_constant_s(p) S
+//   bristle_stiffness(p), S bristle_damping(p) void measure(p, Outputs<S>&)                one stage of the
+//   sensors, by `sensor_stage` void correct(p, BaseParameters<S>&)         the true base parameters from the
+//   model's double rate_radps(p, v, mass)               fastest rate it brings [1/s], by which engines choose
+//   their steps
+// and the flags `kink_at_cart_rest`, `kink_at_pivot_rest` where its force is not smooth through zero
+// velocity.
+#pragma once
+
+#include <limits>
+#include <span>
+#include <string_view>
+
+#include "upright/model/yaml_reader.hpp"
+
+namespace upright {
+
+/// Where an effect enters.
+enum class Enters { cart, actuator, pendulum, sensor, parameter };
+
+constexpr std::string_view name_of(Enters enters) {
+  switch (enters) {
+    case Enters::cart:
+      return "cart";
+    case Enters::actuator:
+      return "actuator";
+    case Enters::pendulum:
+      return "pendulum";
+    case Enters::sensor:
+      return "sensor";
+    case Enters::parameter:
+      return "parameter";
+  }
+  return "";
+}
+
+struct ParameterInfo {
+  std::string_view name;
+  std::string_view unit;
+  Range range;
+  double neutral;  ///< the value at which the effect is not there; NaN where none (a shape, a place)
+  double typical;  ///< the order of magnitude on a laboratory cart; where a search starts
+  std::string_view meaning;
+};
+
+constexpr double no_neutral = std::numeric_limits<double>::quiet_NaN();
+
+struct EffectInfo {
+  std::string_view kind;
+  Enters enters;
+  bool dry;  ///< part of a contact: a level, not a force law
+  std::string_view equation;
+  std::string_view meaning;
+  std::span<const ParameterInfo> parameters;
+};
+
+/// What the sensors show.
+template <class S>
+struct Outputs {
+  S cart_m;
+  S theta_rad;
+};
+
+/// The rigid body and the motor, as numbers of a scalar type.
+template <class S>
+struct BaseParameters {
+  S cart_mass_kg;
+  S pendulum_mass_kg;
+  S length_to_com_m;
+  S inertia_about_pivot_kgm2;
+  S gravity_mps2;
+  S force_per_volt_n;
+  S back_emf_n_per_mps;
+};
+
+}  // namespace upright

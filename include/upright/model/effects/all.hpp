@@ -1,0 +1,67 @@
+// The registration of every effect: one line each. Their order here is the order of documents and candidates.
+#pragma once
+
+#include <tuple>
+
+#include "upright/model/effects/angle_offset.hpp"
+#include "upright/model/effects/angle_scale.hpp"
+#include "upright/model/effects/back_emf.hpp"
+#include "upright/model/effects/bristle_friction.hpp"
+#include "upright/model/effects/cable_spring.hpp"
+#include "upright/model/effects/cart_mass.hpp"
+#include "upright/model/effects/cart_scale.hpp"
+#include "upright/model/effects/cogging_force.hpp"
+#include "upright/model/effects/constant_force.hpp"
+#include "upright/model/effects/coulomb_friction.hpp"
+#include "upright/model/effects/friction_asymmetry.hpp"
+#include "upright/model/effects/input_delay.hpp"
+#include "upright/model/effects/motor_lag.hpp"
+#include "upright/model/effects/pendulum_length.hpp"
+#include "upright/model/effects/pendulum_mass.hpp"
+#include "upright/model/effects/pivot_coulomb_friction.hpp"
+#include "upright/model/effects/pivot_quadratic_drag.hpp"
+#include "upright/model/effects/pivot_viscous_friction.hpp"
+#include "upright/model/effects/position_dependent_friction.hpp"
+#include "upright/model/effects/quadratic_drag.hpp"
+#include "upright/model/effects/stribeck_friction.hpp"
+#include "upright/model/effects/viscous_asymmetry.hpp"
+#include "upright/model/effects/viscous_friction.hpp"
+#include "upright/model/effects/voltage_dead_zone.hpp"
+#include "upright/model/effects/voltage_gain.hpp"
+#include "upright/model/effects/voltage_offset.hpp"
+#include "upright/model/effects/voltage_saturation.hpp"
+
+namespace upright {
+
+// clang-format off
+using AllEffects =
+    std::tuple<effects::ViscousFriction,
+               effects::CoulombFriction,
+               effects::FrictionAsymmetry,
+               effects::ViscousAsymmetry,
+               effects::StribeckFriction,
+               effects::PositionDependentFriction,
+               effects::BristleFriction,
+               effects::QuadraticDrag,
+               effects::ConstantForce,
+               effects::CableSpring,
+               effects::CoggingForce,
+               effects::VoltageSaturation,
+               effects::VoltageDeadZone,
+               effects::VoltageGain,
+               effects::VoltageOffset,
+               effects::InputDelay,
+               effects::MotorLag,
+               effects::PivotViscousFriction,
+               effects::PivotCoulombFriction,
+               effects::PivotQuadraticDrag,
+               effects::AngleOffset,
+               effects::CartScale,
+               effects::AngleScale,
+               effects::CartMass,
+               effects::PendulumMass,
+               effects::PendulumLength,
+               effects::BackEmf>;
+// clang-format on
+
+}  // namespace upright

@@ -1,0 +1,27 @@
+// angle_offset: the angle sensor is zeroed off the vertical.
+#pragma once
+
+#include "upright/model/effect.hpp"
+
+namespace upright::effects {
+
+struct AngleOffset {
+  static constexpr ParameterInfo parameters[] = {
+      {"offset_rad", "rad", Range::any(), 0.0, 0.01, "o: what the sensor shows upright"},
+  };
+  static constexpr EffectInfo info{"angle_offset",
+                                   Enters::sensor,
+                                   false,
+                                   "measured theta = theta + o",
+                                   "the angle sensor is zeroed off the vertical",
+                                   parameters};
+
+  static constexpr int sensor_stage = 2;
+
+  template <class S>
+  static void measure(const S* p, Outputs<S>& outputs) {
+    outputs.theta_rad = outputs.theta_rad + p[0];
+  }
+};
+
+}  // namespace upright::effects

@@ -1,0 +1,28 @@
+// angle_scale: the angle encoder counts more or fewer radians than there are; zero is upright.
+#pragma once
+
+#include "upright/model/effect.hpp"
+
+namespace upright::effects {
+
+struct AngleScale {
+  static constexpr ParameterInfo parameters[] = {
+      {"scale", "1", Range::positive(), 1.0, 1.0, "k: radians shown per radian"},
+  };
+  static constexpr EffectInfo info{
+      "angle_scale",
+      Enters::sensor,
+      false,
+      "measured theta = k theta",
+      "the angle encoder counts more or fewer radians than there are; zero is upright",
+      parameters};
+
+  static constexpr int sensor_stage = 1;
+
+  template <class S>
+  static void measure(const S* p, Outputs<S>& outputs) {
+    outputs.theta_rad = p[0] * outputs.theta_rad;
+  }
+};
+
+}  // namespace upright::effects

@@ -1,0 +1,22 @@
+// cart_mass: the cart is heavier or lighter than the model says.
+#pragma once
+
+#include "upright/model/effect.hpp"
+
+namespace upright::effects {
+
+struct CartMass {
+  static constexpr ParameterInfo parameters[] = {
+      {"scale", "1", Range::positive(), 1.0, 1.0, "k: true mass over the mass in the model"},
+  };
+  static constexpr EffectInfo info{
+      "cart_mass", Enters::parameter, false, "M -> k M", "the cart is heavier or lighter than the model says",
+      parameters};
+
+  template <class S>
+  static void correct(const S* p, BaseParameters<S>& base) {
+    base.cart_mass_kg = p[0] * base.cart_mass_kg;
+  }
+};
+
+}  // namespace upright::effects

@@ -1,0 +1,27 @@
+// cart_scale: the cart encoder counts more or fewer metres than there are.
+#pragma once
+
+#include "upright/model/effect.hpp"
+
+namespace upright::effects {
+
+struct CartScale {
+  static constexpr ParameterInfo parameters[] = {
+      {"scale", "1", Range::positive(), 1.0, 1.0, "k: metres shown per metre"},
+  };
+  static constexpr EffectInfo info{"cart_scale",
+                                   Enters::sensor,
+                                   false,
+                                   "measured x = k x",
+                                   "the cart encoder counts more or fewer metres than there are",
+                                   parameters};
+
+  static constexpr int sensor_stage = 1;
+
+  template <class S>
+  static void measure(const S* p, Outputs<S>& outputs) {
+    outputs.cart_m = p[0] * outputs.cart_m;
+  }
+};
+
+}  // namespace upright::effects

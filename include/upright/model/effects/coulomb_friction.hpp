@@ -1,0 +1,27 @@
+// coulomb_friction: dry friction between cart and track with a level that does not depend on speed.
+#pragma once
+
+#include "upright/model/effect.hpp"
+
+namespace upright::effects {
+
+struct CoulombFriction {
+  static constexpr ParameterInfo parameters[] = {
+      {"force_n", "N", Range::not_negative(), 0.0, 0.5,
+       "Fc: sliding level, and the breakaway level where there is no Stribeck excess"},
+  };
+  static constexpr EffectInfo info{
+      "coulomb_friction",
+      Enters::cart,
+      true,
+      "level L = Fc; sliding: F = -L sgn(v); at rest: holds up to L",
+      "dry friction between cart and track with a level that does not depend on speed",
+      parameters};
+
+  template <class S>
+  static S cart_dry_level(const S* p, const S& /*x*/, const S& /*speed*/, const S& /*direction*/) {
+    return p[0];
+  }
+};
+
+}  // namespace upright::effects

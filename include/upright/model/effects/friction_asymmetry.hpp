@@ -1,0 +1,26 @@
+// friction_asymmetry: dry friction that is larger one way than the other.
+#pragma once
+
+#include "upright/model/effect.hpp"
+
+namespace upright::effects {
+
+struct FrictionAsymmetry {
+  static constexpr ParameterInfo parameters[] = {
+      {"force_n", "N", Range::any(), 0.0, 0.2,
+       "d: added to the level when the cart moves toward +x, taken off the other way"},
+  };
+  static constexpr EffectInfo info{"friction_asymmetry",
+                                   Enters::cart,
+                                   true,
+                                   "L += d s, s = sgn(v)",
+                                   "dry friction that is larger one way than the other",
+                                   parameters};
+
+  template <class S>
+  static S cart_dry_level(const S* p, const S& /*x*/, const S& /*speed*/, const S& direction) {
+    return p[0] * direction;
+  }
+};
+
+}  // namespace upright::effects

@@ -1,0 +1,22 @@
+// input_delay: the voltage acts later than commanded.
+#pragma once
+
+#include "upright/model/effect.hpp"
+
+namespace upright::effects {
+
+struct InputDelay {
+  static constexpr ParameterInfo parameters[] = {
+      {"delay_s", "s", (Range{0.0, 1.0}), 0.0, 0.005, "d: the delay"},
+  };
+  static constexpr EffectInfo info{
+      "input_delay", Enters::actuator, false, "V(t) -> V(t - d)", "the voltage acts later than commanded",
+      parameters};
+
+  template <class S>
+  static S input_delay_s(const S* p) {
+    return p[0];
+  }
+};
+
+}  // namespace upright::effects

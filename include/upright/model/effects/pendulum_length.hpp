@@ -1,0 +1,26 @@
+// pendulum_length: the pendulum is longer or shorter than the model says.
+#pragma once
+
+#include "upright/model/effect.hpp"
+
+namespace upright::effects {
+
+struct PendulumLength {
+  static constexpr ParameterInfo parameters[] = {
+      {"scale", "1", Range::positive(), 1.0, 1.0, "k: true length over the length in the model"},
+  };
+  static constexpr EffectInfo info{"pendulum_length",
+                                   Enters::parameter,
+                                   false,
+                                   "l -> k l, J -> k^2 J",
+                                   "the pendulum is longer or shorter than the model says",
+                                   parameters};
+
+  template <class S>
+  static void correct(const S* p, BaseParameters<S>& base) {
+    base.length_to_com_m = p[0] * base.length_to_com_m;
+    base.inertia_about_pivot_kgm2 = p[0] * p[0] * base.inertia_about_pivot_kgm2;
+  }
+};
+
+}  // namespace upright::effects

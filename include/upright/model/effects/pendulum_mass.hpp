@@ -1,0 +1,26 @@
+// pendulum_mass: the pendulum is heavier or lighter than the model says.
+#pragma once
+
+#include "upright/model/effect.hpp"
+
+namespace upright::effects {
+
+struct PendulumMass {
+  static constexpr ParameterInfo parameters[] = {
+      {"scale", "1", Range::positive(), 1.0, 1.0, "k: true mass over the mass in the model"},
+  };
+  static constexpr EffectInfo info{"pendulum_mass",
+                                   Enters::parameter,
+                                   false,
+                                   "m -> k m, J -> k J",
+                                   "the pendulum is heavier or lighter than the model says",
+                                   parameters};
+
+  template <class S>
+  static void correct(const S* p, BaseParameters<S>& base) {
+    base.pendulum_mass_kg = p[0] * base.pendulum_mass_kg;
+    base.inertia_about_pivot_kgm2 = p[0] * base.inertia_about_pivot_kgm2;
+  }
+};
+
+}  // namespace upright::effects

@@ -1,0 +1,29 @@
+// pivot_quadratic_drag: drag on the pendulum with the square of its rate: the air.
+#pragma once
+
+#include "upright/model/effect.hpp"
+#include "upright/model/scalar.hpp"
+
+namespace upright::effects {
+
+struct PivotQuadraticDrag {
+  static constexpr ParameterInfo parameters[] = {
+      {"coefficient_nms2_per_rad2", "N m s^2/rad^2", Range::not_negative(), 0.0, 0.0003,
+       "c: torque per rate squared"},
+  };
+  static constexpr EffectInfo info{"pivot_quadratic_drag",
+                                   Enters::pendulum,
+                                   false,
+                                   "T = -c w |w|",
+                                   "drag on the pendulum with the square of its rate: the air",
+                                   parameters};
+
+  static constexpr bool kink_at_pivot_rest = true;
+
+  template <class S>
+  static S pivot_torque(const S* p, const S& omega) {
+    return -p[0] * omega * absolute(omega);
+  }
+};
+
+}  // namespace upright::effects

@@ -1,0 +1,25 @@
+// viscous_friction: friction on the cart in proportion to its velocity.
+#pragma once
+
+#include "upright/model/effect.hpp"
+
+namespace upright::effects {
+
+struct ViscousFriction {
+  static constexpr ParameterInfo parameters[] = {
+      {"coefficient_n_per_mps", "N s/m", Range::not_negative(), 0.0, 3.0, "c: force per velocity"},
+  };
+  static constexpr EffectInfo info{"viscous_friction",
+                                   Enters::cart,
+                                   false,
+                                   "F = -c v",
+                                   "friction on the cart in proportion to its velocity",
+                                   parameters};
+
+  template <class S>
+  static S cart_force(const S* p, const S& /*x*/, const S& v) {
+    return -p[0] * v;
+  }
+};
+
+}  // namespace upright::effects

@@ -1,0 +1,25 @@
+// voltage_dead_zone: small voltages do nothing.
+#pragma once
+
+#include "upright/model/effect.hpp"
+#include "upright/model/scalar.hpp"
+
+namespace upright::effects {
+
+struct VoltageDeadZone {
+  static constexpr ParameterInfo parameters[] = {
+      {"half_width_v", "V", Range::not_negative(), 0.0, 0.3, "w: half of the zone"},
+  };
+  static constexpr EffectInfo info{
+      "voltage_dead_zone",         Enters::actuator, false, "V -> V - sgn(V) w outside +-w, 0 inside",
+      "small voltages do nothing", parameters};
+
+  static constexpr int actuator_stage = 1;
+
+  template <class S>
+  static S actuate(const S* p, const S& volts) {
+    return select(volts > p[0], S(volts - p[0]), select(volts < -p[0], S(volts + p[0]), S(0.0)));
+  }
+};
+
+}  // namespace upright::effects

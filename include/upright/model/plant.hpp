@@ -1,0 +1,57 @@
+// A plant as its file describes it: rigid body, motor, and the effects it has. Plain data.
+#pragma once
+
+#include <array>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "upright/model/registry.hpp"
+
+namespace upright {
+
+struct Pendulum {
+  double mass_kg = 0.0;
+  double length_to_com_m = 0.0;  ///< pivot to centre of mass
+  /// About the pivot. Not given: a uniform rod, 4/3 m l^2.
+  std::optional<double> given_inertia_kgm2;
+
+  double inertia_about_pivot_kgm2() const {
+    return given_inertia_kgm2.value_or(4.0 / 3.0 * mass_kg * length_to_com_m * length_to_com_m);
+  }
+};
+
+/// Force of the motor on the cart: force_per_volt V - back_emf v (paper, equation (2)).
+struct Motor {
+  double force_per_volt_n = 0.0;
+  double back_emf_n_per_mps = 0.0;
+};
+
+/// One effect of a plant: its number in the registry and its parameter values in their declared order.
+struct PlantEffect {
+  std::size_t number = 0;
+  std::array<double, most_effect_parameters> values{};
+};
+
+struct Plant {
+  double cart_mass_kg = 0.0;
+  std::optional<Pendulum> pendulum;  ///< none: the cart alone
+  double gravity_mps2 = 9.8;
+  Motor motor;
+  std::vector<PlantEffect> effects;  ///< each kind at most once
+
+  const PlantEffect* find(std::size_t effect) const;
+  const PlantEffect* find(std::string_view kind) const { return find(effect_number(kind)); }
+  /// Adds an effect, or gives new values to the one that is there.
+  void set(std::size_t effect, std::span<const double> values);
+  void set(std::string_view kind, std::initializer_list<double> values) {
+    set(effect_number(kind), std::span<const double>(values.begin(), values.size()));
+  }
+  void remove(std::size_t effect);
+};
+
+/// What is wrong with a plant as a whole, a sentence with the remedy first; empty when it can be simulated.
+std::string fault_of(const Plant& plant);
+
+}  // namespace upright

@@ -1,0 +1,26 @@
+// Plant files (interface: "Plant file"): read strictly, written so that they read back exactly.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "upright/model/plant.hpp"
+#include "upright/model/yaml_reader.hpp"
+
+namespace upright {
+
+/// Reads a plant file. Throws ConfigError with remedy, file, line and key.
+Plant read_plant_file(const std::filesystem::path& file);
+
+/// Reads a plant from a document that is already parsed; `document` holds the key `plant`.
+Plant read_plant(const YamlMap& document);
+
+/// The plant file as text. `comments` become lines at its top.
+std::string plant_text(const Plant& plant, const std::vector<std::string>& comments = {});
+
+/// Writes the plant file; an existing file is replaced. Throws Error when it cannot be written.
+void write_plant_file(const Plant& plant, const std::filesystem::path& file,
+                      const std::vector<std::string>& comments = {});
+
+}  // namespace upright

@@ -1,0 +1,80 @@
+// A plant as numbers of a scalar type: what engines compute with. Differentiate with respect to a parameter
+// by making it a dual number here.
+#pragma once
+
+#include <array>
+
+#include "upright/model/plant.hpp"
+
+namespace upright {
+
+template <class S>
+struct PlantModel {
+  BaseParameters<S> base{};  ///< as in the plant file, before the parameter effects
+  bool has_pendulum = false;
+  bool cart_locked = false;  ///< the cart is held: the pendulum swings alone
+  EffectSet present;
+  std::array<S, all_parameter_count> parameters{};  ///< flat, by parameter_offset
+  /// 0: dry friction is a contact with events. Above 0: sgn(v) becomes tanh(smoothing v), no sticking (for
+  /// linear design).
+  double smoothing = 0.0;
+
+  template <std::size_t I>
+  const S* of() const {
+    return &parameters[parameter_offset<I>];
+  }
+
+  /// Base parameters with the effects that correct them (cart_mass, pendulum_mass, pendulum_length, back_emf)
+  /// applied.
+  BaseParameters<S> corrected() const {
+    BaseParameters<S> result = base;
+    for_each_effect([&]<std::size_t I>() {
+      using E = EffectAt<I>;
+      if constexpr (requires { E::correct(of<I>(), result); })
+        if (present.has<I>()) E::correct(of<I>(), result);
+    });
+    return result;
+  }
+};
+
+/// The model of a plant with plain numbers converted to S.
+template <class S>
+PlantModel<S> make_model(const Plant& plant, bool cart_locked = false) {
+  PlantModel<S> model;
+  model.base.cart_mass_kg = S(plant.cart_mass_kg);
+  model.has_pendulum = plant.pendulum.has_value();
+  if (plant.pendulum) {
+    model.base.pendulum_mass_kg = S(plant.pendulum->mass_kg);
+    model.base.length_to_com_m = S(plant.pendulum->length_to_com_m);
+    model.base.inertia_about_pivot_kgm2 = S(plant.pendulum->inertia_about_pivot_kgm2());
+  }
+  model.base.gravity_mps2 = S(plant.gravity_mps2);
+  model.base.force_per_volt_n = S(plant.motor.force_per_volt_n);
+  model.base.back_emf_n_per_mps = S(plant.motor.back_emf_n_per_mps);
+  model.cart_locked = cart_locked;
+  for (const PlantEffect& effect : plant.effects) {
+    model.present.add(effect.number);
+    const std::size_t offset = effect_parameter_offset(effect.number);
+    for (std::size_t i = 0; i < effect_registry()[effect.number].parameters.size(); ++i)
+      model.parameters[offset + i] = S(effect.values[i]);
+  }
+  return model;
+}
+
+/// The same model with the plain values of its numbers.
+template <class S>
+PlantModel<double> values_of(const PlantModel<S>& model) {
+  PlantModel<double> plain;
+  plain.base = {value_of(model.base.cart_mass_kg),      value_of(model.base.pendulum_mass_kg),
+                value_of(model.base.length_to_com_m),   value_of(model.base.inertia_about_pivot_kgm2),
+                value_of(model.base.gravity_mps2),      value_of(model.base.force_per_volt_n),
+                value_of(model.base.back_emf_n_per_mps)};
+  plain.has_pendulum = model.has_pendulum;
+  plain.cart_locked = model.cart_locked;
+  plain.present = model.present;
+  plain.smoothing = model.smoothing;
+  for (std::size_t i = 0; i < all_parameter_count; ++i) plain.parameters[i] = value_of(model.parameters[i]);
+  return plain;
+}
+
+}  // namespace upright

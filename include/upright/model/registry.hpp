@@ -1,0 +1,85 @@
+// The list of every effect, at run time (names, units, ranges, equations) and at compile time (offsets,
+// folds).
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <string_view>
+#include <tuple>
+#include <type_traits>
+#include <utility>
+
+#include "upright/model/effects/all.hpp"
+
+namespace upright {
+
+constexpr std::size_t effect_count = std::tuple_size_v<AllEffects>;
+constexpr std::size_t most_effect_parameters = 3;
+
+template <std::size_t I>
+using EffectAt = std::tuple_element_t<I, AllEffects>;
+
+template <std::size_t I>
+constexpr std::size_t parameter_count_of = std::size(EffectAt<I>::parameters);
+
+/// Where the parameters of effect I begin in the flat array of all effects' parameters.
+template <std::size_t I>
+constexpr std::size_t parameter_offset = parameter_offset<I - 1> + parameter_count_of<I - 1>;
+template <>
+inline constexpr std::size_t parameter_offset<0> = 0;
+
+constexpr std::size_t all_parameter_count =
+    parameter_offset<effect_count - 1> + parameter_count_of<effect_count - 1>;
+
+/// Index of an effect type, by which plants and masks name it.
+template <class E, std::size_t I = 0>
+constexpr std::size_t effect_index() {
+  if constexpr (std::is_same_v<EffectAt<I>, E>) {
+    return I;
+  } else {
+    return effect_index<E, I + 1>();
+  }
+}
+
+/// Calls f.template operator()<I>() for every effect index I.
+template <class F>
+constexpr void for_each_effect(F&& f) {
+  [&]<std::size_t... I>(std::index_sequence<I...>) {
+    (f.template operator()<I>(), ...);
+  }
+  (std::make_index_sequence<effect_count>{});
+}
+
+/// Every effect's description, in the order of registration; the index is the effect's number.
+std::span<const EffectInfo> effect_registry();
+
+/// The number of a kind; `effect_count` when there is no such kind.
+std::size_t effect_number(std::string_view kind);
+
+/// Where the parameters of an effect begin in the flat array.
+std::size_t effect_parameter_offset(std::size_t effect);
+
+/// A set of effects known at run time.
+struct EffectSet {
+  std::uint64_t mask = 0;
+  template <std::size_t I>
+  constexpr bool has() const {
+    return (mask >> I & 1u) != 0;
+  }
+  constexpr bool has(std::size_t effect) const { return (mask >> effect & 1u) != 0; }
+  void add(std::size_t effect) { mask |= std::uint64_t{1} << effect; }
+};
+static_assert(effect_count <= 64);
+
+/// A set of effects known at compile time: what is not in it costs nothing.
+template <std::uint64_t Mask>
+struct StaticEffectSet {
+  template <std::size_t I>
+  static constexpr bool has() {
+    return (Mask >> I & 1u) != 0;
+  }
+};
+
+}  // namespace upright

@@ -1,0 +1,44 @@
+// What the physics asks of a scalar, so that the same text runs on double, on dual numbers (ceres::Jet) and
+// on SIMD lanes. A SIMD type adds an overload of `select` for its own comparison result; everything else
+// follows from it.
+#pragma once
+
+#include <cmath>
+
+namespace upright {
+
+/// Either of two values by a condition; both are evaluated, so that lanes may differ.
+template <class S>
+S select(bool condition, const S& yes, const S& no) {
+  return condition ? yes : no;
+}
+
+/// The plain number in a scalar: itself for double, the value part of a dual number.
+inline double value_of(double x) {
+  return x;
+}
+template <class S>
+requires requires(const S& x) {
+  x.a;
+}
+double value_of(const S& x) {
+  return x.a;
+}
+
+template <class S>
+S absolute(const S& x) {
+  return select(x < S(0.0), S(-x), x);
+}
+
+template <class S>
+S positive_part(const S& x) {
+  return select(x > S(0.0), x, S(0.0));
+}
+
+/// -1, 0 or 1.
+template <class S>
+S sign_of(const S& x) {
+  return select(x > S(0.0), S(1.0), select(x < S(0.0), S(-1.0), S(0.0)));
+}
+
+}  // namespace upright

@@ -1,0 +1,77 @@
+// A plant with its input: commands take effect after the plant's input delay, the event engine does the rest.
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "upright/sim/event_engine.hpp"
+
+namespace upright {
+
+/// Follows a record of commanded voltages. Allocates at construction only.
+template <class S>
+class Simulator {
+ public:
+  /// `most_commands`: how many commands may be on their way at once (input delay times command rate, and
+  /// some).
+  explicit Simulator(const PlantModel<S>& model, const EngineOptions& options = {},
+                     std::size_t most_commands = 4096)
+      : engine_(model, options), delay_s_(engine_.dynamics().input_delay_s()), waiting_(most_commands) {}
+
+  /// Starts at a time, with the voltage that has been acting until then.
+  void start(const PlantState<S>& state, double time_s = 0.0, double acting_v = 0.0) {
+    acting_v_ = acting_v;
+    now_s_ = S(time_s);
+    first_ = 0;
+    count_ = 0;
+    engine_.start(state, time_s, S(acting_v));
+  }
+
+  /// The voltage commanded from `time_s` on. Times must not go back; commands from before the start are
+  /// welcome.
+  void command(double time_s, double voltage_v) {
+    if (count_ == waiting_.size()) drop_oldest();
+    waiting_[(first_ + count_++) % waiting_.size()] = {S(time_s) + delay_s_, voltage_v};
+  }
+
+  void advance_to(double time_s) {
+    while (count_ > 0 && value_of(waiting_[first_].acts_s) < time_s) {
+      const Command next = waiting_[first_];
+      if (value_of(next.acts_s) > value_of(now_s_)) move_to(next.acts_s);
+      acting_v_ = next.voltage_v;
+      drop_oldest();
+    }
+    if (time_s > value_of(now_s_)) move_to(S(time_s));
+  }
+
+  EventEngine<S>& engine() { return engine_; }
+  const EventEngine<S>& engine() const { return engine_; }
+  double time_s() const { return value_of(now_s_); }
+  /// The commanded voltage that acts now, after the input delay and before the rest of the actuator chain.
+  double acting_v() const { return acting_v_; }
+
+ private:
+  struct Command {
+    S acts_s{};
+    double voltage_v = 0.0;
+  };
+
+  void drop_oldest() {
+    first_ = (first_ + 1) % waiting_.size();
+    --count_;
+  }
+
+  void move_to(const S& time_s) {
+    engine_.advance(time_s - now_s_, S(acting_v_));
+    now_s_ = time_s;
+  }
+
+  EventEngine<S> engine_;
+  S delay_s_;
+  std::vector<Command> waiting_;
+  std::size_t first_ = 0, count_ = 0;
+  double acting_v_ = 0.0;
+  S now_s_{};
+};
+
+}  // namespace upright

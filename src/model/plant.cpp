@@ -1,0 +1,47 @@
+#include "upright/model/plant.hpp"
+
+#include <algorithm>
+
+namespace upright {
+
+const PlantEffect* Plant::find(std::size_t effect) const {
+  const auto at =
+      std::find_if(effects.begin(), effects.end(), [&](const auto& e) { return e.number == effect; });
+  return at == effects.end() ? nullptr : &*at;
+}
+
+void Plant::set(std::size_t effect, std::span<const double> values) {
+  PlantEffect entry{effect, {}};
+  std::copy_n(values.begin(), std::min(values.size(), entry.values.size()), entry.values.begin());
+  const auto at =
+      std::find_if(effects.begin(), effects.end(), [&](const auto& e) { return e.number == effect; });
+  if (at == effects.end()) {
+    effects.push_back(entry);
+  } else {
+    *at = entry;
+  }
+}
+
+void Plant::remove(std::size_t effect) {
+  std::erase_if(effects, [&](const auto& e) { return e.number == effect; });
+}
+
+std::string fault_of(const Plant& plant) {
+  const PlantEffect* coulomb = plant.find("coulomb_friction");
+  const PlantEffect* stribeck = plant.find("stribeck_friction");
+  const bool level =
+      (coulomb != nullptr && coulomb->values[0] > 0.0) || (stribeck != nullptr && stribeck->values[0] > 0.0);
+  if (plant.find("bristle_friction") != nullptr && !level)
+    return "add coulomb_friction or stribeck_friction: bristle_friction renders a dry level, and the plant "
+           "has none";
+  if (plant.pendulum) return "";
+  for (const PlantEffect& effect : plant.effects) {
+    const std::string kind(effect_registry()[effect.number].kind);
+    if (effect_registry()[effect.number].enters == Enters::pendulum || kind.starts_with("pendulum_") ||
+        kind.starts_with("angle_"))
+      return "add the pendulum or remove " + kind + ": the plant is a cart alone";
+  }
+  return "";
+}
+
+}  // namespace upright
