@@ -1,0 +1,109 @@
+// `upright check`: reads files as the other commands would, without hardware.
+#include <array>
+#include <iostream>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "commands.hpp"
+#include "upright/model/error.hpp"
+#include "upright/model/plant_file.hpp"
+
+namespace upright::cli {
+
+namespace {
+
+/// A kind of file: the key at its top level that tells it, and its reader.
+struct FileKind {
+  const char* key;
+  void (*read)(const std::filesystem::path& file);
+};
+
+constexpr std::array file_kinds = {
+    FileKind{"plant", [](const std::filesystem::path& file) { read_plant_file(file); }},
+};
+
+struct Finding {
+  std::string file;
+  std::string kind;
+  std::string error;  // empty: valid
+};
+
+const FileKind& kind_of(const YamlMap& document) {
+  for (const FileKind& kind : file_kinds)
+    if (document.has(kind.key)) return kind;
+  std::vector<std::string> known;
+  std::string list;
+  for (const FileKind& kind : file_kinds) {
+    known.emplace_back(kind.key);
+    list += (list.empty() ? "" : ", ") + known.back();
+  }
+  for (const std::string& key : document.keys()) {
+    const std::string near = nearest_name(key, known);
+    if (!near.empty()) document.fail(key, "is not a known key", "did you mean " + near + "?");
+  }
+  throw ConfigError("give the file one of the top-level keys " + list + ": " + document.file().string() +
+                    ":1: none of them is there");
+}
+
+Finding check(const std::string& file) {
+  Finding finding{file, "", ""};
+  try {
+    const FileKind& kind = kind_of(YamlMap::from_file(file));
+    finding.kind = kind.key;
+    kind.read(file);
+  } catch (const Error& error) {
+    finding.error = error.what();
+  }
+  return finding;
+}
+
+using Json = nlohmann::ordered_json;
+
+Json text_or_null(const std::string& text) {
+  return text.empty() ? Json(nullptr) : Json(text);
+}
+
+Json json_of(const Finding& finding) {
+  return {{"file", finding.file},
+          {"valid", finding.error.empty()},
+          {"kind", text_or_null(finding.kind)},
+          {"error", text_or_null(finding.error)}};
+}
+
+bool check_all(const std::vector<std::string>& files, bool as_json) {
+  bool all_valid = true;
+  Json list = Json::array();
+  for (const std::string& file : files) {
+    const Finding finding = check(file);
+    all_valid = all_valid && finding.error.empty();
+    if (!finding.error.empty()) std::cerr << "upright: " << finding.error << "\n";
+    if (as_json)
+      list.push_back(json_of(finding));
+    else if (finding.error.empty())
+      std::cout << file << ": a valid " << finding.kind << " file\n";
+  }
+  if (as_json) {
+    const Json document{{"valid", all_valid}, {"files", list}};
+    // A file name need not be UTF-8.
+    std::cout << document.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) << "\n";
+  }
+  return all_valid;
+}
+
+}  // namespace
+
+void add_check(CLI::App& app, int& exit_code) {
+  CLI::App* command = app.add_subcommand("check", "Validate files without hardware");
+  command->footer("Example:  upright check config/plants/*.yaml config/gains/*.yaml config/rigs/*.yaml");
+  const auto files = std::make_shared<std::vector<std::string>>();
+  const auto as_json = std::make_shared<bool>(false);
+  command->add_option("files", *files, "The files to read")->required();
+  command->add_flag("--json", *as_json, "One JSON document");
+  command->callback([files, as_json, &exit_code] {
+    exit_code = static_cast<int>(check_all(*files, *as_json) ? ExitCode::done : ExitCode::usage);
+  });
+}
+
+}  // namespace upright::cli

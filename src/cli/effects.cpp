@@ -1,0 +1,69 @@
+// `upright effects`: every effect the plant model knows, from the registry.
+#include <cmath>
+#include <iostream>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "commands.hpp"
+#include "upright/model/registry.hpp"
+
+namespace upright::cli {
+
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json finite_or_null(double value) {
+  return std::isfinite(value) ? Json(value) : Json(nullptr);
+}
+
+Json json_of(const ParameterInfo& parameter) {
+  return {{"name", parameter.name},
+          {"unit", parameter.unit},
+          {"minimum", finite_or_null(parameter.range.low)},
+          {"maximum", finite_or_null(parameter.range.high)},
+          {"minimum_excluded", parameter.range.low_open},
+          {"neutral", finite_or_null(parameter.neutral)},
+          {"typical", finite_or_null(parameter.typical)},
+          {"meaning", parameter.meaning}};
+}
+
+Json json_of(const EffectInfo& effect) {
+  Json parameters = Json::array();
+  for (const ParameterInfo& parameter : effect.parameters) parameters.push_back(json_of(parameter));
+  return {{"kind", effect.kind},         {"enters", name_of(effect.enters)}, {"dry", effect.dry},
+          {"equation", effect.equation}, {"meaning", effect.meaning},        {"parameters", parameters}};
+}
+
+void print(const EffectInfo& effect) {
+  std::cout << effect.kind << "  (" << name_of(effect.enters) << (effect.dry ? ", dry" : "") << ")\n  "
+            << effect.meaning << "\n  " << effect.equation << "\n";
+  for (const ParameterInfo& parameter : effect.parameters) {
+    std::cout << "    " << parameter.name;
+    if (!parameter.unit.empty()) std::cout << " [" << parameter.unit << "]";
+    std::cout << ", " << parameter.range.text() << ": " << parameter.meaning << "\n";
+  }
+  std::cout << "\n";
+}
+
+void print_all(bool as_json) {
+  if (!as_json) {
+    for (const EffectInfo& effect : effect_registry()) print(effect);
+    return;
+  }
+  Json list = Json::array();
+  for (const EffectInfo& effect : effect_registry()) list.push_back(json_of(effect));
+  std::cout << Json{{"effects", list}}.dump(2) << "\n";
+}
+
+}  // namespace
+
+void add_effects(CLI::App& app, int&) {
+  CLI::App* command = app.add_subcommand("effects", "List every effect a plant can have");
+  command->footer("Example:  upright effects --json");
+  const auto as_json = std::make_shared<bool>(false);
+  command->add_flag("--json", *as_json, "One JSON document");
+  command->callback([as_json] { print_all(*as_json); });
+}
+
+}  // namespace upright::cli
