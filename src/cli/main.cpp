@@ -37,11 +37,12 @@ std::vector<std::string> flag_names(const CLI::App& command) {
   return names;
 }
 
-/// The remedy for a word nobody knows: the nearest known one, or else the help.
+/// The remedy for a word nobody knows: the nearest known one, or else the help. `dashes` are those of a flag.
 std::string remedy_for(const std::string& word, const std::vector<std::string>& known,
-                       const std::string& command) {
+                       const std::string& dashes, const std::string& command) {
   const std::string near = nearest_name(word, known);
-  return near.empty() ? "see " + command + " --help" : "did you mean " + near + "?";
+  const std::string help = "see " + command + " --help";
+  return near.empty() ? help : "did you mean " + dashes + near + "? otherwise " + help;
 }
 
 std::string printable(const std::string& word) {
@@ -62,9 +63,9 @@ std::string sentence_for(const CLI::ParseError& error, CLI::App& app) {
     if (word.starts_with("-")) {
       const std::string flag = word.substr(0, word.find('='));
       const std::string bare = flag.substr(std::min(flag.find_first_not_of('-'), flag.size()));
-      return remedy_for(bare, flag_names(command), name) + ": " + name + " has no flag " + flag;
+      return remedy_for(bare, flag_names(command), "--", name) + ": " + name + " has no flag " + flag;
     }
-    if (at_top) return remedy_for(word, command_names(app), name) + ": upright has no command " + word;
+    if (at_top) return remedy_for(word, command_names(app), "", name) + ": upright has no command " + word;
     return "remove it, or see " + name + " --help: " + name + " does not expect '" + word + "'";
   }
   if (at_top) return "name a command, see upright --help: nothing to do";

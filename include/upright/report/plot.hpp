@@ -1,0 +1,79 @@
+// A plot as plain data, and its drawing as an SVG element by gnuplot.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace upright {
+
+struct Axis {
+  std::string label;  ///< with its unit: "cart position [m]"
+  bool logarithmic = false;
+  std::optional<double> low;  ///< not given: from the data
+  std::optional<double> high;
+};
+
+/// Points joined in their order. A value that is not finite leaves a gap.
+struct Series {
+  enum class Style { line, steps, points, bars };
+  std::string name;  ///< in the key; empty: not in the key
+  std::vector<double> x;
+  std::vector<double> y;  ///< as many as x
+  Style style = Style::line;
+  int color = -1;  ///< place in the palette; -1: the next one
+  bool dashed = false;
+};
+
+/// A region between two curves, drawn light behind the series.
+struct Band {
+  std::string name;
+  std::vector<double> x;
+  std::vector<double> low;
+  std::vector<double> high;
+};
+
+/// Values on a rectangular grid; cell (row, column) is centred at (x[column], y[row]).
+struct HeatMap {
+  std::vector<double> x;
+  std::vector<double> y;
+  std::vector<double> values;  ///< row by row, y.size() rows of x.size(); not finite: left blank
+  std::string label;           ///< of the colour scale
+  /// For outcomes instead of magnitudes: value k is drawn in the k-th colour and named `classes[k]`.
+  std::vector<std::string> classes;
+};
+
+/// A straight line across the plot at one place, with a word beside it.
+struct Mark {
+  double at = 0.0;
+  std::string label;
+};
+
+struct Plot {
+  std::string title;
+  Axis x;
+  Axis y;
+  std::vector<Series> series;
+  std::vector<Band> bands;
+  std::optional<HeatMap> heat_map;
+  std::vector<Mark> vertical_marks;
+  std::vector<Mark> horizontal_marks;
+  int width_px = 900;
+  int height_px = 260;
+};
+
+/// Draws the plot: one `<svg>` element that refers to nothing outside itself and whose identifiers begin with
+/// `id` (letters and digits; unique within a page). Text is shown as given, never interpreted. Long lines are
+/// thinned to the smallest and largest value of each pixel column, so no peak is lost.
+/// Throws Error when gnuplot is missing or fails, and when x and y of a series differ in length.
+std::string svg_of(const Plot& plot, const std::string& id);
+
+/// Thins a line to at most about two points per column over `columns` columns; keeps each column's extremes.
+/// x must not decrease. Returned as indices into x and y. Values that are not finite are kept as gaps.
+std::vector<std::size_t> thinned(const std::vector<double>& x, const std::vector<double>& y,
+                                 std::size_t columns);
+
+/// A histogram of the finite values as bars over `bins` equal bins.
+Series histogram(const std::vector<double>& values, std::size_t bins, const std::string& name);
+
+}  // namespace upright
