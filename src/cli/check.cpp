@@ -41,7 +41,7 @@ const FileKind& kind_of(const YamlMap& document) {
   }
   for (const std::string& key : document.keys()) {
     const std::string near = nearest_name(key, known);
-    if (!near.empty()) document.fail(key, "is not a known key", "did you mean " + near + "?");
+    if (!near.empty()) document.fail(key, "is not a known key", "did you mean " + near + "? otherwise remove it");
   }
   throw ConfigError("give the file one of the top-level keys " + list + ": " + document.file().string() +
                     ":1: none of them is there");

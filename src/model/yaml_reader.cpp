@@ -1,5 +1,6 @@
 #include "upright/model/yaml_reader.hpp"
 
+#include <yaml-cpp/eventhandler.h>
 #include <yaml-cpp/yaml.h>
 
 #include <algorithm>
@@ -57,28 +58,54 @@ std::optional<double> parse_number(const std::string& text) {
   return value;
 }
 
-/// yaml-cpp recurses over nested flow collections; refuse input that would exhaust the stack before it sees
-/// it.
-void refuse_deep_nesting(const std::string& text, const std::filesystem::path& file) {
-  int depth = 0;
-  int line = 1;
-  std::size_t indent_of_dashes = 0;
-  bool at_line_start = true;
-  for (const char c : text) {
-    if (c == '\n') {
-      ++line;
-      at_line_start = true;
-      indent_of_dashes = 0;
-      continue;
-    }
-    if (at_line_start && (c == '-' || c == '?')) ++indent_of_dashes;
-    if (c != '-' && c != '?' && c != ' ') at_line_start = false;
-    if (c == '{' || c == '[') ++depth;
-    if ((c == '}' || c == ']') && depth > 0) --depth;
-    if (depth > deepest_nesting || indent_of_dashes > deepest_nesting) {
-      throw ConfigError("nest less deeply: " + file.string() + ":" + std::to_string(line) + ": more than " +
-                        std::to_string(deepest_nesting) + " levels");
-    }
+/// Walks a file's events before any node is built and refuses what yaml-cpp cannot be trusted with: nesting
+/// that would exhaust the stack, and a second document (on some broken text yaml-cpp 0.7 finds empty
+/// documents for ever).
+class Gatekeeper : public YAML::EventHandler {
+ public:
+  explicit Gatekeeper(std::filesystem::path file) : file_(std::move(file)) {}
+
+  void OnDocumentStart(const YAML::Mark& mark) override {
+    if (++documents_ > 1) refuse(mark, "keep one YAML document", "a second one begins here");
+  }
+  void OnDocumentEnd() override {}
+  void OnNull(const YAML::Mark&, YAML::anchor_t) override {}
+  void OnAlias(const YAML::Mark& mark, YAML::anchor_t) override {
+    refuse(mark, "write the values out", "aliases are not supported");
+  }
+  void OnScalar(const YAML::Mark&, const std::string&, YAML::anchor_t, const std::string&) override {}
+  void OnSequenceStart(const YAML::Mark& mark, const std::string&, YAML::anchor_t,
+                       YAML::EmitterStyle::value) override {
+    enter(mark);
+  }
+  void OnSequenceEnd() override { --depth_; }
+  void OnMapStart(const YAML::Mark& mark, const std::string&, YAML::anchor_t,
+                  YAML::EmitterStyle::value) override {
+    enter(mark);
+  }
+  void OnMapEnd() override { --depth_; }
+
+ private:
+  void enter(const YAML::Mark& mark) {
+    if (++depth_ > deepest_nesting)
+      refuse(mark, "nest less deeply", "more than " + std::to_string(deepest_nesting) + " levels");
+  }
+  [[noreturn]] void refuse(const YAML::Mark& mark, const std::string& remedy,
+                           const std::string& problem) const {
+    throw ConfigError(remedy + ": " + file_.string() + ":" + std::to_string(std::max(mark.line, 0) + 1) +
+                      ": " + problem);
+  }
+
+  std::filesystem::path file_;
+  int documents_ = 0;
+  int depth_ = 0;
+};
+
+void refuse_what_cannot_be_built(const std::string& text, const std::filesystem::path& file) {
+  std::istringstream stream(text);
+  YAML::Parser parser(stream);
+  Gatekeeper gatekeeper(file);
+  while (parser.HandleNextDocument(gatekeeper)) {
   }
 }
 
@@ -128,10 +155,18 @@ struct YamlMap::Node {
 
   std::string full_key(const std::string& key) const { return path.empty() ? key : path + "." + key; }
 
+  /// Where to point: at a plain value itself, otherwise at its key. An empty value's own mark is that of the
+  /// next line, and a map's or list's that of its first entry.
+  YAML::Mark mark_of(const YAML::Node& at, const std::string& key) const {
+    if (at.IsDefined() && at.IsScalar() && !at.Scalar().empty()) return at.Mark();
+    for (const auto& entry : yaml)
+      if (entry.first.IsScalar() && entry.first.Scalar() == key) return entry.first.Mark();
+    return at.IsDefined() ? at.Mark() : yaml.Mark();
+  }
+
   [[noreturn]] void fail(const YAML::Node& at, const std::string& key, const std::string& problem,
                          const std::string& remedy) const {
-    const YAML::Mark mark = at.IsDefined() ? at.Mark() : yaml.Mark();
-    const int line = mark.line >= 0 ? mark.line + 1 : 1;
+    const int line = std::max(mark_of(at, key).line, 0) + 1;
     throw ConfigError(remedy + ": " + file.string() + ":" + std::to_string(line) + ": " + full_key(key) +
                       " " + problem);
   }
@@ -191,15 +226,11 @@ std::shared_ptr<YamlMap::Node> YamlMap::Node::child(const YAML::Node& node,
 }
 
 YamlMap YamlMap::from_text(const std::string& text, const std::filesystem::path& file) {
-  refuse_deep_nesting(text, file);
   auto node = std::make_shared<Node>();
   node->file = file;
   try {
-    const std::vector<YAML::Node> documents = YAML::LoadAll(text);
-    if (documents.size() > 1)
-      throw ConfigError("keep one YAML document: " + file.string() + ":1: the file holds " +
-                        std::to_string(documents.size()));
-    if (!documents.empty()) node->yaml.reset(documents.front());
+    refuse_what_cannot_be_built(text, file);
+    node->yaml.reset(YAML::Load(text));
   } catch (const YAML::Exception& problem) {
     throw ConfigError("correct the YAML: " + file.string() + ":" +
                       std::to_string(std::max(problem.mark.line, 0) + 1) + ": " + problem.msg);

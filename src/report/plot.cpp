@@ -116,7 +116,7 @@ void add_series(const Plot& plot, Curves& curves) {
         how = "with points pt 7 ps 0.35 lc rgb '" + color + "'";
         break;
       case Series::Style::bars:
-        how = "with boxes fs solid 0.75 noborder lc rgb '" + color + "'";
+        how = "with boxes fs solid 1.0 noborder lc rgb '" + color + "'";
         break;
     }
     curves.add(line_data(series, plot), how, series.name);
@@ -204,7 +204,7 @@ struct Extent {
 /// A range for an axis. gnuplot complains of an empty one and rounds a given one; this leaves a small margin.
 std::string axis_settings(const std::string& name, const Axis& axis, const Extent& extent, double margin) {
   std::string text = "set " + name + "label " + quoted(axis.label) + "\n";
-  if (axis.logarithmic) text += "set logscale " + name + "\nset format " + name + " '%.3g'\n";
+  if (axis.logarithmic) text += "set logscale " + name + "\nset format " + name + " '%g'\n";
   double low = axis.low.value_or(extent.low);
   double high = axis.high.value_or(extent.high);
   if (!(low <= high)) {
@@ -271,8 +271,9 @@ std::string script_for(const Plot& plot) {
       "set terminal svg size " + std::to_string(plot.width_px) + "," + std::to_string(plot.height_px) +
       " noenhanced font 'sans-serif,12' background '#ffffff'\nset encoding utf8\nset border lc rgb "
       "'#555555'\n"
-      "set grid lc rgb '#dddddd' lt 1\nset tics nomirror\nset key above right horizontal\nset samples 2\n";
-  if (!plot.title.empty()) settings += "set title " + quoted(plot.title) + "\n";
+      "set grid lc rgb '#dddddd' lt 1\nset tics nomirror\nset key above right horizontal\nset samples 2\nset tmargin 3\n";
+  if (!plot.title.empty())
+    settings += "set label " + quoted(plot.title) + " at graph 0, graph 1 left offset 0,0.9 font ',14'\n";
   settings += axes(plot);
   add_heat_map(plot, curves, settings);
   add_bands(plot, curves);

@@ -56,5 +56,17 @@ TEST(YamlReader, RefusesDoubledKeysBrokenYamlAndDeepNesting) {
   EXPECT_THROW(YamlMap::from_text(std::string(100000, '['), "f.yaml"), ConfigError);
 }
 
+TEST(YamlReader, RefusesASecondDocumentAndTextInWhichYamlCppFindsDocumentsForEver) {
+  EXPECT_EQ(message_of([] { YamlMap::from_text("a: 1\n---\nb: 2\n", "f.yaml"); }),
+            "keep one YAML document: f.yaml:2: a second one begins here");
+  EXPECT_THROW(YamlMap::from_text("a:\n   , - b'\n", "f.yaml"), ConfigError);
+}
+
+TEST(YamlReader, BracketsInCommentsAndTextsAreNotNesting) {
+  const std::string many(1000, '[');
+  const YamlMap map = YamlMap::from_text("a: \"" + many + "\"  # " + many + "\n", "f.yaml");
+  EXPECT_EQ(map.text("a"), many);
+}
+
 }  // namespace
 }  // namespace upright

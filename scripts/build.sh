@@ -1,0 +1,24 @@
+#!/usr/bin/env bash
+# Builds one CMake preset (release when none is named) into build/PRESET, with ccache where there is one.
+#   scripts/build.sh [PRESET] [ninja arguments, e.g. the targets]
+set -euo pipefail
+cd "$(dirname "$0")/.."
+
+preset=${1:-release}
+shift || true
+
+# An old clone's cache may name another path or generator; CMake would refuse it.
+cache=build/$preset/CMakeCache.txt
+if [ -e "$cache" ] && ! grep -q "^CMAKE_HOME_DIRECTORY:INTERNAL=$PWD\$" "$cache"; then
+  rm -rf "build/$preset"
+fi
+
+options=()
+if command -v ccache >/dev/null; then
+  options+=(-DCMAKE_CXX_COMPILER_LAUNCHER=ccache)
+  export CCACHE_BASEDIR=$PWD CCACHE_NOHASHDIR=1
+fi
+log=$(mktemp)
+trap 'rm -f "$log"' EXIT
+cmake --preset "$preset" "${options[@]}" >"$log" 2>&1 || { cat "$log" >&2; exit 1; }
+cmake --build --preset "$preset" -- "$@"

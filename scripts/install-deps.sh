@@ -1,0 +1,51 @@
+#!/usr/bin/env bash
+# Installs the Debian 12 packages that upright is built from. Quiet and quick when all are there.
+#   scripts/install-deps.sh         what building, testing and the demo need
+#   scripts/install-deps.sh --dev   also what .ci/run needs: clang's formatter, linter, sanitizers, fuzzer; ccache
+set -euo pipefail
+
+packages=(
+  build-essential cmake ninja-build git ca-certificates
+  libeigen3-dev libsundials-dev libmodbus-dev libyaml-cpp-dev libcli11-dev libboost-dev nlohmann-json3-dev
+  libxsimd-dev libceres-dev
+  libgtest-dev libbenchmark-dev
+  gnuplot-nox python3-venv
+)
+development_packages=(
+  clang-14 clang-format-14 clang-tidy-14 clang-tools-14 libclang-rt-14-dev ccache
+)
+case "${1:-}" in
+  '') ;;
+  --dev) packages+=("${development_packages[@]}") ;;
+  *) echo "usage: scripts/install-deps.sh [--dev]" >&2; exit 2 ;;
+esac
+
+command -v apt-get >/dev/null || {
+  echo "install these packages by hand (no apt-get here): ${packages[*]}" >&2
+  exit 2
+}
+
+missing=()
+for package in "${packages[@]}"; do
+  status=$(dpkg-query -W -f '${db:Status-Status}' "$package" 2>/dev/null || true)
+  [ "$status" = installed ] || missing+=("$package")
+done
+[ ${#missing[@]} -gt 0 ] || exit 0
+
+as_root=()
+if [ "$(id -u)" -ne 0 ]; then
+  command -v sudo >/dev/null || {
+    echo "run it as root, or install sudo: these packages are missing: ${missing[*]}" >&2
+    exit 2
+  }
+  as_root=(sudo)
+fi
+
+echo "installing: ${missing[*]}"
+log=$(mktemp)
+trap 'rm -f "$log"' EXIT
+quietly() {
+  "$@" </dev/null >"$log" 2>&1 || { tail -n 30 "$log" >&2; return 1; }
+}
+quietly "${as_root[@]}" apt-get update || echo "the package lists could not be renewed; trying with those at hand" >&2
+quietly "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y --no-install-recommends "${missing[@]}"

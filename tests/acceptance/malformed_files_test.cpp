@@ -1,0 +1,163 @@
+// Files a user may get wrong: each is refused with exit code 2 and one sentence that gives the remedy, the
+// file, the line and the key.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <string>
+#include <vector>
+
+#include "command.hpp"
+
+namespace upright::testing {
+namespace {
+
+struct Malformed {
+  const char* name;    ///< letters and digits: it names the test
+  std::string text;    ///< the whole file
+  int line;            ///< where the mistake is
+  const char* key;     ///< the word the sentence must contain: the key, or what is wrong where there is none
+  const char* remedy;  ///< a part of the remedy
+};
+
+void PrintTo(const Malformed& malformed, std::ostream* out) {
+  *out << malformed.name;
+}
+
+/// `text` with its only `from` made `to`.
+std::string with(std::string text, const std::string& from, const std::string& to) {
+  const std::size_t at = text.find(from);
+  if (at == std::string::npos || text.find(from, at + 1) != std::string::npos)
+    throw std::logic_error("'" + from + "' must stand once in the good file");
+  return text.replace(at, from.size(), to);
+}
+
+const std::string plant =
+    "plant:\n"
+    "  cart_mass_kg: 0.815\n"
+    "  pendulum:\n"
+    "    mass_kg: 0.210\n"
+    "    length_to_com_m: 0.305\n"
+    "  gravity_mps2: 9.8\n"
+    "  motor: {force_per_volt_n: 1.7189,\n"
+    "          back_emf_n_per_mps: 7.682}\n"
+    "  effects:\n"
+    "    - {kind: viscous_friction, coefficient_n_per_mps: 3.0}\n"
+    "    - {kind: stribeck_friction, extra_force_n: 0.43,\n"
+    "       velocity_mps: 0.105, shape: 2.0}\n";
+
+std::vector<Malformed> malformed_plants() {
+  const std::string effects = "  effects:\n" + plant.substr(plant.find("    - {kind: visc"));
+  return {
+      {"empty", "", 1, "map", "key: value"},
+      {"list_at_top", "- 1\n- 2\n", 1, "map", "key: value"},
+      {"scalar_at_top", "plant\n", 1, "map", "key: value"},
+      {"binary",
+       std::string("\x7f"
+                   "ELF\x02\x01\x00\x00",
+                   8),
+       1, "", "YAML"},
+      {"broken_yaml", "plant: {cart_mass_kg: [1,\n", 2, "", "correct the YAML"},
+      {"tab_indent", "plant:\n\tcart_mass_kg: 1\n", 2, "", "correct the YAML"},
+      {"two_documents", plant + "---\n" + plant, 13, "second", "keep one YAML document"},
+      {"alias", with(plant, "mass_kg: 0.210", "mass_kg: *a"), 4, "", "YAML"},
+      {"plant_is_number", "plant: 3\n", 1, "plant", "map"},
+      {"plant_is_list", "plant: [1, 2]\n", 1, "plant", "map"},
+      {"plant_misspelt", with(plant, "plant:\n", "palnt:\n"), 1, "palnt", "plant"},
+      {"second_top_key", plant + "plant_name: x\n", 13, "plant_name", "remove it"},
+      {"missing_mass", with(plant, "  cart_mass_kg: 0.815\n", ""), 2, "cart_mass_kg", "add cart_mass_kg"},
+      {"missing_gravity", with(plant, "  gravity_mps2: 9.8\n", ""), 2, "gravity_mps2", "add"},
+      {"missing_effects", plant.substr(0, plant.find("  effects")), 2, "effects", "add"},
+      {"misspelt_key", with(plant, "gravity_mps2", "gravity_mp2"), 2, "gravity_mps2", "add"},
+      {"unknown_key", with(plant, "  gravity", "  colour: red\n  gravity"), 6, "colour", "remove it"},
+      {"doubled_key", with(plant, "  gravity", "  cart_mass_kg: 1.0\n  gravity"), 6, "cart_mass_kg",
+       "keep one"},
+      {"mass_is_word", with(plant, "0.815", "heavy"), 2, "cart_mass_kg", "a number above 0"},
+      {"mass_is_quoted", with(plant, "0.815", "'0.815'"), 2, "cart_mass_kg", "number"},
+      {"mass_has_unit", with(plant, "0.815", "0.815 kg"), 2, "cart_mass_kg", "number"},
+      {"mass_decimal_comma", with(plant, "0.815", "0,815"), 2, "cart_mass_kg", "number"},
+      {"mass_hexadecimal", with(plant, "0.815", "0x1p3"), 2, "cart_mass_kg", "number"},
+      {"mass_is_list", with(plant, "0.815", "[0.815]"), 2, "cart_mass_kg", "number"},
+      {"mass_empty", with(plant, "0.815", ""), 2, "cart_mass_kg", "number"},
+      {"mass_null", with(plant, "0.815", "~"), 2, "cart_mass_kg", "number"},
+      {"mass_true", with(plant, "0.815", "true"), 2, "cart_mass_kg", "number"},
+      {"mass_nan", with(plant, "0.815", ".nan"), 2, "cart_mass_kg", "number"},
+      {"mass_plain_nan", with(plant, "0.815", "nan"), 2, "cart_mass_kg", "number"},
+      {"mass_infinite", with(plant, "0.815", ".inf"), 2, "cart_mass_kg", "number"},
+      {"mass_overflows", with(plant, "0.815", "1e999"), 2, "cart_mass_kg", "number"},
+      {"mass_zero", with(plant, "0.815", "0.0"), 2, "cart_mass_kg", "above 0"},
+      {"mass_negative", with(plant, "0.815", "-0.815"), 2, "cart_mass_kg", "above 0"},
+      {"gravity_negative", with(plant, "9.8", "-9.8"), 6, "gravity_mps2", "not below 0"},
+      {"pendulum_is_number", "plant:\n  cart_mass_kg: 1\n  pendulum: 0.2\n", 3, "pendulum", "map"},
+      {"pendulum_without_length", with(plant, "    length_to_com_m: 0.305\n", ""), 4, "length_to_com_m",
+       "add"},
+      {"pendulum_length_zero", with(plant, "0.305", "0"), 5, "length_to_com_m", "above 0"},
+      {"pendulum_unknown_key",
+       with(plant, "length_to_com_m: 0.305", "length_to_com_m: 0.305\n    length_to_con_m: 1"), 6,
+       "length_to_con_m", "length_to_com_m"},
+      {"inertia_too_small",
+       with(plant, "length_to_com_m: 0.305", "length_to_com_m: 0.305\n    inertia_about_pivot_kgm2: 1e-6"), 6,
+       "inertia_about_pivot_kgm2", "at least"},
+      {"motor_is_text",
+       with(plant, "{force_per_volt_n: 1.7189,\n          back_emf_n_per_mps: 7.682}", "strong"), 7, "motor",
+       "map"},
+      {"motor_back_emf_negative", with(plant, "7.682", "-7.682"), 8, "back_emf_n_per_mps", "not below 0"},
+      {"motor_key_unknown", with(plant, "back_emf_n_per_mps: 7.682", "back_emf_n_per_mps: 7.682, kt: 1"), 8,
+       "kt", "remove it"},
+      {"effects_is_map", with(plant, effects, "  effects: {kind: viscous_friction}\n"), 9, "effects", "list"},
+      {"effects_is_null", with(plant, effects, "  effects:\n"), 9, "effects", "list"},
+      {"effect_is_word", with(plant, effects, "  effects: [viscous_friction]\n"), 9, "effects[0]",
+       "{key: value}"},
+      {"effect_kind_misspelt", with(plant, "viscous_friction,", "viscus_friction,"), 10, "kind",
+       "viscous_friction"},
+      {"effect_without_kind", with(plant, "kind: viscous_friction, ", ""), 10, "kind", "one of"},
+      {"effect_kind_is_list", with(plant, "viscous_friction,", "[a],"), 10, "kind", "one of"},
+      {"effect_parameter_missing", with(plant, ", coefficient_n_per_mps: 3.0", ""), 10,
+       "coefficient_n_per_mps", "add"},
+      {"effect_parameter_unknown", with(plant, "_n_per_mps: 3.0", "_n_per_mps: 3.0, coeff: 2"), 10, "coeff",
+       "remove"},
+      {"effect_parameter_negative", with(plant, "3.0", "-3.0"), 10, "coefficient_n_per_mps", "not below 0"},
+      {"effect_parameter_nan", with(plant, "3.0", ".NaN"), 10, "coefficient_n_per_mps", "number"},
+      {"effect_shape_out_of_range", with(plant, "2.0", "20.0"), 12, "shape", "from 0.1 to 10"},
+      {"effect_velocity_zero", with(plant, "0.105", "0.0"), 12, "velocity_mps", "above 0"},
+      {"effect_twice", plant + "    - {kind: viscous_friction, coefficient_n_per_mps: 1.0}\n", 13, "kind",
+       "keep one viscous_friction"},
+      {"bristles_without_level",
+       with(plant, effects,
+            "  effects:\n    - {kind: bristle_friction, stiffness_n_per_m: 121, damping_n_per_mps: 70}\n"),
+       9, "effects", "coulomb_friction"},
+      {"key_is_list", with(plant, "  gravity", "  [a, b]: 1\n  gravity"), 6, "key", "plain words"},
+      {"deep_nesting", "plant: " + std::string(5000, '[') + "\n", 1, "levels", "less deeply"},
+  };
+}
+
+class MalformedFile : public ::testing::TestWithParam<Malformed> {};
+
+TEST_P(MalformedFile, IsRefusedWithRemedyFileLineAndKey) {
+  const Malformed& malformed = GetParam();
+  const TemporaryFolder folder;
+  const std::string file = folder.write(std::string(malformed.name) + ".yaml", malformed.text).string();
+  const CommandResult result = run_upright("check " + shell_quoted(file));
+  const std::string where = file + ":" + std::to_string(malformed.line) + ":";
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_EQ(result.out, "");
+  EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
+  const std::size_t at = result.err.find(where);
+  ASSERT_NE(at, std::string::npos) << "expected " << where << "\n" << result.err;
+  EXPECT_NE(result.err.substr(0, at).find(malformed.remedy), std::string::npos) << result.err;
+  EXPECT_NE(result.err.find(malformed.key, at), std::string::npos) << result.err;
+}
+
+std::string name_of_test(const ::testing::TestParamInfo<Malformed>& info) {
+  return info.param.name;
+}
+
+INSTANTIATE_TEST_SUITE_P(Plant, MalformedFile, ::testing::ValuesIn(malformed_plants()), name_of_test);
+
+TEST(WellFormedFile, IsAccepted) {
+  const TemporaryFolder folder;
+  const CommandResult result = run_upright("check " + folder.write("plant.yaml", plant).string());
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+}
+
+}  // namespace
+}  // namespace upright::testing
