@@ -8,41 +8,20 @@
 #include <cmath>
 #include <cstdint>
 #include <optional>
+#include <type_traits>
 
 #include "upright/model/dynamics.hpp"
+#include "upright/sim/contacts.hpp"
 
 namespace upright {
 
-enum class EventKind : std::uint8_t {
-  cart_stick,
-  cart_breakaway,
-  cart_reversal,
-  pivot_stick,
-  pivot_breakaway,
-  pivot_reversal,
-  fall,
-  track_end,
-};
-
-struct Event {
-  double time_s = 0.0;
-  EventKind kind = EventKind::cart_stick;
-};
-
-struct EngineOptions {
-  double max_step_s = 1e-3;
-  /// Steps are at most this fraction of the inverse of the fastest rate of the motion.
-  double step_fraction = 0.2;
-  std::optional<double> fall_angle_rad;  ///< the run halts where |theta| reaches it
-  std::optional<double> track_limit_m;   ///< the run halts where |x| reaches it
-};
-
-/// Integrates a plant over intervals of constant voltage. Allocates nothing after construction.
+/// Integrates a plant over intervals of constant voltage, or under a voltage that varies. Allocates nothing
+/// after construction.
 template <class S>
 class EventEngine {
  public:
   explicit EventEngine(const PlantModel<S>& model, const EngineOptions& options = {})
-      : dynamics_(model), plain_(values_of(model)), options_(options) {}
+      : dynamics_(model), plain_(values_of(model)), corners_(model), options_(options) {}
 
   const Dynamics<S>& dynamics() const { return dynamics_; }
 
@@ -52,35 +31,91 @@ class EventEngine {
     time_s_ = time_s;
     halted_.reset();
     event_count_ = 0;
+    budget_.restart(time_s);
     if (dynamics_.cart_locked()) state_.cart_mps = S(0.0);
-    drive_ = dynamics_.actuate(voltage_v);
-    if (!dynamics_.has_motor_lag()) state_.motor_v = drive_;
-    contacts_.cart = direction_of(value_of(state_.cart_mps));
-    contacts_.pivot = direction_of(value_of(state_.theta_radps));
+    hold(voltage_v);
+    contacts_ = contacts_of(plain_state(state_));
     settle();
   }
 
   /// Moves on by `duration_s` with the voltage (after the input delay) held at `voltage_v`. Does nothing once
   /// halted.
   void advance(const S& duration_s, const S& voltage_v) {
-    drive_ = dynamics_.actuate(voltage_v);
-    if (!dynamics_.has_motor_lag()) state_.motor_v = drive_;
+    hold(voltage_v);
     settle();
+    halt_where_ended();
     S remaining = duration_s;
-    int events_left = most_events_per_advance;
     while (value_of(remaining) > 0.0 && !halted_) {
+      const bool held = budget_.spent(time_s_);
       const S step = next_step(remaining);
-      const PlantState<S> next = rk4(dynamics_, state_, contacts_, drive_, step);
-      const auto found = events_left > 0 ? first_event(plain_state(next), value_of(step)) : std::nullopt;
+      FirstRate rate;
+      const PlantState<S> next = rk4(dynamics_, state_, contacts_, step, held_motor(dynamics_, step), &rate);
+      const PlantState<double> plain_next = plain_state(next);
+      const auto along = [&](double t) {
+        return rk4(plain_, plain_state(state_), contacts_, t, held_motor(plain_, t));
+      };
+      const auto found = first_event(plain_next, rate, value_of(step), held, along);
       if (!found) {
         state_ = next;
         remaining = remaining - step;
         time_s_ += value_of(step);
         continue;
       }
-      --events_left;
-      remaining = remaining - pass(*found);
+      remaining = remaining - pass(*found, held);
     }
+  }
+
+  /// Moves on by `duration_s` under a voltage that varies: `volts(t, state)` is the command (after the input
+  /// delay) at time t, smooth between events. Steps are at most `most_step_s`; `sink(const DenseStep&)` gets
+  /// each of them before the next one begins. A motor lag below a microsecond is taken as none here.
+  template <class Volts, class Sink>
+  requires(std::is_same_v<S, double>&& std::is_invocable_r_v<
+           double, Volts, double, const PlantState<double>&>) void advance(double duration_s,
+                                                                           const Volts& volts,
+                                                                           double most_step_s,
+                                                                           const Sink& sink) {
+    const bool lag = dynamics_.has_motor_lag() && dynamics_.motor_time_constant_s() > least_lag_s;
+    const auto command = [&](double t, const PlantState<double>& s) { return volts(t, s); };
+    if (!lag) state_.motor_v = dynamics_.actuate(command(time_s_, state_));
+    settle();
+    halt_where_ended();
+    const double end_s = time_s_ + duration_s;
+    while (!halted_ && end_s - time_s_ > smallest_step_s) {
+      const bool held = budget_.spent(time_s_);
+      double rate = plain_.fastest_rate_radps(state_);
+      if (lag) rate += 1.0 / dynamics_.motor_time_constant_s();
+      const double step = even_step(end_s - time_s_, std::min(rate_step(rate), most_step_s));
+      const auto along = [&](double t) { return driven_rk4(command, lag, t).end; };
+      const DrivenStep driven = driven_rk4(command, lag, step);
+      auto found =
+          first_event(driven.end, {driven.first.cart_mps, driven.first.theta_radps}, step, held, along);
+      WatchList corner_list;
+      corners_.watch(command(time_s_, state_), corner_list);
+      for (const Watch& watch : corner_list) {
+        const auto past = [&](double t, const PlantState<double>& s) {
+          return watch.sign * (command(time_s_ + t, s) - watch.corner_v);
+        };
+        const double at_end = past(step, driven.end);
+        if (!(at_end > 0.0)) continue;
+        const double after =
+            turning_positive([&](double t) { return past(t, along(t)); }, past(0.0, state_), at_end, step);
+        if (!found || after < found->after_s) found = Found{watch, after};
+      }
+      if (found && found->watch.kind == EventKind::actuator_corner && found->after_s < smallest_step_s)
+        found.reset();
+      const DrivenStep taken = found ? driven_rk4(command, lag, found->after_s) : driven;
+      const double to_s = found ? time_s_ + found->after_s : time_s_ + step;
+      if (to_s > time_s_) {
+        DenseStep dense = dense_step(taken, command, lag, to_s);
+        mark_end(dense, found ? &found->watch : nullptr);
+        sink(dense);
+      }
+      state_ = taken.end;
+      time_s_ = to_s;
+      if (found) enter(found->watch, held);
+      if (!lag) state_.motor_v = dynamics_.actuate(command(time_s_, state_));
+    }
+    if (!halted_) time_s_ = end_s;
   }
 
   const PlantState<S>& state() const { return state_; }
@@ -97,23 +132,56 @@ class EventEngine {
   static constexpr std::uint64_t kept_events = 256;
 
  private:
-  static constexpr int most_events_per_advance = 1000;
-  static constexpr int most_root_iterations = 60;
-  static constexpr double root_tolerance_s = 1e-14;
+  static constexpr double least_lag_s = 1e-6;
+  static constexpr double smallest_step_s = 1e-13;
 
   struct Found {
-    EventKind kind;
+    Watch watch;
     double after_s;
   };
 
-  static Contact direction_of(double velocity) {
-    if (velocity == 0.0) return Contact::stick;
-    return velocity > 0.0 ? Contact::slip_forward : Contact::slip_backward;
-  }
+  /// Accelerations at the beginning of a step.
+  struct FirstRate {
+    double cart_mps2 = 0.0;
+    double theta_radps2 = 0.0;
+  };
+
+  /// Voltage at the motor at the beginning, in the middle and at the end of a step under constant drive.
+  template <class T>
+  struct HeldMotor {
+    T begin_v, middle_v, end_v;
+  };
 
   static PlantState<double> plain_state(const PlantState<S>& s) {
     return {value_of(s.cart_m),      value_of(s.theta_rad), value_of(s.cart_mps),
             value_of(s.theta_radps), value_of(s.motor_v),   value_of(s.bristle_m)};
+  }
+
+  void hold(const S& voltage_v) {
+    drive_ = dynamics_.actuate(voltage_v);
+    if (!dynamics_.has_motor_lag()) state_.motor_v = drive_;
+  }
+
+  void settle() { contacts_ = settled_contacts(plain_, plain_state(state_), contacts_); }
+
+  void halt_where_ended() {
+    const auto end =
+        ended_at(value_of(state_.theta_rad), value_of(state_.cart_m), dynamics_.has_pendulum(), options_);
+    if (!end || halted_) return;
+    halted_ = end;
+    note(*end);
+  }
+
+  void note(EventKind kind) {
+    events_[event_count_++ % kept_events] = {time_s_, kind};
+    budget_.count();
+  }
+
+  double rate_step(double rate) const { return std::min(options_.max_step_s, options_.step_fraction / rate); }
+
+  static S even_step(const S& remaining, double limit) {
+    const double pieces = std::ceil(value_of(remaining) / limit - 1e-9);
+    return pieces <= 1.0 ? remaining : S(remaining / S(pieces));
   }
 
   S next_step(const S& remaining) const {
@@ -123,9 +191,7 @@ class EventEngine {
       constexpr double settled_v = 1e-9;
       if (gap_v > settled_v) rate += 1.0 / value_of(dynamics_.motor_time_constant_s());
     }
-    const double limit = std::min(options_.max_step_s, options_.step_fraction / rate);
-    const double pieces = std::ceil(value_of(remaining) / limit - 1e-9);
-    return pieces <= 1.0 ? remaining : S(remaining / S(pieces));
+    return even_step(remaining, rate_step(rate));
   }
 
   template <class T>
@@ -139,21 +205,8 @@ class EventEngine {
   }
 
   template <class T>
-  static PlantState<T> rk4(const Dynamics<T>& dynamics, const PlantState<T>& s, Contacts contacts,
-                           const T& drive, const T& h) {
-    const T half = T(0.5) * h;
-    T middle_v = drive;
-    T end_v = drive;
-    if (dynamics.has_motor_lag()) {
-      using std::exp;
-      const T decay = exp(-half / dynamics.motor_time_constant_s());
-      middle_v = drive + (s.motor_v - drive) * decay;
-      end_v = drive + (s.motor_v - drive) * decay * decay;
-    }
-    const PlantState<T> k1 = dynamics.derivative(s, s.motor_v, contacts);
-    const PlantState<T> k2 = dynamics.derivative(shifted(s, k1, half), middle_v, contacts);
-    const PlantState<T> k3 = dynamics.derivative(shifted(s, k2, half), middle_v, contacts);
-    const PlantState<T> k4 = dynamics.derivative(shifted(s, k3, h), end_v, contacts);
+  static PlantState<T> combined(const PlantState<T>& s, const PlantState<T>& k1, const PlantState<T>& k2,
+                                const PlantState<T>& k3, const PlantState<T>& k4, const T& h) {
     const T sixth = h / T(6.0);
     const auto mean = [](const T& a, const T& b, const T& c, const T& d) { return a + T(2.0) * (b + c) + d; };
     PlantState<T> end;
@@ -163,114 +216,141 @@ class EventEngine {
     end.theta_radps =
         s.theta_radps + sixth * mean(k1.theta_radps, k2.theta_radps, k3.theta_radps, k4.theta_radps);
     end.bristle_m = s.bristle_m + sixth * mean(k1.bristle_m, k2.bristle_m, k3.bristle_m, k4.bristle_m);
-    end.motor_v = end_v;
     return end;
   }
 
-  PlantState<double> plain_step(double h) const {
-    return rk4(plain_, plain_state(state_), contacts_, value_of(drive_), h);
-  }
-
-  /// A function of the state that is not positive before its event and positive after it.
   template <class T>
-  T indicator(const Dynamics<T>& dynamics, const PlantState<T>& s, EventKind kind) const {
-    switch (kind) {
-      case EventKind::cart_stick:
-        return -T(static_cast<double>(contacts_.cart)) * s.cart_mps;
-      case EventKind::pivot_stick:
-        return -T(static_cast<double>(contacts_.pivot)) * s.theta_radps;
-      case EventKind::cart_reversal:
-        return value_of(state_.cart_mps) > 0.0 ? T(-s.cart_mps) : s.cart_mps;
-      case EventKind::pivot_reversal:
-        return value_of(state_.theta_radps) > 0.0 ? T(-s.theta_radps) : s.theta_radps;
-      case EventKind::cart_breakaway: {
-        const T load = dynamics.cart_load(s, s.motor_v, contacts_.pivot);
-        const T forward = load - dynamics.cart_dry_level(s.cart_m, T(0.0), T(1.0));
-        const T backward = -load - dynamics.cart_dry_level(s.cart_m, T(0.0), T(-1.0));
-        return forward > backward ? forward : backward;
-      }
-      case EventKind::pivot_breakaway:
-        return absolute(dynamics.pivot_load(s, s.motor_v, contacts_.cart)) - dynamics.pivot_dry_level();
-      case EventKind::fall:
-        return absolute(s.theta_rad) - T(*options_.fall_angle_rad);
-      case EventKind::track_end:
-        return absolute(s.cart_m) - T(*options_.track_limit_m);
+  HeldMotor<T> held_motor(const Dynamics<T>& dynamics, const T& h) const {
+    T drive, motor_v;
+    if constexpr (std::is_same_v<T, S>) {
+      drive = drive_;
+      motor_v = state_.motor_v;
+    } else {
+      drive = value_of(drive_);
+      motor_v = value_of(state_.motor_v);
     }
-    return T(-1.0);
+    if (!dynamics.has_motor_lag()) return {motor_v, drive, drive};
+    using std::exp;
+    const T decay = exp(-(T(0.5) * h) / dynamics.motor_time_constant_s());
+    return {motor_v, drive + (motor_v - drive) * decay, drive + (motor_v - drive) * decay * decay};
   }
 
-  std::optional<Found> first_event(const PlantState<double>& end, double h) const {
-    std::optional<Found> first;
-    const auto consider = [&](EventKind kind) {
-      if (!(indicator(plain_, end, kind) > 0.0)) return;
-      const double after = root(kind, h);
-      if (!first || after < first->after_s) first = Found{kind, after};
+  template <class T>
+  static PlantState<T> rk4(const Dynamics<T>& dynamics, const PlantState<T>& s, Contacts contacts, const T& h,
+                           const HeldMotor<T>& motor, FirstRate* first = nullptr) {
+    const T half = T(0.5) * h;
+    const PlantState<T> k1 = dynamics.derivative(s, motor.begin_v, contacts);
+    const PlantState<T> k2 = dynamics.derivative(shifted(s, k1, half), motor.middle_v, contacts);
+    const PlantState<T> k3 = dynamics.derivative(shifted(s, k2, half), motor.middle_v, contacts);
+    const PlantState<T> k4 = dynamics.derivative(shifted(s, k3, h), motor.end_v, contacts);
+    if (first != nullptr) *first = {value_of(k1.cart_mps), value_of(k1.theta_radps)};
+    PlantState<T> end = combined(s, k1, k2, k3, k4, h);
+    end.motor_v = motor.end_v;
+    return end;
+  }
+
+  struct DrivenStep {
+    PlantState<double> first;  ///< rate at the beginning
+    PlantState<double> end;
+  };
+
+  /// Rate of the state under a command that varies, the motor's lag included.
+  template <class Command>
+  PlantState<double> driven_rate(const Command& command, bool lag, double t,
+                                 const PlantState<double>& s) const {
+    const double drive = plain_.actuate(command(t, s));
+    PlantState<double> rate = plain_.derivative(s, lag ? s.motor_v : drive, contacts_);
+    rate.motor_v = lag ? (drive - s.motor_v) / plain_.motor_time_constant_s() : 0.0;
+    return rate;
+  }
+
+  template <class Command>
+  DrivenStep driven_rk4(const Command& command, bool lag, double h) const {
+    const double half = 0.5 * h;
+    const auto stage = [](const PlantState<double>& s, const PlantState<double>& rate, double t) {
+      PlantState<double> at = shifted(s, rate, t);
+      at.motor_v = s.motor_v + t * rate.motor_v;
+      return at;
     };
-    if (!dynamics_.cart_locked() && dynamics_.cart_has_kink()) {
-      if (!dynamics_.cart_can_stick()) {
-        if (value_of(state_.cart_mps) != 0.0) consider(EventKind::cart_reversal);
-      } else {
-        consider(contacts_.cart == Contact::stick ? EventKind::cart_breakaway : EventKind::cart_stick);
+    const PlantState<double> s = plain_state(state_);
+    const PlantState<double> k1 = driven_rate(command, lag, time_s_, s);
+    const PlantState<double> k2 = driven_rate(command, lag, time_s_ + half, stage(s, k1, half));
+    const PlantState<double> k3 = driven_rate(command, lag, time_s_ + half, stage(s, k2, half));
+    const PlantState<double> k4 = driven_rate(command, lag, time_s_ + h, stage(s, k3, h));
+    DrivenStep step{k1, combined(s, k1, k2, k3, k4, h)};
+    step.end.motor_v = lag ? s.motor_v + h / 6.0 * (k1.motor_v + 2.0 * (k2.motor_v + k3.motor_v) + k4.motor_v)
+                           : plain_.actuate(command(time_s_ + h, step.end));
+    return step;
+  }
+
+  /// The cubic through the states and rates at both ends of the step from now to `to_s`.
+  template <class Command>
+  DenseStep dense_step(const DrivenStep& step, const Command& command, bool lag, double to_s) const {
+    const PlantState<double> last = driven_rate(command, lag, to_s, step.end);
+    const double h = to_s - time_s_;
+    DenseStep dense;
+    dense.begin_s = dense.at_s = time_s_;
+    dense.end_s = to_s;
+    dense.factors = 4;
+    const auto cubic = [&](double PlantState<double>::*of) {
+      const double rise = (step.end.*of - state_.*of) / h;
+      dense.factor[0].*of = state_.*of;
+      dense.factor[1].*of = step.first.*of;
+      dense.factor[2].*of = (3.0 * rise - 2.0 * (step.first.*of) - last.*of) / h;
+      dense.factor[3].*of = (step.first.*of + last.*of - 2.0 * rise) / (h * h);
+    };
+    cubic(&PlantState<double>::cart_m);
+    cubic(&PlantState<double>::theta_rad);
+    cubic(&PlantState<double>::cart_mps);
+    cubic(&PlantState<double>::theta_radps);
+    cubic(&PlantState<double>::motor_v);
+    cubic(&PlantState<double>::bristle_m);
+    return dense;
+  }
+
+  /// The first of the events within a step that ends at `end`; `along(t)` is the state at a time inside.
+  template <class Along>
+  std::optional<Found> first_event(const PlantState<double>& end, const FirstRate& rate, double h, bool held,
+                                   const Along& along) const {
+    const double v = value_of(state_.cart_mps);
+    const double omega = value_of(state_.theta_radps);
+    const WatchList list = next_events(plain_, v, omega, contacts_, options_, held);
+    std::optional<Found> first;
+    const auto consider = [&](const Watch& watch, double within_s, double at_end) {
+      const auto f = [&](double t) { return event_indicator(plain_, along(t), contacts_, watch, options_); };
+      const double now = event_indicator(plain_, plain_state(state_), contacts_, watch, options_);
+      const double after = turning_positive(f, now, at_end, within_s);
+      if (!first || after < first->after_s) first = Found{watch, after};
+    };
+    for (const Watch& watch : list) {
+      const double at_end = event_indicator(plain_, end, contacts_, watch, options_);
+      if (at_end > 0.0) {
+        consider(watch, h, at_end);
+        continue;
       }
+      const bool cart = watch.kind == EventKind::cart_stick || watch.kind == EventKind::cart_reversal;
+      const bool pivot = watch.kind == EventKind::pivot_stick || watch.kind == EventKind::pivot_reversal;
+      if (!cart && !pivot) continue;
+      // The velocity may dip through zero and come back within the step.
+      const double from = watch.sign * (cart ? v : omega);
+      const double slope = watch.sign * (cart ? rate.cart_mps2 : rate.theta_radps2);
+      if (!(from > 0.0 && from + 0.5 * h * slope <= 0.0)) continue;
+      const double curvature = (-at_end - from - slope * h) / (h * h);
+      const double lowest_s = -slope / (2.0 * curvature);
+      if (!(lowest_s > 0.0 && lowest_s < h)) continue;
+      const double at_lowest = event_indicator(plain_, along(lowest_s), contacts_, watch, options_);
+      if (at_lowest > 0.0) consider(watch, lowest_s, at_lowest);
     }
-    if (dynamics_.pivot_has_kink()) {
-      if (!dynamics_.pivot_can_stick()) {
-        if (value_of(state_.theta_radps) != 0.0) consider(EventKind::pivot_reversal);
-      } else {
-        consider(contacts_.pivot == Contact::stick ? EventKind::pivot_breakaway : EventKind::pivot_stick);
-      }
-    }
-    if (options_.fall_angle_rad && dynamics_.has_pendulum()) consider(EventKind::fall);
-    if (options_.track_limit_m) consider(EventKind::track_end);
     return first;
   }
 
-  /// Time within (0, h] at which the indicator turns positive, given that it is positive at h.
-  double root(EventKind kind, double h) const {
-    const auto f = [&](double t) { return indicator(plain_, plain_step(t), kind); };
-    double low = 0.0, high = h;
-    double f_low = indicator(plain_, plain_state(state_), kind), f_high = f(h);
-    if (!(f_low < 0.0)) {
-      // Started on the event itself, at rest: look inside for a time at which the motion has left it.
-      double inside = h;
-      for (int i = 0; i < most_root_iterations && inside > root_tolerance_s; ++i) {
-        inside *= 0.5;
-        const double f_inside = f(inside);
-        if (f_inside < 0.0) {
-          low = inside;
-          f_low = f_inside;
-          break;
-        }
-        high = inside;
-        f_high = f_inside;
-      }
-      if (!(f_low < 0.0)) return 0.0;
-    }
-    for (int i = 0; i < most_root_iterations && high - low > root_tolerance_s; ++i) {
-      double t = high - f_high * (high - low) / (f_high - f_low);
-      if (!(t > low && t < high) || i % 4 == 3) t = 0.5 * (low + high);
-      const double f_t = f(t);
-      if (f_t == 0.0) return t;
-      if (f_t > 0.0) {
-        high = t;
-        f_high = f_t;
-        f_low *= 0.5;
-      } else {
-        low = t;
-        f_low = f_t;
-        f_high *= 0.5;
-      }
-    }
-    return high;
-  }
-
   /// Moves to an event and through it. Returns the time it took, with its derivative.
-  S pass(const Found& found) {
+  S pass(const Found& found, bool held) {
     S taken(found.after_s);
-    PlantState<S> at = rk4(dynamics_, state_, contacts_, drive_, taken);
+    PlantState<S> at = rk4(dynamics_, state_, contacts_, taken, held_motor(dynamics_, taken));
     if constexpr (!std::is_same_v<S, double>) {
       // The root moves with the parameters: dt = -dg / (dg/dt).
-      const S g = indicator(dynamics_, at, found.kind);
+      const S g = event_indicator(dynamics_, at, contacts_, found.watch, options_);
       const double slope = indicator_slope(found);
       constexpr double flattest = 1e-9;  // a grazing event has no derivative; keep it finite
       const S shift = (S(value_of(g)) - g) / S(std::max(slope, flattest));
@@ -281,98 +361,41 @@ class EventEngine {
     }
     state_ = at;
     time_s_ += found.after_s;
-    events_[event_count_++ % kept_events] = {time_s_, found.kind};
-    switch (found.kind) {
-      case EventKind::cart_reversal:
-      case EventKind::cart_stick:
-        state_.cart_mps = S(0.0);
-        break;
-      case EventKind::pivot_reversal:
-      case EventKind::pivot_stick:
-        state_.theta_radps = S(0.0);
-        break;
-      case EventKind::cart_breakaway:
-        contacts_.cart =
-            plain_.cart_load(plain_state(state_), value_of(state_.motor_v), contacts_.pivot) > 0.0
-                ? Contact::slip_forward
-                : Contact::slip_backward;
-        break;
-      case EventKind::pivot_breakaway:
-        contacts_.pivot =
-            plain_.pivot_load(plain_state(state_), value_of(state_.motor_v), contacts_.cart) > 0.0
-                ? Contact::slip_forward
-                : Contact::slip_backward;
-        break;
-      case EventKind::fall:
-      case EventKind::track_end:
-        halted_ = found.kind;
-        break;
-    }
-    if (found.kind == EventKind::cart_stick || found.kind == EventKind::pivot_stick) {
-      settle();
-      if (found.kind == EventKind::cart_stick && contacts_.cart != Contact::stick)
-        events_[(event_count_ - 1) % kept_events].kind = EventKind::cart_reversal;
-      if (found.kind == EventKind::pivot_stick && contacts_.pivot != Contact::stick)
-        events_[(event_count_ - 1) % kept_events].kind = EventKind::pivot_reversal;
-    }
+    enter(found.watch, held);
     return taken;
+  }
+
+  /// Changes modes for an event at the present state.
+  void enter(const Watch& watch, bool held) {
+    const EventKind kind = watch.kind;
+    if (kind == EventKind::actuator_corner) return;
+    if (kind == EventKind::cart_reversal || kind == EventKind::cart_stick) state_.cart_mps = S(0.0);
+    if (kind == EventKind::pivot_reversal || kind == EventKind::pivot_stick) state_.theta_radps = S(0.0);
+    contacts_ = contacts_after(plain_, plain_state(state_), contacts_, kind, held);
+    if (kind == EventKind::fall || kind == EventKind::track_end) halted_ = kind;
+    note(resolved_kind(kind, contacts_));
   }
 
   /// How fast the indicator rises where it crosses zero [1/s].
   double indicator_slope(const Found& found) const {
     constexpr double aside_s = 1e-7;
-    const double before = indicator(plain_, plain_step(found.after_s), found.kind);
-    const double after = indicator(plain_, plain_step(found.after_s + aside_s), found.kind);
-    return (after - before) / aside_s;
-  }
-
-  /// Chooses the modes of contacts that are at rest so that they hold together: a sticking contact carries
-  /// its load, a sliding one is driven the way it slides. Sticking is tried first.
-  void settle() {
-    const PlantState<double> s = plain_state(state_);
-    const bool cart_rests = dynamics_.cart_can_stick() && !dynamics_.cart_locked() && s.cart_mps == 0.0;
-    const bool pivot_rests = dynamics_.pivot_can_stick() && s.theta_radps == 0.0;
-    if (!cart_rests && !pivot_rests) return;
-    constexpr std::array modes = {Contact::stick, Contact::slip_forward, Contact::slip_backward};
-    for (const Contact cart : modes) {
-      if (!cart_rests && cart != contacts_.cart) continue;
-      for (const Contact pivot : modes) {
-        if (!pivot_rests && pivot != contacts_.pivot) continue;
-        const bool cart_holds = !cart_rests || holds(cart, plain_.cart_load(s, s.motor_v, pivot),
-                                                     plain_.cart_dry_level(s.cart_m, 0.0, 1.0),
-                                                     plain_.cart_dry_level(s.cart_m, 0.0, -1.0));
-        const bool pivot_holds = !pivot_rests || holds(pivot, plain_.pivot_load(s, s.motor_v, cart),
-                                                       plain_.pivot_dry_level(), plain_.pivot_dry_level());
-        if (cart_holds && pivot_holds) {
-          contacts_ = {cart, pivot};
-          return;
-        }
-      }
-    }
-    if (cart_rests) contacts_.cart = Contact::stick;
-    if (pivot_rests) contacts_.pivot = Contact::stick;
-  }
-
-  static bool holds(Contact mode, double load, double forward_level, double backward_level) {
-    switch (mode) {
-      case Contact::slip_forward:
-        return load > forward_level;
-      case Contact::slip_backward:
-        return -load > backward_level;
-      case Contact::stick:
-        break;
-    }
-    return load <= forward_level && -load <= backward_level;
+    const auto g = [&](double t) {
+      const PlantState<double> s = rk4(plain_, plain_state(state_), contacts_, t, held_motor(plain_, t));
+      return event_indicator(plain_, s, contacts_, found.watch, options_);
+    };
+    return (g(found.after_s + aside_s) - g(found.after_s)) / aside_s;
   }
 
   Dynamics<S> dynamics_;
   Dynamics<double> plain_;
+  ActuatorCorners<S> corners_;
   EngineOptions options_;
   PlantState<S> state_{};
   Contacts contacts_;
   S drive_{};
   double time_s_ = 0.0;
   std::optional<EventKind> halted_;
+  EventBudget budget_;
   std::uint64_t event_count_ = 0;
   std::array<Event, kept_events> events_{};
 };

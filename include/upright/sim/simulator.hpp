@@ -1,4 +1,4 @@
-// A plant with its input: commands take effect after the plant's input delay, the event engine does the rest.
+// A plant with its input: commands take effect after the plant's input delay, the engine does the rest.
 #pragma once
 
 #include <cstddef>
@@ -8,14 +8,15 @@
 
 namespace upright {
 
-/// Follows a record of commanded voltages. Allocates at construction only.
-template <class S>
-class Simulator {
+/// Follows a record of commanded voltages on any engine (EventEngine<S>, CvodeEngine) whose numbers are S.
+/// Allocates at construction only.
+template <class Engine, class S>
+class BasicSimulator {
  public:
   /// `most_commands`: how many commands may be on their way at once (input delay times command rate, and
   /// some).
-  explicit Simulator(const PlantModel<S>& model, const EngineOptions& options = {},
-                     std::size_t most_commands = 4096)
+  explicit BasicSimulator(const PlantModel<S>& model, const EngineOptions& options = {},
+                          std::size_t most_commands = 4096)
       : engine_(model, options), delay_s_(engine_.dynamics().input_delay_s()), waiting_(most_commands) {}
 
   /// Starts at a time, with the voltage that has been acting until then.
@@ -44,8 +45,8 @@ class Simulator {
     if (time_s > value_of(now_s_)) move_to(S(time_s));
   }
 
-  EventEngine<S>& engine() { return engine_; }
-  const EventEngine<S>& engine() const { return engine_; }
+  Engine& engine() { return engine_; }
+  const Engine& engine() const { return engine_; }
   double time_s() const { return value_of(now_s_); }
   /// The commanded voltage that acts now, after the input delay and before the rest of the actuator chain.
   double acting_v() const { return acting_v_; }
@@ -66,12 +67,16 @@ class Simulator {
     now_s_ = time_s;
   }
 
-  EventEngine<S> engine_;
+  Engine engine_;
   S delay_s_;
   std::vector<Command> waiting_;
   std::size_t first_ = 0, count_ = 0;
   double acting_v_ = 0.0;
   S now_s_{};
 };
+
+/// The real-time plant.
+template <class S>
+using Simulator = BasicSimulator<EventEngine<S>, S>;
 
 }  // namespace upright

@@ -1,0 +1,347 @@
+// What every engine shares of dry contacts and events: which events to watch for from a state, how to tell
+// that one has come, and which modes of the contacts hold together afterwards. Pure functions of their
+// arguments.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <optional>
+
+#include "upright/model/dynamics.hpp"
+
+namespace upright {
+
+enum class EventKind : std::uint8_t {
+  cart_stick,
+  cart_breakaway,
+  cart_reversal,
+  pivot_stick,
+  pivot_breakaway,
+  pivot_reversal,
+  fall,
+  track_end,
+  /// The voltage passes a corner of the actuator chain. Engines restart there; it is not counted as an event.
+  actuator_corner,
+};
+
+struct Event {
+  double time_s = 0.0;
+  EventKind kind = EventKind::cart_stick;
+};
+
+struct EngineOptions {
+  double max_step_s = 1e-3;
+  /// Steps of the Runge-Kutta engine are at most this fraction of the inverse of the fastest rate of the
+  /// motion.
+  double step_fraction = 0.2;
+  /// Relative tolerance of the reference engine.
+  double relative_tolerance = 1e-10;
+  std::optional<double> fall_angle_rad;  ///< the run halts where |theta| reaches it
+  std::optional<double> track_limit_m;   ///< the run halts where |x| reaches it
+};
+
+/// An event to look for. `sign` is the direction of the motion before it, `corner_v` the voltage of a corner.
+struct Watch {
+  EventKind kind = EventKind::cart_stick;
+  double sign = 1.0;
+  double corner_v = 0.0;
+};
+
+/// A few watches, without allocation.
+struct WatchList {
+  std::array<Watch, 6> items{};
+  std::size_t count = 0;
+  void add(const Watch& watch) { items[count++] = watch; }
+  const Watch* begin() const { return items.data(); }
+  const Watch* end() const { return items.data() + count; }
+};
+
+inline Contact direction_of(double velocity) {
+  if (velocity == 0.0) return Contact::stick;
+  return velocity > 0.0 ? Contact::slip_forward : Contact::slip_backward;
+}
+
+inline double sign_of_contact(Contact contact) {
+  return static_cast<double>(contact);
+}
+
+/// Both contacts as the velocities say, before `settled_contacts` has its word on those at rest.
+inline Contacts contacts_of(const PlantState<double>& s) {
+  return {direction_of(s.cart_mps), direction_of(s.theta_radps)};
+}
+
+namespace detail {
+
+inline bool holds(Contact mode, double load, double forward_level, double backward_level) {
+  switch (mode) {
+    case Contact::slip_forward:
+      return load > forward_level;
+    case Contact::slip_backward:
+      return -load > backward_level;
+    case Contact::stick:
+      break;
+  }
+  return load <= forward_level && -load <= backward_level;
+}
+
+}  // namespace detail
+
+/// Chooses the modes of contacts that are at rest so that they hold together: a sticking contact carries its
+/// load, a sliding one is driven the way it slides. Sticking is tried first. Moving contacts stay as they
+/// are.
+template <class Present>
+Contacts settled_contacts(const Dynamics<double, Present>& dynamics, const PlantState<double>& s,
+                          Contacts contacts) {
+  const bool cart_rests = dynamics.cart_can_stick() && !dynamics.cart_locked() && s.cart_mps == 0.0;
+  const bool pivot_rests = dynamics.pivot_can_stick() && s.theta_radps == 0.0;
+  if (!cart_rests && !pivot_rests) return contacts;
+  constexpr std::array modes = {Contact::stick, Contact::slip_forward, Contact::slip_backward};
+  for (const Contact cart : modes) {
+    if (!cart_rests && cart != contacts.cart) continue;
+    for (const Contact pivot : modes) {
+      if (!pivot_rests && pivot != contacts.pivot) continue;
+      const bool cart_holds = !cart_rests || detail::holds(cart, dynamics.cart_load(s, s.motor_v, pivot),
+                                                           dynamics.cart_dry_level(s.cart_m, 0.0, 1.0),
+                                                           dynamics.cart_dry_level(s.cart_m, 0.0, -1.0));
+      const bool pivot_holds =
+          !pivot_rests || detail::holds(pivot, dynamics.pivot_load(s, s.motor_v, cart),
+                                        dynamics.pivot_dry_level(), dynamics.pivot_dry_level());
+      if (cart_holds && pivot_holds) return {cart, pivot};
+    }
+  }
+  if (cart_rests) contacts.cart = Contact::stick;
+  if (pivot_rests) contacts.pivot = Contact::stick;
+  return contacts;
+}
+
+/// The events that can come next. `held`: contacts that came to rest stay so, their breakaway is not watched
+/// (how engines end a flutter of events that no time separates).
+template <class S, class Present>
+WatchList next_events(const Dynamics<S, Present>& dynamics, double cart_mps, double theta_radps,
+                      Contacts contacts, const EngineOptions& options, bool held = false) {
+  WatchList list;
+  if (!dynamics.cart_locked() && dynamics.cart_has_kink()) {
+    if (!dynamics.cart_can_stick()) {
+      if (cart_mps != 0.0 && !held) list.add({EventKind::cart_reversal, cart_mps > 0.0 ? 1.0 : -1.0});
+    } else if (contacts.cart != Contact::stick) {
+      list.add({EventKind::cart_stick, sign_of_contact(contacts.cart)});
+    } else if (!held) {
+      list.add({EventKind::cart_breakaway});
+    }
+  }
+  if (dynamics.pivot_has_kink()) {
+    if (!dynamics.pivot_can_stick()) {
+      if (theta_radps != 0.0 && !held) list.add({EventKind::pivot_reversal, theta_radps > 0.0 ? 1.0 : -1.0});
+    } else if (contacts.pivot != Contact::stick) {
+      list.add({EventKind::pivot_stick, sign_of_contact(contacts.pivot)});
+    } else if (!held) {
+      list.add({EventKind::pivot_breakaway});
+    }
+  }
+  if (options.fall_angle_rad && dynamics.has_pendulum()) list.add({EventKind::fall});
+  if (options.track_limit_m) list.add({EventKind::track_end});
+  return list;
+}
+
+/// A function of the state that is not positive before the event and positive after it. Corners of the
+/// actuator chain are the engine's own.
+template <class S, class Present>
+S event_indicator(const Dynamics<S, Present>& dynamics, const PlantState<S>& s, Contacts contacts,
+                  const Watch& watch, const EngineOptions& options) {
+  switch (watch.kind) {
+    case EventKind::cart_stick:
+    case EventKind::cart_reversal:
+      return watch.sign > 0.0 ? S(-s.cart_mps) : s.cart_mps;
+    case EventKind::pivot_stick:
+    case EventKind::pivot_reversal:
+      return watch.sign > 0.0 ? S(-s.theta_radps) : s.theta_radps;
+    case EventKind::cart_breakaway: {
+      const S load = dynamics.cart_load(s, s.motor_v, contacts.pivot);
+      const S forward = load - dynamics.cart_dry_level(s.cart_m, S(0.0), S(1.0));
+      const S backward = -load - dynamics.cart_dry_level(s.cart_m, S(0.0), S(-1.0));
+      return forward > backward ? forward : backward;
+    }
+    case EventKind::pivot_breakaway:
+      return absolute(dynamics.pivot_load(s, s.motor_v, contacts.cart)) - dynamics.pivot_dry_level();
+    case EventKind::fall:
+      return absolute(s.theta_rad) - S(*options.fall_angle_rad);
+    case EventKind::track_end:
+      return absolute(s.cart_m) - S(*options.track_limit_m);
+    case EventKind::actuator_corner:
+      break;
+  }
+  return S(-1.0);
+}
+
+/// The modes after an event, at the state of the event with the velocity of a contact that came to rest set
+/// to zero. `held` as in `next_events`.
+template <class Present>
+Contacts contacts_after(const Dynamics<double, Present>& dynamics, const PlantState<double>& s,
+                        Contacts contacts, EventKind kind, bool held = false) {
+  switch (kind) {
+    case EventKind::cart_breakaway:
+      contacts.cart = dynamics.cart_load(s, s.motor_v, contacts.pivot) > 0.0 ? Contact::slip_forward
+                                                                             : Contact::slip_backward;
+      return contacts;
+    case EventKind::pivot_breakaway:
+      contacts.pivot = dynamics.pivot_load(s, s.motor_v, contacts.cart) > 0.0 ? Contact::slip_forward
+                                                                              : Contact::slip_backward;
+      return contacts;
+    case EventKind::cart_stick:
+      contacts.cart = Contact::stick;
+      return held ? contacts : settled_contacts(dynamics, s, contacts);
+    case EventKind::pivot_stick:
+      contacts.pivot = Contact::stick;
+      return held ? contacts : settled_contacts(dynamics, s, contacts);
+    default:
+      return contacts;
+  }
+}
+
+/// What a stick is called once it is known whether the contact stays.
+inline EventKind resolved_kind(EventKind kind, Contacts after) {
+  if (kind == EventKind::cart_stick && after.cart != Contact::stick) return EventKind::cart_reversal;
+  if (kind == EventKind::pivot_stick && after.pivot != Contact::stick) return EventKind::pivot_reversal;
+  return kind;
+}
+
+/// Whether a run that starts here has ended already: fallen, or beyond the track.
+inline std::optional<EventKind> ended_at(double theta_rad, double cart_m, bool has_pendulum,
+                                         const EngineOptions& options) {
+  if (has_pendulum && options.fall_angle_rad && std::abs(theta_rad) > *options.fall_angle_rad)
+    return EventKind::fall;
+  if (options.track_limit_m && std::abs(cart_m) > *options.track_limit_m) return EventKind::track_end;
+  return std::nullopt;
+}
+
+/// Time within [0, h] at which f turns positive, given that f(h) = f_high > 0. Where f(0) = f_low is not
+/// negative (the last event was this one) it looks inside for a time at which the motion has left it; 0 where
+/// it never does. At most about 120 evaluations.
+template <class F>
+double turning_positive(F&& f, double f_low, double f_high, double h) {
+  constexpr int most_iterations = 60;
+  constexpr double tolerance_s = 1e-14;
+  double low = 0.0, high = h;
+  if (!(f_low < 0.0)) {
+    double inside = h;
+    for (int i = 0; i < most_iterations && inside > tolerance_s; ++i) {
+      inside *= 0.5;
+      const double f_inside = f(inside);
+      if (f_inside < 0.0) {
+        low = inside;
+        f_low = f_inside;
+        break;
+      }
+      high = inside;
+      f_high = f_inside;
+    }
+    if (!(f_low < 0.0)) return 0.0;
+  }
+  for (int i = 0; i < most_iterations && high - low > tolerance_s; ++i) {
+    double t = high - f_high * (high - low) / (f_high - f_low);
+    if (!(t > low && t < high) || i % 4 == 3) t = 0.5 * (low + high);
+    const double f_t = f(t);
+    if (f_t == 0.0) return t;
+    if (f_t > 0.0) {
+      high = t;
+      f_high = f_t;
+      f_low *= 0.5;
+    } else {
+      low = t;
+      f_low = f_t;
+      f_high *= 0.5;
+    }
+  }
+  return high;
+}
+
+/// Counts events in windows of time. In a window with too many of them engines hold contacts at rest, so that
+/// no flutter costs unbounded work.
+class EventBudget {
+ public:
+  void restart(double time_s) {
+    window_begin_s_ = time_s;
+    events_ = 0;
+  }
+  /// To be asked before each step.
+  bool spent(double time_s) {
+    if (time_s - window_begin_s_ >= window_s) restart(time_s);
+    return events_ >= most_events;
+  }
+  void count() { ++events_; }
+
+ private:
+  static constexpr double window_s = 1e-4;
+  static constexpr int most_events = 24;
+  double window_begin_s_ = 0.0;
+  int events_ = 0;
+};
+
+/// The corners of a plant's actuator chain, in command volts, in rising order: edges of the dead zone and of
+/// saturation.
+template <class S>
+struct ActuatorCorners {
+  std::array<double, 4> volts{};
+  std::size_t count = 0;
+
+  explicit ActuatorCorners(const PlantModel<S>& model) {
+    constexpr std::size_t dead = effect_index<effects::VoltageDeadZone>();
+    constexpr std::size_t gain = effect_index<effects::VoltageGain>();
+    constexpr std::size_t offset = effect_index<effects::VoltageOffset>();
+    constexpr std::size_t saturation = effect_index<effects::VoltageSaturation>();
+    const double half = model.present.template has<dead>() ? value_of(model.template of<dead>()[0]) : 0.0;
+    const double scale = model.present.template has<gain>() ? value_of(model.template of<gain>()[0]) : 1.0;
+    const double shift =
+        model.present.template has<offset>() ? value_of(model.template of<offset>()[0]) : 0.0;
+    if (half > 0.0) {
+      volts[count++] = -half;
+      volts[count++] = half;
+    }
+    if (model.present.template has<saturation>()) {
+      const double limit = value_of(model.template of<saturation>()[0]);
+      for (const double end : {-limit, limit}) {
+        const double before = (end - shift) / scale;
+        volts[count++] = before + (before > 0.0 ? half : before < 0.0 ? -half : 0.0);
+      }
+    }
+    std::sort(volts.begin(), volts.begin() + static_cast<std::ptrdiff_t>(count));
+  }
+
+  /// Adds the nearest corner on either side of a voltage.
+  void watch(double at_v, WatchList& list) const {
+    const double here = 1e-12 * (1.0 + std::abs(at_v));  // on a corner: it has just been passed
+    double below = -std::numeric_limits<double>::infinity();
+    for (std::size_t i = 0; i < count; ++i) {
+      if (volts[i] < at_v - here) below = volts[i];
+      if (volts[i] > at_v + here) {
+        list.add({EventKind::actuator_corner, 1.0, volts[i]});
+        break;
+      }
+    }
+    if (std::isfinite(below)) list.add({EventKind::actuator_corner, -1.0, below});
+  }
+};
+
+/// The motion over one step of an engine, as a polynomial in time about `at_s`; `factor[k]` multiplies
+/// (t - at_s)^k. Step sinks get it where the voltage varies; it is the dense history of delayed feedback.
+struct DenseStep {
+  static constexpr int most_factors = 13;
+  double begin_s = 0.0;
+  double end_s = 0.0;
+  double at_s = 0.0;
+  int factors = 0;
+  bool ends_at_event = false;   ///< the acceleration jumps at `end_s`
+  bool ends_at_corner = false;  ///< its slope does
+  std::array<PlantState<double>, most_factors> factor{};
+};
+
+inline void mark_end(DenseStep& step, const Watch* found) {
+  step.ends_at_corner = found != nullptr && found->kind == EventKind::actuator_corner;
+  step.ends_at_event = found != nullptr && !step.ends_at_corner;
+}
+
+}  // namespace upright
