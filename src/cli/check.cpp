@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "commands.hpp"
+#include "upright/control/gain_file.hpp"
 #include "upright/model/error.hpp"
 #include "upright/model/plant_file.hpp"
 
@@ -22,6 +23,7 @@ struct FileKind {
 
 constexpr std::array file_kinds = {
     FileKind{"plant", [](const std::filesystem::path& file) { read_plant_file(file); }},
+    FileKind{"gains", [](const std::filesystem::path& file) { read_gain_file(file); }},
 };
 
 struct Finding {

@@ -1,0 +1,81 @@
+// The one control step, shared by run, replay, sweep and experiment: velocity estimates, delay, state
+// feedback and limiter as a pure function of counts-in-SI and what came before. Allocates at construction
+// only.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+
+#include "upright/control/delay_line.hpp"
+#include "upright/control/gain_file.hpp"
+#include "upright/control/limiter.hpp"
+#include "upright/control/state.hpp"
+#include "upright/control/velocity_estimator.hpp"
+
+namespace upright {
+
+/// Makes up for the delay: turns the delayed state into an estimate of the present one. Called once per
+/// period, in the loop: no allocation, no lock, no exception.
+class DelayCompensator {
+ public:
+  virtual ~DelayCompensator() = default;
+  /// Begins from rest at `state`, which has held for ever.
+  virtual void start(const ControlState& state) noexcept = 0;
+  /// `delayed`: the state one delay ago. `applied_v`: the voltage that was held over the period that just
+  /// ended.
+  virtual ControlState compensate(const ControlState& delayed, double applied_v) noexcept = 0;
+};
+
+/// One sample, already scaled and unwrapped.
+struct ControlInput {
+  std::uint64_t tick = 0;  ///< period number; grows. A gap means periods without a sample.
+  double cart_m = 0.0;
+  double theta_rad = 0.0;
+  double reference_m = 0.0;  ///< set-point of the cart position
+};
+
+struct ControlOutput {
+  ControlState state;  ///< what was measured and estimated now
+  double voltage_requested_v = 0.0;
+  double voltage_v = 0.0;  ///< after the limiter; zero when the request was not finite
+  bool saturated = false;
+  bool finite = true;
+};
+
+class Controller {
+ public:
+  /// `amplifier_limit_v`: the limiter's. Throws ConfigError when the configuration cannot be run: a
+  /// compensation other than none needs a `compensator`.
+  Controller(const ControlConfig& config, double amplifier_limit_v,
+             std::unique_ptr<DelayCompensator> compensator = nullptr);
+
+  /// Forgets what came before: the next step begins from rest there.
+  void reset() noexcept { started_ = false; }
+
+  /// The voltage for a sample. Samples missing since the last step are taken as lying on the straight line
+  /// between the two that are there, so that estimates and delay keep their time; at most
+  /// `most_missing_periods` of them, beyond which the controller begins anew from rest.
+  ControlOutput step(const ControlInput& input) noexcept;
+
+  const ControlConfig& config() const { return config_; }
+  const DelayLine& delay_line() const { return delay_; }
+  double amplifier_limit_v() const { return limit_v_; }
+
+  static constexpr std::uint64_t most_missing_periods = 1000;
+
+ private:
+  void begin(const ControlInput& input) noexcept;
+  void advance(double cart_m, double theta_rad) noexcept;
+
+  ControlConfig config_;
+  double limit_v_;
+  VelocityEstimator cart_, pendulum_;
+  DelayLine delay_;
+  std::unique_ptr<DelayCompensator> compensator_;
+  ControlState state_, acting_;
+  std::uint64_t tick_ = 0;
+  double voltage_v_ = 0.0;
+  bool started_ = false;
+};
+
+}  // namespace upright

@@ -1,0 +1,48 @@
+// A delay of whole or fractional periods over a ring buffer that is allocated once.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "upright/control/state.hpp"
+
+namespace upright {
+
+/// Remembers one state per period and gives back the state `delay_s` ago: exact to the sample when the delay
+/// is a multiple of the period, linear between the two samples around it otherwise (`exact` says which).
+/// Before there are data, the first state is held, which is the constant history of the paper's equation
+/// (15).
+class DelayLine {
+ public:
+  /// A delay within 1e-9 periods of a whole number counts as that number (0.003 s at 1 kHz is 3 samples
+  /// although neither is a binary fraction). Throws ConfigError when the delay or the period is not usable.
+  DelayLine(double delay_s, double period_s);
+
+  double delay_s() const { return delay_s_; }
+  bool exact() const { return fraction_ == 0.0; }
+  /// Whole periods of the delay, and the rest as a fraction of a period.
+  std::size_t whole_periods() const { return whole_; }
+  double fraction() const { return fraction_; }
+
+  /// Forgets everything and takes `state` as the history.
+  void start(const ControlState& state) noexcept;
+  /// Takes the state of the next period.
+  void push(const ControlState& state) noexcept;
+  /// The state `delay_s` before the one pushed last.
+  ControlState delayed() const noexcept;
+
+  static constexpr double longest_delay_s = 10.0;
+  static constexpr double longest_delay_periods = 1e6;
+
+ private:
+  const ControlState& back(std::size_t periods) const noexcept;
+
+  double delay_s_;
+  std::size_t whole_ = 0;
+  double fraction_ = 0.0;
+  std::vector<ControlState> ring_;
+  std::size_t newest_ = 0;
+};
+
+}  // namespace upright

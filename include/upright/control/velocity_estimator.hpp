@@ -1,0 +1,65 @@
+// Velocities from sampled positions.
+#pragma once
+
+#include <cstdint>
+
+namespace upright {
+
+enum class EstimatorKind : std::uint8_t {
+  second_order_filter,  ///< wc^2 s / (s^2 + 2 zeta wc s + wc^2), as on Quanser rigs
+  difference,           ///< (x_k - x_{k-1}) / T
+};
+
+struct EstimatorConfig {
+  EstimatorKind kind = EstimatorKind::second_order_filter;
+  double cutoff_hz = 50.0;  ///< wc / (2 pi)
+  double damping = 0.9;     ///< zeta
+};
+
+/// One step of an estimator as numbers, for the loop and for engines that run many lanes:
+///   velocity' = p21 lag + p22 velocity + g2 dx
+///   lag'      = p11 lag + p12 velocity + g1 dx
+/// with dx = x' - x, and lag = (filtered position - position). The backward difference is the same step with
+/// g2 = 1 / T and everything else zero.
+///
+/// The filter is discretised ramp-invariantly (first-order hold): it is exact when the position moves
+/// linearly between samples, the right reading of an encoder on a body that cannot jump. A constant gives
+/// exactly zero and a ramp its exact slope once settled, at any sampling rate.
+struct EstimatorStep {
+  double p11 = 0.0, p12 = 0.0, p21 = 0.0, p22 = 0.0, g1 = 0.0, g2 = 0.0;
+};
+
+/// Throws ConfigError when the configuration cannot be run at this period.
+EstimatorStep make_estimator_step(const EstimatorConfig& config, double period_s);
+
+/// Follows one coordinate.
+class VelocityEstimator {
+ public:
+  explicit VelocityEstimator(const EstimatorStep& step) : step_(step) {}
+
+  /// At rest at `position`.
+  void start(double position) noexcept {
+    position_ = position;
+    lag_ = 0.0;
+    velocity_ = 0.0;
+  }
+
+  /// Takes the position one period later and returns the velocity there.
+  double step(double position) noexcept {
+    const double dx = position - position_;
+    const double velocity = step_.p21 * lag_ + step_.p22 * velocity_ + step_.g2 * dx;
+    lag_ = step_.p11 * lag_ + step_.p12 * velocity_ + step_.g1 * dx;
+    velocity_ = velocity;
+    position_ = position;
+    return velocity;
+  }
+
+  double velocity() const noexcept { return velocity_; }
+  double position() const noexcept { return position_; }
+
+ private:
+  EstimatorStep step_;
+  double position_ = 0.0, lag_ = 0.0, velocity_ = 0.0;
+};
+
+}  // namespace upright

@@ -1,0 +1,52 @@
+// The clock a loop and its rig share: the machine's, or one that only moves when it is told to.
+#pragma once
+
+#include <time.h>
+
+#include <cstdint>
+
+namespace upright {
+
+inline constexpr std::int64_t nanoseconds_per_second = 1'000'000'000;
+
+class Clock {
+ public:
+  virtual ~Clock() = default;
+  virtual std::int64_t now_ns() noexcept = 0;
+  /// Returns at `time_ns` or later; early only when a signal came.
+  virtual void sleep_until(std::int64_t time_ns) noexcept = 0;
+  /// True when time passes only by `sleep_until`: the loop may wait for its log, and runs repeat exactly.
+  virtual bool is_virtual() const noexcept = 0;
+};
+
+/// CLOCK_MONOTONIC, absolute sleeps.
+class MonotonicClock final : public Clock {
+ public:
+  std::int64_t now_ns() noexcept override {
+    timespec now{};
+    clock_gettime(CLOCK_MONOTONIC, &now);
+    return now.tv_sec * nanoseconds_per_second + now.tv_nsec;
+  }
+  void sleep_until(std::int64_t time_ns) noexcept override {
+    timespec until{};
+    until.tv_sec = time_ns / nanoseconds_per_second;
+    until.tv_nsec = time_ns % nanoseconds_per_second;
+    clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &until, nullptr);
+  }
+  bool is_virtual() const noexcept override { return false; }
+};
+
+/// Stands still until it is told to move; never goes back.
+class VirtualClock final : public Clock {
+ public:
+  std::int64_t now_ns() noexcept override { return now_ns_; }
+  void sleep_until(std::int64_t time_ns) noexcept override {
+    if (time_ns > now_ns_) now_ns_ = time_ns;
+  }
+  bool is_virtual() const noexcept override { return true; }
+
+ private:
+  std::int64_t now_ns_ = 0;
+};
+
+}  // namespace upright

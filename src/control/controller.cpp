@@ -1,0 +1,73 @@
+#include "upright/control/controller.hpp"
+
+#include <cmath>
+
+#include "upright/model/error.hpp"
+
+namespace upright {
+
+Controller::Controller(const ControlConfig& config, double amplifier_limit_v,
+                       std::unique_ptr<DelayCompensator> compensator)
+    : config_(config),
+      limit_v_(amplifier_limit_v),
+      cart_(make_estimator_step(config.estimator, config.period_s())),
+      pendulum_(cart_),
+      delay_(config.delay_s, config.period_s()),
+      compensator_(std::move(compensator)) {
+  if (!(limit_v_ > 0.0) || !std::isfinite(limit_v_))
+    throw ConfigError("give the amplifier a voltage limit above 0: it is " + exact_text(limit_v_) + " V");
+  if (config.compensation.kind != CompensationKind::none && !compensator_)
+    throw ConfigError("use delay_compensation: {kind: none}: this controller has no predictor");
+}
+
+void Controller::begin(const ControlInput& input) noexcept {
+  cart_.start(input.cart_m);
+  pendulum_.start(input.theta_rad);
+  state_ = {input.cart_m, input.theta_rad, 0.0, 0.0};
+  acting_ = state_;
+  delay_.start(state_);
+  voltage_v_ = 0.0;
+  if (compensator_) compensator_->start(state_);
+  started_ = true;
+}
+
+void Controller::advance(double cart_m, double theta_rad) noexcept {
+  state_.cart_velocity_mps = cart_.step(cart_m);
+  state_.pendulum_rate_radps = pendulum_.step(theta_rad);
+  state_.cart_m = cart_m;
+  state_.theta_rad = theta_rad;
+  delay_.push(state_);
+  acting_ = delay_.delayed();
+  if (compensator_) acting_ = compensator_->compensate(acting_, voltage_v_);
+}
+
+ControlOutput Controller::step(const ControlInput& input) noexcept {
+  const std::uint64_t periods = input.tick - tick_;
+  if (!started_ || periods == 0 || periods > most_missing_periods) {
+    begin(input);
+  } else {
+    const ControlState before = state_;
+    for (std::uint64_t i = 1; i < periods; ++i) {
+      const double part = static_cast<double>(i) / static_cast<double>(periods);
+      advance(before.cart_m + part * (input.cart_m - before.cart_m),
+              before.theta_rad + part * (input.theta_rad - before.theta_rad));
+    }
+    advance(input.cart_m, input.theta_rad);
+  }
+  tick_ = input.tick;
+  const Gains& k = config_.gains;
+  ControlOutput output;
+  output.state = state_;
+  output.voltage_requested_v = k.cart_position_v_per_m * (acting_.cart_m - input.reference_m) +
+                               k.pendulum_angle_v_per_rad * acting_.theta_rad +
+                               k.cart_velocity_v_per_mps * acting_.cart_velocity_mps +
+                               k.pendulum_rate_v_per_radps * acting_.pendulum_rate_radps;
+  const LimitedVoltage limited = limit_voltage(output.voltage_requested_v, limit_v_);
+  output.voltage_v = limited.voltage_v;
+  output.saturated = limited.saturated;
+  output.finite = limited.finite;
+  voltage_v_ = output.voltage_v;
+  return output;
+}
+
+}  // namespace upright
