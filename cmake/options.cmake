@@ -2,6 +2,10 @@
 
 add_library(upright_options INTERFACE)
 target_compile_options(upright_options INTERFACE -Wall -Wextra -Wpedantic -Wshadow -Wno-psabi)
+# g++ 12 takes the undefined lanes of its own AVX-512 intrinsics for ours (its bug 105593).
+if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND CMAKE_CXX_COMPILER_VERSION VERSION_LESS 13)
+  target_compile_options(upright_options INTERFACE -Wno-maybe-uninitialized)
+endif()
 # Built where it runs: the machine's own SIMD makes fits and sweeps several times faster. All targets share the flag,
 # since Eigen's alignment must be the same everywhere.
 if(UPRIGHT_NATIVE)

@@ -8,6 +8,7 @@
 namespace upright::cli {
 
 void add_check(CLI::App& app, int& exit_code);
+void add_design(CLI::App& app, int& exit_code);
 void add_effects(CLI::App& app, int& exit_code);
 
 }  // namespace upright::cli

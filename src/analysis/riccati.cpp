@@ -1,0 +1,154 @@
+#include "upright/analysis/riccati.hpp"
+
+#include <Eigen/Dense>
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <complex>
+
+#include "upright/model/error.hpp"
+#include "upright/model/linear_plant.hpp"
+
+namespace upright {
+
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+using ComplexMatrix = Eigen::MatrixXcd;
+
+struct SchurForm {
+  ComplexMatrix t;
+  ComplexMatrix u;
+};
+
+/// Exchanges the diagonal entries k and k + 1 of the triangular factor by one rotation.
+void exchange(SchurForm& schur, Index k) {
+  Eigen::JacobiRotation<std::complex<double>> rotation;
+  rotation.makeGivens(schur.t(k, k + 1), schur.t(k + 1, k + 1) - schur.t(k, k));
+  schur.t.applyOnTheLeft(k, k + 1, rotation.adjoint());
+  schur.t.applyOnTheRight(k, k + 1, rotation);
+  schur.u.applyOnTheRight(k, k + 1, rotation);
+  schur.t(k + 1, k) = 0.0;
+}
+
+/// Schur form with the eigenvalues of the left half plane first; returns how many they are.
+Index order_stable_first(SchurForm& schur) {
+  Index stable = 0;
+  for (Index i = 0; i < schur.t.rows(); ++i) {
+    if (!(schur.t(i, i).real() < 0.0)) continue;
+    for (Index k = i; k > stable; --k) exchange(schur, k - 1);
+    ++stable;
+  }
+  return stable;
+}
+
+MatrixXd symmetric_part(const MatrixXd& m) {
+  return 0.5 * (m + m.transpose());
+}
+
+/// F'X + XF + W = 0 through the Kronecker product: the systems here have a handful of states.
+MatrixXd solve_lyapunov(const MatrixXd& f, const MatrixXd& w) {
+  const Index n = f.rows();
+  MatrixXd system = MatrixXd::Zero(n * n, n * n);
+  for (Index i = 0; i < n; ++i)
+    for (Index j = 0; j < n; ++j) {
+      system.block(i * n, j * n, n, n) += f(j, i) * MatrixXd::Identity(n, n);
+      if (i == j) system.block(i * n, i * n, n, n) += f.transpose();
+    }
+  const VectorXd right = -Eigen::Map<const VectorXd>(w.data(), n * n);
+  const VectorXd solution = system.partialPivLu().solve(right);
+  return symmetric_part(Eigen::Map<const MatrixXd>(solution.data(), n, n));
+}
+
+double relative(const MatrixXd& remainder, std::initializer_list<double> terms) {
+  const double largest = std::max(terms);
+  return remainder.cwiseAbs().maxCoeff() / std::max(largest, std::numeric_limits<double>::min());
+}
+
+void finish_continuous(RiccatiSolution& solution, const MatrixXd& a, const VectorXd& b, const MatrixXd& q,
+                       double r) {
+  const MatrixXd& x = solution.x;
+  solution.gain = b.transpose() * x / r;
+  const MatrixXd linear = a.transpose() * x + x * a;
+  const MatrixXd square = solution.gain.transpose() * r * solution.gain;
+  solution.residual = relative(linear - square + q, {linear.cwiseAbs().maxCoeff(),
+                                                     square.cwiseAbs().maxCoeff(), q.cwiseAbs().maxCoeff()});
+}
+
+[[noreturn]] void refuse(const MatrixXd& a, const VectorXd& b, const MatrixXd& q, const std::string& why) {
+  throw ConfigError("correct the plant or the weights: " + why + ", " + matrix_text("A", a) + ", " +
+                    matrix_text("b", b) + ", " + matrix_text("Q", q));
+}
+
+void check(const MatrixXd& a, const VectorXd& b, const MatrixXd& q, double r) {
+  if (!a.allFinite()) refuse(a, b, q, "the matrix A has an entry that is not finite");
+  if (!b.allFinite()) refuse(a, b, q, "the matrix b has an entry that is not finite");
+  if (!q.allFinite()) refuse(a, b, q, "the matrix Q has an entry that is not finite");
+  if (!(r > 0.0)) refuse(a, b, q, "the weight r must be above 0");
+}
+
+}  // namespace
+
+RiccatiSolution solve_continuous_riccati(const MatrixXd& a, const VectorXd& b, const MatrixXd& q, double r) {
+  check(a, b, q, r);
+  const Index n = a.rows();
+  MatrixXd hamiltonian(2 * n, 2 * n);
+  hamiltonian << a, -b * b.transpose() / r, -q, -a.transpose();
+  const Eigen::ComplexSchur<ComplexMatrix> factored(hamiltonian.cast<std::complex<double>>());
+  SchurForm schur{factored.matrixT(), factored.matrixU()};
+  const double smallest = schur.t.diagonal().real().cwiseAbs().minCoeff();
+  constexpr double on_the_axis = 1e-13;
+  if (factored.info() != Eigen::Success || order_stable_first(schur) != n ||
+      smallest < on_the_axis * hamiltonian.cwiseAbs().maxCoeff())
+    refuse(a, b, q,
+           "the matrix pair (A, b) is not stabilizable or (A, Q) does not show every mode, so that the "
+           "Hamiltonian "
+           "matrix has eigenvalues on the imaginary axis");
+  const ComplexMatrix top = schur.u.topLeftCorner(n, n), bottom = schur.u.bottomLeftCorner(n, n);
+  const ComplexMatrix x = top.transpose().partialPivLu().solve(bottom.transpose()).transpose();
+  RiccatiSolution solution;
+  solution.x = symmetric_part(x.real());
+  finish_continuous(solution, a, b, q, r);
+  const MatrixXd closed = a - b * solution.gain;
+  solution.x = solve_lyapunov(closed, q + solution.gain.transpose() * r * solution.gain);
+  finish_continuous(solution, a, b, q, r);
+  if (!solution.x.allFinite()) refuse(a, b, q, "the matrix X of the Riccati equation is not finite");
+  return solution;
+}
+
+RiccatiSolution solve_discrete_riccati(const MatrixXd& a, const VectorXd& b, const MatrixXd& q,
+                                       const VectorXd& s, double r) {
+  check(a, b, q, r);
+  const Index n = a.rows();
+  MatrixXd f = a - b * s.transpose() / r;
+  MatrixXd g = b * b.transpose() / r;
+  MatrixXd h = symmetric_part(q - s * s.transpose() / r);
+  constexpr int most_doublings = 60;
+  constexpr double converged = 1e-15;
+  bool done = false;
+  for (int i = 0; i < most_doublings && !done; ++i) {
+    const Eigen::PartialPivLU<MatrixXd> lu(MatrixXd::Identity(n, n) + g * h);
+    const MatrixXd w_f = lu.solve(f), w_g = lu.solve(g);
+    const MatrixXd grown = f.transpose() * h * w_f;
+    done = grown.cwiseAbs().maxCoeff() <= converged * h.cwiseAbs().maxCoeff();
+    g = symmetric_part(g + f * w_g * f.transpose());
+    h = symmetric_part(h + grown);
+    f = f * w_f;
+    if (!h.allFinite()) break;
+  }
+  if (!done)
+    refuse(a, b, q,
+           "the matrix pair (A, b) is not stabilizable, or (A, Q) does not show every unstable mode");
+  RiccatiSolution solution;
+  solution.x = h;
+  const Eigen::RowVectorXd cross = b.transpose() * h * a + s.transpose();
+  solution.gain = cross / (r + b.dot(h * b));
+  const MatrixXd moved = a.transpose() * h * a;
+  const MatrixXd remainder = moved + q - cross.transpose() * solution.gain - h;
+  solution.residual =
+      relative(remainder, {moved.cwiseAbs().maxCoeff(), h.cwiseAbs().maxCoeff(), q.cwiseAbs().maxCoeff()});
+  return solution;
+}
+
+}  // namespace upright

@@ -1,0 +1,165 @@
+// `upright design`: gains for a plant by linear-quadratic design.
+#include <algorithm>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <iostream>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+
+#include "commands.hpp"
+#include "options.hpp"
+#include "upright/analysis/gain_design.hpp"
+#include "upright/model/error.hpp"
+#include "upright/model/plant_file.hpp"
+
+namespace upright::cli {
+
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+struct DesignOptions {
+  std::string plant;
+  std::vector<double> q{5000.0, 3000.0, 20.0, 20.0};
+  double r = 1.0;
+  double smoothing = 100.0;
+  std::optional<double> delay_s;
+  double rate_hz = 1000.0;
+  double cutoff_hz = 50.0;
+  double damping = 0.9;
+  std::string out;
+  bool force = false;
+  bool as_json = false;
+};
+
+Json json_of(const EliminatedState& state) {
+  return {{"state", state.state},
+          {"eigenvalue", {state.eigenvalue.real(), state.eigenvalue.imag()}},
+          {"explanation", state.explanation}};
+}
+
+Json json_of(const GainDesign& design, const std::optional<SampledDesign>& sampled) {
+  Json poles = Json::array(), eliminated = Json::array();
+  for (const auto& pole : design.closed_loop_poles) poles.push_back({pole.real(), pole.imag()});
+  for (const EliminatedState& state : design.eliminated) eliminated.push_back(json_of(state));
+  Json document{{"gains", design.gains},
+                {"closed_loop_poles", poles},
+                {"eliminated_states", eliminated},
+                {"riccati_residual", design.residual},
+                {"notes", design.notes}};
+  if (sampled)
+    document["sampled"] = {{"delay_periods", sampled->delay_periods},
+                           {"prediction_s", sampled->prediction_s},
+                           {"delay_line_residual", sampled->delay_line_residual},
+                           {"delay_line_difference", sampled->delay_line_difference}};
+  return document;
+}
+
+void print(const GainDesign& design, const std::optional<SampledDesign>& sampled) {
+  constexpr std::array names = {"x [V/m]", "theta [V/rad]", "x_dot [V s/m]", "theta_dot [V s/rad]"};
+  std::printf("gains\n");
+  for (std::size_t i = 0; i < names.size(); ++i) std::printf("  %-20s %14.7f\n", names[i], design.gains[i]);
+  std::printf("closed-loop poles [1/s]\n");
+  for (const auto& pole : design.closed_loop_poles)
+    std::printf("  %14.6f %+14.6fi\n", pole.real(), pole.imag());
+  std::printf("Riccati residual %.1e (relative)\n", design.residual);
+  if (sampled && sampled->delay_periods > 0)
+    std::printf("delay line of %d periods as states: residual %.1e, its gains and these agree to %.1e\n",
+                sampled->delay_periods, sampled->delay_line_residual, sampled->delay_line_difference);
+  for (const EliminatedState& state : design.eliminated)
+    std::printf("eliminated: %s\n", state.explanation.c_str());
+  for (const std::string& note : design.notes) std::printf("note: %s\n", note.c_str());
+  std::fflush(stdout);
+}
+
+/// The plant's path as the gain file, which may lie elsewhere, names it.
+std::string path_from(const std::filesystem::path& file, const std::filesystem::path& plant) {
+  std::error_code error;
+  const auto folder = std::filesystem::absolute(file).parent_path();
+  const auto relative = std::filesystem::relative(plant, folder, error);
+  return error || relative.empty() ? std::filesystem::absolute(plant).string() : relative.string();
+}
+
+std::string gain_text(const DesignOptions& options, const GainDesign& design) {
+  std::string text = "# Designed by `upright design` on " + options.plant + "\n";
+  text += "gains: {cart_position_v_per_m: " + exact_text(design.gains[0]) +
+          ", pendulum_angle_v_per_rad: " + exact_text(design.gains[1]) +
+          ",\n        cart_velocity_v_per_mps: " + exact_text(design.gains[2]) +
+          ", pendulum_rate_v_per_radps: " + exact_text(design.gains[3]) + "}\n";
+  text += "delay_s: " + exact_text(options.delay_s.value_or(0.0)) + "\n";
+  text += "sample_rate_hz: " + exact_text(options.rate_hz) + "\n";
+  text += "velocity_estimator: {kind: second_order_filter, cutoff_hz: " + exact_text(options.cutoff_hz) +
+          ", damping: " + exact_text(options.damping) + "}\n";
+  if (options.delay_s)
+    text +=
+        "delay_compensation: {kind: predictor, plant: \"" + path_from(options.out, options.plant) + "\"}\n";
+  return text;
+}
+
+void write_gains(const DesignOptions& options, const GainDesign& design) {
+  if (std::filesystem::exists(options.out) && !options.force)
+    throw ConfigError("give another --out or add --force: " + options.out + " exists already");
+  std::ofstream file(options.out);
+  file << gain_text(options, design) << std::flush;
+  if (!file) throw ConfigError("give --out a file that can be written: " + options.out + " cannot");
+}
+
+void design(const DesignOptions& options) {
+  const Plant plant = read_plant_file(options.plant);
+  DesignWeights weights;
+  std::copy(options.q.begin(), options.q.end(), weights.q.begin());
+  weights.r = options.r;
+  std::optional<SampledDesign> sampled;
+  GainDesign gains;
+  if (options.delay_s) {
+    sampled = design_sampled_gains(plant, weights, options.smoothing, options.rate_hz, *options.delay_s);
+    gains = sampled->design;
+  } else {
+    gains = design_gains(plant, weights, options.smoothing);
+  }
+  if (!options.out.empty()) write_gains(options, gains);
+  if (options.as_json)
+    std::cout << json_of(gains, sampled).dump(2) << "\n";
+  else
+    print(gains, sampled);
+}
+
+}  // namespace
+
+void add_design(CLI::App& app, int&) {
+  CLI::App* command = app.add_subcommand("design", "Design gains for a plant (linear-quadratic)");
+  command->footer(
+      "Examples:\n"
+      "  upright design config/plants/exponential.yaml --q 5000,3000,20,20 --r 1 --out gains.yaml\n"
+      "  upright design config/plants/viscous.yaml --delay 0.1 --rate 1000 --out compensated.yaml\n"
+      "With --delay the gains feed back the state predicted to when the voltage acts (delay_compensation: "
+      "predictor).");
+  const auto options = std::make_shared<DesignOptions>();
+  command->add_option("plant", options->plant, "Plant file")->required();
+  command->add_option("--q", options->q, "Weights on x, theta, x_dot, theta_dot")
+      ->delimiter(',')
+      ->expected(4)
+      ->check(number_in(Range::not_negative()));
+  command->add_option("--r", options->r, "Weight on the voltage")->check(number_in(Range::positive()));
+  command->add_option("--smoothing", options->smoothing, "sgn(v) is taken as tanh(smoothing v)")
+      ->check(number_in(Range::positive()));
+  command
+      ->add_option("--delay", options->delay_s,
+                   "Loop delay to design for [s]: sampled design, for the predictor")
+      ->check(number_in(Range::within(0.0, 10.0)));
+  command->add_option("--rate", options->rate_hz, "Sample rate [Hz]; with --delay, and for the gain file")
+      ->check(number_in(Range::within(1.0, 100000.0)));
+  command->add_option("--cutoff", options->cutoff_hz, "Velocity filter in the gain file: cutoff [Hz]")
+      ->check(number_in(Range::positive()));
+  command->add_option("--damping", options->damping, "Velocity filter in the gain file: damping")
+      ->check(number_in(Range::positive()));
+  command->add_option("--out", options->out, "Write a gain file");
+  command->add_flag("--force", options->force, "Replace the gain file if it exists");
+  command->add_flag("--json", options->as_json, "One JSON document");
+  command->callback([options] { design(*options); });
+}
+
+}  // namespace upright::cli

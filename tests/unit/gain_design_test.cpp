@@ -1,0 +1,150 @@
+#include "upright/analysis/gain_design.hpp"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Dense>
+#include <Eigen/Eigenvalues>
+#include <random>
+
+#include "upright/analysis/riccati.hpp"
+#include "upright/model/error.hpp"
+#include "upright/model/plant_file.hpp"
+
+namespace upright {
+namespace {
+
+Plant plant_named(const std::string& name) {
+  return read_plant_file(std::string(UPRIGHT_SOURCE_DIR) + "/config/plants/" + name + ".yaml");
+}
+
+void expect_gains(const GainDesign& design, const std::array<double, 4>& expected) {
+  for (std::size_t i = 0; i < 4; ++i) EXPECT_NEAR(design.gains[i], expected[i], 1e-5 * expected[i]);
+  for (const auto& pole : design.closed_loop_poles) EXPECT_LT(pole.real(), 0.0);
+  EXPECT_LT(design.residual, 1e-12);
+}
+
+TEST(GainDesign, GivesThePapersExponentialGain) {
+  const GainDesign design = design_gains(plant_named("exponential"), {}, 100.0);
+  expect_gains(design, {70.7107, 304.9270, 143.3150, 61.0832});
+  EXPECT_TRUE(design.eliminated.empty());
+}
+
+TEST(GainDesign, GivesTheViscousGain) {
+  expect_gains(design_gains(plant_named("viscous"), {}, 100.0), {70.7107, 143.2162, 51.3919, 27.1288});
+}
+
+TEST(GainDesign, EliminatesTheBristleThatTheVoltageCannotMoveAlone) {
+  const GainDesign design = design_gains(plant_named("dynamic"), {}, 100.0);
+  expect_gains(design, {170.170, 290.499, 136.020, 58.101});
+  ASSERT_EQ(design.eliminated.size(), 1u);
+  EXPECT_EQ(design.eliminated[0].state, "bristle_m");
+  EXPECT_NEAR(std::abs(design.eliminated[0].eigenvalue), 0.0, 1e-9);
+  EXPECT_NE(design.eliminated[0].explanation.find("85.085 on cart_m"), std::string::npos);
+}
+
+TEST(GainDesign, ActuatorAndSensorScalesMoveIntoTheGains) {
+  Plant plant = plant_named("viscous");
+  const GainDesign plain = design_gains(plant, {}, 100.0);
+  plant.set("angle_scale", {1.25});
+  const GainDesign scaled = design_gains(plant, {}, 100.0);
+  EXPECT_NEAR(scaled.gains[1], plain.gains[1] / 1.25, 1e-9 * plain.gains[1]);
+  EXPECT_NEAR(scaled.gains[0], plain.gains[0], 1e-9 * plain.gains[0]);
+}
+
+TEST(GainDesign, MotorLagIsTakenAsQuickAndThePolesShowIt) {
+  Plant plant = plant_named("viscous");
+  plant.set("motor_lag", {0.005});
+  const GainDesign design = design_gains(plant, {}, 100.0);
+  EXPECT_EQ(design.closed_loop_poles.size(), 5u);
+  EXPECT_EQ(design.eliminated.back().state, "motor_v");
+}
+
+TEST(GainDesign, AKinkCountsWithTheMeanOfItsSlopes) {
+  Plant plant = plant_named("viscous");
+  const GainDesign plain = design_gains(plant, {}, 100.0);
+  plant.set("viscous_asymmetry", {0.7});
+  plant.set("quadratic_drag", {5.0});
+  const GainDesign kinked = design_gains(plant, {}, 100.0);
+  for (std::size_t i = 0; i < 4; ++i) EXPECT_NEAR(kinked.gains[i], plain.gains[i], 1e-9);
+}
+
+TEST(GainDesign, CartAloneHasGainsOnTheCartOnly) {
+  Plant plant = plant_named("viscous");
+  plant.pendulum.reset();
+  const GainDesign design = design_gains(plant, {}, 100.0);
+  EXPECT_LT(design.gains[0], 0.0);
+  EXPECT_EQ(design.gains[1], 0.0);
+}
+
+TEST(GainDesign, NamesAndPrintsTheBadMatrix) {
+  Plant plant = plant_named("viscous");
+  DesignWeights weights;
+  weights.q = {0.0, 0.0, 0.0, 0.0};
+  try {
+    design_gains(plant, weights, 100.0);
+    FAIL();
+  } catch (const ConfigError& error) {
+    EXPECT_NE(std::string(error.what()).find("Q = [0 0 0 0; "), std::string::npos) << error.what();
+  }
+  plant.motor.force_per_volt_n = 0.0;
+  EXPECT_THROW(design_gains(plant, {}, 100.0), ConfigError);
+}
+
+TEST(SampledDesign, DelayLineEquationAgreesWithThePredictedState) {
+  for (const double delay_s : {0.0, 0.004, 0.0215, 0.1}) {
+    const SampledDesign sampled = design_sampled_gains(plant_named("viscous"), {}, 100.0, 1000.0, delay_s);
+    EXPECT_EQ(sampled.delay_periods, static_cast<int>(std::ceil(delay_s * 1000.0 - 1e-9)));
+    EXPECT_LT(sampled.delay_line_difference, 1e-6);
+    EXPECT_LT(sampled.design.residual, 1e-9);
+    for (const auto& pole : sampled.design.closed_loop_poles) EXPECT_LT(pole.real(), 0.0);
+  }
+}
+
+TEST(SampledDesign, TendsToTheContinuousGainAtHighRates) {
+  const GainDesign continuous = design_gains(plant_named("exponential"), {}, 100.0);
+  const SampledDesign sampled = design_sampled_gains(plant_named("exponential"), {}, 100.0, 20000.0, 0.0);
+  for (std::size_t i = 0; i < 4; ++i)
+    EXPECT_NEAR(sampled.design.gains[i], continuous.gains[i], 5e-3 * continuous.gains[i]);
+}
+
+/// Random systems with one unstable part at least, all of it within reach of the input.
+class RandomSystem : public testing::TestWithParam<unsigned> {
+ protected:
+  std::mt19937 random{GetParam()};
+  std::normal_distribution<double> normal;
+  Eigen::MatrixXd matrix(Eigen::Index rows, Eigen::Index columns) {
+    return Eigen::MatrixXd::NullaryExpr(rows, columns, [&] { return normal(random); });
+  }
+};
+
+TEST_P(RandomSystem, ContinuousRiccatiHoldsAndStabilizes) {
+  const auto n = static_cast<Eigen::Index>(1 + GetParam() % 7);
+  const Eigen::MatrixXd a = matrix(n, n) * 3.0, c = matrix(n, n);
+  const Eigen::VectorXd b = matrix(n, 1);
+  const Eigen::MatrixXd q = c.transpose() * c;
+  const double r = std::exp(normal(random));
+  const RiccatiSolution solution = solve_continuous_riccati(a, b, q, r);
+  EXPECT_LT(solution.residual, 1e-8);
+  const Eigen::MatrixXd closed = a - b * solution.gain;
+  EXPECT_LT(closed.eigenvalues().real().maxCoeff(), 0.0);
+  const Eigen::MatrixXd& x = solution.x;
+  const Eigen::MatrixXd remainder = a.transpose() * x + x * a - x * b * b.transpose() * x / r + q;
+  EXPECT_LT(remainder.norm(), 1e-8 * (x * a).norm());
+  EXPECT_GT(x.selfadjointView<Eigen::Lower>().eigenvalues().minCoeff(), -1e-9 * x.norm());
+}
+
+TEST_P(RandomSystem, DiscreteRiccatiHoldsAndStabilizes) {
+  const auto n = static_cast<Eigen::Index>(1 + GetParam() % 7);
+  const Eigen::MatrixXd a = matrix(n, n) * 0.8, c = matrix(n, n);
+  const Eigen::VectorXd b = matrix(n, 1);
+  const Eigen::MatrixXd q = c.transpose() * c + 0.1 * Eigen::MatrixXd::Identity(n, n);
+  const RiccatiSolution solution = solve_discrete_riccati(a, b, q, Eigen::VectorXd::Zero(n), 1.0);
+  EXPECT_LT(solution.residual, 1e-8);
+  const Eigen::MatrixXd closed = a - b * solution.gain;
+  EXPECT_LT(closed.eigenvalues().cwiseAbs().maxCoeff(), 1.0);
+}
+
+INSTANTIATE_TEST_SUITE_P(Seeds, RandomSystem, testing::Range(0u, 60u));
+
+}  // namespace
+}  // namespace upright
