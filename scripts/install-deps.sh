@@ -12,7 +12,7 @@ packages=(
   gnuplot-nox python3-venv
 )
 development_packages=(
-  clang-14 clang-format-14 clang-tidy-14 clang-tools-14 libclang-rt-14-dev ccache
+  clang-14 clang-format-14 clang-tidy-14 clang-tools-14 libclang-rt-14-dev libomp-14-dev ccache
 )
 case "${1:-}" in
   '') ;;

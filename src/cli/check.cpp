@@ -21,9 +21,15 @@ struct FileKind {
   void (*read)(const std::filesystem::path& file);
 };
 
+void check_gains(const std::filesystem::path& file) {
+  const ControlConfig config = read_gain_file(file);
+  make_estimator_step(config.estimator, config.period_s());
+  if (config.compensation.kind == CompensationKind::predictor) read_plant_file(config.compensation.plant);
+}
+
 constexpr std::array file_kinds = {
     FileKind{"plant", [](const std::filesystem::path& file) { read_plant_file(file); }},
-    FileKind{"gains", [](const std::filesystem::path& file) { read_gain_file(file); }},
+    FileKind{"gains", check_gains},
 };
 
 struct Finding {
@@ -43,7 +49,8 @@ const FileKind& kind_of(const YamlMap& document) {
   }
   for (const std::string& key : document.keys()) {
     const std::string near = nearest_name(key, known);
-    if (!near.empty()) document.fail(key, "is not a known key", "did you mean " + near + "? otherwise remove it");
+    if (!near.empty())
+      document.fail(key, "is not a known key", "did you mean " + near + "? otherwise remove it");
   }
   throw ConfigError("give the file one of the top-level keys " + list + ": " + document.file().string() +
                     ":1: none of them is there");

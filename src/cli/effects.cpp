@@ -41,7 +41,9 @@ void print(const EffectInfo& effect) {
   for (const ParameterInfo& parameter : effect.parameters) {
     std::cout << "    " << parameter.name;
     if (!parameter.unit.empty()) std::cout << " [" << parameter.unit << "]";
-    std::cout << ", " << parameter.range.text() << ": " << parameter.meaning << "\n";
+    const bool bounded = std::isfinite(parameter.range.low) || std::isfinite(parameter.range.high);
+    std::cout << ", " << (bounded ? parameter.range.text() : "any value") << ": " << parameter.meaning
+              << "\n";
   }
   std::cout << "\n";
 }

@@ -131,7 +131,7 @@ std::string Range::text() const {
     return (low_open ? "above " : "from ") + brief(low) + (low_open ? " up to " : " to ") + brief(high);
   if (low_finite) return (low_open ? "above " : "not below ") + brief(low);
   if (high_finite) return "not above " + brief(high);
-  return "finite";
+  return "that is finite";
 }
 
 std::string nearest_name(std::string_view word, const std::vector<std::string>& known) {

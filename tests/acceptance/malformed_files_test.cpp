@@ -130,6 +130,65 @@ std::vector<Malformed> malformed_plants() {
   };
 }
 
+const std::string gains =
+    "gains:\n"
+    "  cart_position_v_per_m: 70.7107\n"
+    "  pendulum_angle_v_per_rad: 304.9273\n"
+    "  cart_velocity_v_per_mps: 143.3152\n"
+    "  pendulum_rate_v_per_radps: 61.0833\n"
+    "delay_s: 0.0\n"
+    "sample_rate_hz: 1000\n"
+    "velocity_estimator:\n"
+    "  kind: second_order_filter\n"
+    "  cutoff_hz: 50\n"
+    "  damping: 0.9\n"
+    "delay_compensation:\n"
+    "  kind: none\n";
+
+std::vector<Malformed> malformed_gains() {
+  const std::string predictor = with(gains, "kind: none", "kind: predictor");
+  return {
+      {"gains_missing_number", with(gains, "  cart_position_v_per_m: 70.7107\n", ""), 2,
+       "cart_position_v_per_m", "add"},
+      {"gains_misspelt", with(gains, "gains:\n", "gain:\n"), 1, "gain", "did you mean gains?"},
+      {"gains_is_list", "gains: [1, 2, 3, 4]\ndelay_s: 0\n", 1, "gains", "map"},
+      {"gains_unknown_key", with(gains, "delay_s: 0.0", "  integral: 1\ndelay_s: 0.0"), 6, "integral",
+       "remove it"},
+      {"gain_is_text", with(gains, "70.7107", "lots"), 2, "cart_position_v_per_m", "number"},
+      {"gain_is_nan", with(gains, "304.9273", ".nan"), 3, "pendulum_angle_v_per_rad", "number"},
+      {"gain_is_infinite", with(gains, "61.0833", "-.inf"), 5, "pendulum_rate_v_per_radps", "number"},
+      {"delay_missing", with(gains, "delay_s: 0.0\n", ""), 1, "delay_s", "add"},
+      {"delay_negative", with(gains, "delay_s: 0.0", "delay_s: -0.01"), 6, "delay_s", "from 0"},
+      {"delay_too_long", with(gains, "delay_s: 0.0", "delay_s: 1e6"), 6, "delay_s", "from 0"},
+      {"delay_in_text", with(gains, "delay_s: 0.0", "delay_s: 10ms"), 6, "delay_s", "number"},
+      {"delay_misspelt", with(gains, "delay_s: 0.0", "delay: 0.0"), 1, "delay_s", "add"},
+      {"rate_zero", with(gains, "1000", "0"), 7, "sample_rate_hz", "from 1"},
+      {"rate_negative", with(gains, "1000", "-1000"), 7, "sample_rate_hz", "from 1"},
+      {"rate_too_high", with(gains, "1000", "1e9"), 7, "sample_rate_hz", "to 20000"},
+      {"rate_missing", with(gains, "sample_rate_hz: 1000\n", ""), 1, "sample_rate_hz", "add"},
+      {"estimator_missing", gains.substr(0, gains.find("velocity_estimator")), 1, "velocity_estimator",
+       "add"},
+      {"estimator_kind_unknown", with(gains, "second_order_filter", "kalman"), 9, "kind",
+       "second_order_filter"},
+      {"estimator_kind_misspelt", with(gains, "second_order_filter", "second_order_fliter"), 9, "kind",
+       "did you mean second_order_filter?"},
+      {"estimator_is_word",
+       with(gains, "\n  kind: second_order_filter\n  cutoff_hz: 50\n  damping: 0.9", " fast"), 8,
+       "velocity_estimator", "map"},
+      {"cutoff_missing", with(gains, "  cutoff_hz: 50\n", ""), 9, "cutoff_hz", "add"},
+      {"cutoff_zero", with(gains, "cutoff_hz: 50", "cutoff_hz: 0"), 10, "cutoff_hz", "above 0"},
+      {"damping_negative", with(gains, "0.9", "-0.9"), 11, "damping", "above 0"},
+      {"difference_with_cutoff", with(gains, "second_order_filter", "difference"), 10, "cutoff_hz",
+       "remove it"},
+      {"compensation_kind_unknown", with(gains, "kind: none", "kind: smith"), 13, "kind", "predictor"},
+      {"compensation_without_plant", predictor, 13, "plant", "add plant"},
+      {"compensation_plant_is_map", predictor + "  plant: {a: 1}\n", 14, "plant", "text"},
+      {"none_with_plant", gains + "  plant: x.yaml\n", 14, "plant", "remove it"},
+      {"gains_unknown_top_key", gains + "author: me\n", 14, "author", "remove it"},
+      {"gains_doubled_key", gains + "delay_s: 0.1\n", 14, "delay_s", "keep one"},
+  };
+}
+
 class MalformedFile : public ::testing::TestWithParam<Malformed> {};
 
 TEST_P(MalformedFile, IsRefusedWithRemedyFileLineAndKey) {
@@ -153,10 +212,24 @@ std::string name_of_test(const ::testing::TestParamInfo<Malformed>& info) {
 
 INSTANTIATE_TEST_SUITE_P(Plant, MalformedFile, ::testing::ValuesIn(malformed_plants()), name_of_test);
 
+INSTANTIATE_TEST_SUITE_P(Gains, MalformedFile, ::testing::ValuesIn(malformed_gains()), name_of_test);
+
 TEST(WellFormedFile, IsAccepted) {
   const TemporaryFolder folder;
-  const CommandResult result = run_upright("check " + folder.write("plant.yaml", plant).string());
-  EXPECT_EQ(result.exit_code, 0) << result.err;
+  for (const auto& [name, text] : {std::pair{"plant.yaml", plant}, {"gains.yaml", gains}}) {
+    const CommandResult result = run_upright("check " + folder.write(name, text).string());
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+  }
+}
+
+TEST(ReferencedFile, IsCheckedToo) {
+  const TemporaryFolder folder;
+  const std::string file =
+      folder.write("gains.yaml", with(gains, "kind: none", "kind: predictor\n  plant: there/is/none.yaml"));
+  const CommandResult result = run_upright("check " + file);
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_NE(result.err.find((folder.path() / "there/is/none.yaml").string()), std::string::npos)
+      << result.err;
 }
 
 }  // namespace

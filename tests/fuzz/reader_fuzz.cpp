@@ -5,6 +5,7 @@
 #include <cstdlib>
 #include <string>
 
+#include "upright/control/gain_file.hpp"
 #include "upright/model/error.hpp"
 #include "upright/model/plant_file.hpp"
 
@@ -16,6 +17,12 @@ void read_plant_twice(const YamlMap& document) {
   const std::string once = upright::plant_text(upright::read_plant(document));
   const YamlMap again = YamlMap::from_text(once, "again.yaml");
   if (upright::plant_text(upright::read_plant(again)) != once) std::abort();
+}
+
+void read_gains_twice(const YamlMap& document) {
+  const std::string once = upright::gain_text(upright::read_gains(document));
+  const YamlMap again = YamlMap::from_text(once, "again.yaml");
+  if (upright::gain_text(upright::read_gains(again)) != once) std::abort();
 }
 
 /// An Error is the reader's good right; every other exception, crash or sanitizer report is a find.
@@ -35,5 +42,6 @@ void feed(const std::string& text, const Reader& reader) {
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const std::string text(reinterpret_cast<const char*>(data), size);
   feed(text, read_plant_twice);
+  feed(text, read_gains_twice);
   return 0;
 }
