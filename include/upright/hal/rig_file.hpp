@@ -1,0 +1,103 @@
+// Rig files (interface: "Rig file"): which backend, how it is wired and calibrated, and the limits that keep
+// it safe. Read strictly, written so that they read back exactly. The sample rate is the gain file's.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+
+#include "upright/hal/calibration.hpp"
+#include "upright/hal/modbus_registers.hpp"
+#include "upright/model/yaml_reader.hpp"
+
+namespace upright {
+
+enum class Backend : std::uint8_t { simulated, modbus_tcp, modbus_rtu, gpio, comedi };
+
+/// "simulated", "modbus-tcp", ...
+std::string backend_name(Backend backend);
+
+struct Amplifier {
+  double limit_v = 0.0;  ///< symmetric; commands are clamped to it
+  int sign = 1;          ///< -1 where a positive command would push the cart toward -x
+};
+
+/// The simulated rig: which plant, where it starts, what its sensors and its clock do.
+struct SimulatedRig {
+  std::filesystem::path plant;  ///< plant file
+  Pose initial;
+  double initial_cart_mps = 0.0;
+  double initial_theta_radps = 0.0;
+  bool quantise = true;          ///< false: encoders 1024 times as fine, see calibration_in_use
+  double cart_noise_m = 0.0;     ///< standard deviation, before quantisation
+  double theta_noise_rad = 0.0;  ///< standard deviation, before quantisation
+  double timing_jitter_s = 0.0;  ///< standard deviation of how late a reading is taken
+};
+
+enum class Parity : std::uint8_t { none, even, odd };
+
+/// How encoders and voltage travel.
+enum class ModbusExchange : std::uint8_t {
+  read_write,  ///< function 0x17 (holding registers only)
+  separate,    ///< 0x03 or 0x04 to read, 0x10 to write
+};
+
+/// A watchdog in the device: it takes the voltage away when no valid request came for its time.
+struct DeviceWatchdog {
+  int address = 0;
+  double time_s = 0.0;
+  double seconds_per_count = 0.0;  ///< what one count of the register means
+
+  int counts() const;
+};
+
+struct ModbusRig {
+  std::string host;    ///< modbus-tcp
+  int port = 502;      ///< modbus-tcp
+  std::string device;  ///< modbus-rtu: the serial line
+  int baud = 0;        ///< modbus-rtu
+  Parity parity = Parity::none;
+  int stop_bits = 1;
+  int unit = 1;
+  double response_timeout_s = 0.0;  ///< per exchange; the factory checks it against the period
+  ModbusExchange exchange = ModbusExchange::read_write;
+  bool input_registers = false;  ///< counters are input registers (0x04)
+  int cart_address = 0;
+  int pendulum_address = 0;
+  CounterFormat counter;
+  int voltage_address = 0;
+  VoltageFormat voltage;
+  std::optional<int> enable_address;      ///< holding register: 1 enables the amplifier, 0 disables it
+  std::optional<int> boot_count_address;  ///< same table as the counters: changes when the device restarts
+  std::optional<DeviceWatchdog> watchdog;
+};
+
+struct RigFile {
+  std::filesystem::path file;
+  Backend encoders = Backend::simulated;  ///< where the counts come from
+  Backend output = Backend::simulated;    ///< where the voltage goes: the same, or another
+  Calibration calibration;
+  Amplifier amplifier;
+  double track_limit_m = 0.0;   ///< the loop stops where |x| reaches it
+  double fall_angle_rad = 0.0;  ///< the loop stops where |theta| reaches it
+  double watchdog_s = 0.0;      ///< the motor is at zero volts this long after the last good exchange
+  std::optional<SimulatedRig> simulated;
+  std::optional<ModbusRig> modbus;
+};
+
+/// Reads a rig file. Throws ConfigError with remedy, file, line and key.
+RigFile read_rig_file(const std::filesystem::path& file);
+RigFile read_rig(const YamlMap& document);
+
+/// The calibration the counts of a reading follow. It is the file's, except for a simulated rig without
+/// quantisation: its encoders count 1024 times as finely, in 32 bits.
+Calibration calibration_in_use(const RigFile& rig);
+
+/// The rig file as text. Paths are written as they are in `rig` (absolute or relative to the current folder).
+std::string rig_text(const RigFile& rig);
+
+/// The baud rates that both libmodbus and the kernel know; libmodbus turns any other into 9600.
+bool baud_is_known(int baud);
+
+}  // namespace upright
