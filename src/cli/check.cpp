@@ -8,6 +8,7 @@
 
 #include "commands.hpp"
 #include "upright/control/gain_file.hpp"
+#include "upright/hal/rig_file.hpp"
 #include "upright/model/error.hpp"
 #include "upright/model/plant_file.hpp"
 
@@ -15,8 +16,9 @@ namespace upright::cli {
 
 namespace {
 
-/// A kind of file: the key at its top level that tells it, and its reader.
+/// A kind of file: its name, the key at its top level that tells it, and its reader.
 struct FileKind {
+  const char* name;
   const char* key;
   void (*read)(const std::filesystem::path& file);
 };
@@ -27,9 +29,15 @@ void check_gains(const std::filesystem::path& file) {
   if (config.compensation.kind == CompensationKind::predictor) read_plant_file(config.compensation.plant);
 }
 
+void check_rig(const std::filesystem::path& file) {
+  const RigFile rig = read_rig_file(file);
+  if (rig.simulated) read_plant_file(rig.simulated->plant);
+}
+
 constexpr std::array file_kinds = {
-    FileKind{"plant", [](const std::filesystem::path& file) { read_plant_file(file); }},
-    FileKind{"gains", check_gains},
+    FileKind{"plant", "plant", [](const std::filesystem::path& file) { read_plant_file(file); }},
+    FileKind{"gain", "gains", check_gains},
+    FileKind{"rig", "backend", check_rig},
 };
 
 struct Finding {
@@ -60,7 +68,7 @@ Finding check(const std::string& file) {
   Finding finding{file, "", ""};
   try {
     const FileKind& kind = kind_of(YamlMap::from_file(file));
-    finding.kind = kind.key;
+    finding.kind = kind.name;
     kind.read(file);
   } catch (const Error& error) {
     finding.error = error.what();

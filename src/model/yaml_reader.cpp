@@ -123,9 +123,8 @@ std::string Range::text() const {
   const bool low_finite = std::isfinite(low);
   const bool high_finite = std::isfinite(high);
   const auto brief = [](double v) {
-    std::ostringstream out;
-    out << v;
-    return out.str();
+    char buffer[32];
+    return std::string(buffer, std::to_chars(buffer, buffer + sizeof buffer, v).ptr);
   };
   if (low_finite && high_finite)
     return (low_open ? "above " : "from ") + brief(low) + (low_open ? " up to " : " to ") + brief(high);
@@ -184,8 +183,9 @@ struct YamlMap::Node {
     return node;
   }
 
-  double number(const YAML::Node& node, const std::string& key, const Range& range) const {
-    const std::string remedy = "give " + key + " a number " + range.text();
+  double number(const YAML::Node& node, const std::string& key, const Range& range,
+                const std::string& what = "a number ") const {
+    const std::string remedy = "give " + key + " " + what + range.text();
     if (!node.IsScalar()) fail(node, key, "is not a number", remedy);
     const std::optional<double> value = parse_number(node.Scalar());
     if (!value || node.Tag() == "!")
@@ -276,7 +276,7 @@ std::int64_t YamlMap::integer(const std::string& key, std::int64_t low, std::int
   const Range range = Range::within(static_cast<double>(low), static_cast<double>(high));
   const std::string what = "a whole number " + range.text();
   const YAML::Node node = node_->require(key, what);
-  const double value = node_->number(node, key, range);
+  const double value = node_->number(node, key, range, "a whole number ");
   if (value != std::floor(value))
     node_->fail(node, key, "is " + shown(node.Scalar()), "give " + key + " " + what);
   return static_cast<std::int64_t>(value);
@@ -310,7 +310,7 @@ std::string YamlMap::choice(const std::string& key, const std::vector<std::strin
   std::string list;
   for (const std::string& name : names) list += (list.empty() ? "" : ", ") + name;
   const YAML::Node node = node_->require(key, "one of " + list);
-  const std::string value = node.IsScalar() ? node.Scalar() : "";
+  std::string value = node.IsScalar() ? node.Scalar() : "";
   if (std::find(names.begin(), names.end(), value) != names.end()) return value;
   const std::string near = nearest_name(value, names);
   node_->fail(node, key, "is '" + shown(value) + "'",
@@ -351,13 +351,18 @@ std::vector<YamlMap> YamlMap::maps(const std::string& key) const {
 }
 
 bool YamlMap::is_scalar(const std::string& key) const {
-  return node_->find(key).IsScalar();
+  const YAML::Node node = node_->find(key);
+  return node.IsDefined() && node.IsScalar();
 }
+
 bool YamlMap::is_map(const std::string& key) const {
-  return node_->find(key).IsMap();
+  const YAML::Node node = node_->find(key);
+  return node.IsDefined() && node.IsMap();
 }
+
 bool YamlMap::is_list(const std::string& key) const {
-  return node_->find(key).IsSequence();
+  const YAML::Node node = node_->find(key);
+  return node.IsDefined() && node.IsSequence();
 }
 
 std::vector<std::string> YamlMap::keys() const {

@@ -230,10 +230,12 @@ std::string axes(const Plot& plot) {
   Extent x;
   Extent y;
   bool bars = false;
+  bool room_beside = false;  // bars have a width, and a curve that turns back should not run along the frame
   for (const Series& series : plot.series) {
     x.include(series.x, plot.x);
     y.include(series.y, plot.y);
     bars = bars || series.style == Series::Style::bars;
+    room_beside = room_beside || bars || !std::is_sorted(series.x.begin(), series.x.end());
   }
   for (const Band& band : plot.bands) {
     x.include(band.x, plot.x);
@@ -242,7 +244,7 @@ std::string axes(const Plot& plot) {
   }
   Axis y_axis = plot.y;
   if (bars && !y_axis.low && !y_axis.logarithmic) y_axis.low = 0.0;
-  return axis_settings("x", plot.x, x, bars ? 0.03 : 0.0) + axis_settings("y", y_axis, y, 0.06);
+  return axis_settings("x", plot.x, x, room_beside ? 0.03 : 0.0) + axis_settings("y", y_axis, y, 0.06);
 }
 
 std::string marks(const Plot& plot) {
@@ -271,7 +273,8 @@ std::string script_for(const Plot& plot) {
       "set terminal svg size " + std::to_string(plot.width_px) + "," + std::to_string(plot.height_px) +
       " noenhanced font 'sans-serif,12' background '#ffffff'\nset encoding utf8\nset border lc rgb "
       "'#555555'\n"
-      "set grid lc rgb '#dddddd' lt 1\nset tics nomirror\nset key above right horizontal\nset samples 2\nset tmargin 3\n";
+      "set grid lc rgb '#dddddd' lt 1\nset tics nomirror\nset key above right horizontal\nset samples 2\nset "
+      "tmargin 3\n";
   if (!plot.title.empty())
     settings += "set label " + quoted(plot.title) + " at graph 0, graph 1 left offset 0,0.9 font ',14'\n";
   settings += axes(plot);

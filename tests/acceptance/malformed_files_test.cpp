@@ -189,6 +189,130 @@ std::vector<Malformed> malformed_gains() {
   };
 }
 
+const std::string rig_head =
+    "calibration:\n"
+    "  cart: {m_per_count: 2.27485e-5, sign: 1, width_bits: 32, fastest_mps: 5.0}\n"
+    "  pendulum: {counts_per_revolution: 4096, sign: -1, width_bits: 24, fastest_radps: 60.0}\n"
+    "  zero: {at: counts, cart_counts: 0, pendulum_counts: 0, pose: upright}\n"
+    "amplifier: {limit_v: 15.0, sign: 1}\n"
+    "track: {limit_m: 0.4}\n"
+    "fall_angle_rad: 0.6\n"
+    "watchdog_s: 0.1\n";
+
+const std::string simulated_rig = "backend: simulated\n" + rig_head +
+                                  "simulated:\n"
+                                  "  plant: " UPRIGHT_SOURCE_DIR
+                                  "/config/plants/viscous.yaml\n"
+                                  "  initial: {cart_m: 0.0, theta_rad: 0.05}\n"
+                                  "  quantise: true\n"
+                                  "  noise: {cart_m: 0.0, theta_rad: 1e-5}\n"
+                                  "  timing_jitter_s: 0.0\n";
+
+const std::string modbus_rig =
+    "backend: modbus-tcp\n" + rig_head +
+    "modbus:\n"
+    "  host: 127.0.0.1\n"
+    "  port: 1502\n"
+    "  unit: 1\n"
+    "  response_timeout_s: 0.0008\n"
+    "  exchange: read_write\n"
+    "  counters: {table: holding, cart_address: 0, pendulum_address: 2, registers: 2, "
+    "word_order: high_first}\n"
+    "  boot_count_address: 4\n"
+    "  voltage: {address: 16, encoding: int16, counts_per_v: 1000.0}\n"
+    "  enable_address: 17\n"
+    "  device_watchdog: {address: 18, time_s: 0.12, seconds_per_count: 0.001}\n";
+
+const std::string serial_rig =
+    with(with(modbus_rig, "modbus-tcp", "modbus-rtu"), "  host: 127.0.0.1\n  port: 1502\n",
+         "  device: /dev/ttyUSB0\n  baud: 921600\n  parity: none\n  stop_bits: 1\n");
+
+std::vector<Malformed> malformed_rigs() {
+  const std::string& sim = simulated_rig;
+  const std::string& tcp = modbus_rig;
+  const std::string& rtu = serial_rig;
+  return {
+      {"backend_unknown", with(sim, "backend: simulated", "backend: usb"), 1, "backend", "one of"},
+      {"backend_misspelt", with(tcp, "modbus-tcp", "modbus-tpc"), 1, "backend", "did you mean modbus-tcp?"},
+      {"backend_key_misspelt", with(sim, "backend", "backand"), 1, "backand", "did you mean backend?"},
+      {"backend_pair_without_output", with(sim, "backend: simulated", "backend: {encoders: simulated}"), 1,
+       "output", "add output"},
+      {"backends_do_not_go_together",
+       with(tcp, "backend: modbus-tcp", "backend: {encoders: modbus-tcp, output: modbus-rtu}"), 1, "backend",
+       "one"},
+      {"calibration_missing", with(sim, "calibration:", "calibratoin:"), 1, "calibration", "add calibration"},
+      {"cart_scale_zero", with(sim, "2.27485e-5", "0"), 3, "m_per_count", "number"},
+      {"cart_scale_negative", with(sim, "2.27485e-5", "-2.27485e-5"), 3, "m_per_count", "number"},
+      {"cart_scale_nan", with(sim, "2.27485e-5", ".nan"), 3, "m_per_count", "number"},
+      {"cart_scale_missing", with(sim, "m_per_count: 2.27485e-5, ", ""), 3, "m_per_count", "add"},
+      {"cart_sign_zero", with(sim, "sign: 1, width_bits: 32", "sign: 0, width_bits: 32"), 3, "sign",
+       "1 or -1"},
+      {"cart_sign_word", with(sim, "sign: 1, width_bits: 32", "sign: plus, width_bits: 32"), 3, "sign",
+       "number"},
+      {"cart_sign_two", with(sim, "sign: 1, width_bits: 32", "sign: 2, width_bits: 32"), 3, "sign",
+       "from -1 to 1"},
+      {"counter_width_odd", with(sim, "width_bits: 24", "width_bits: 24.5"), 4, "width_bits", "whole number"},
+      {"counter_width_too_wide", with(sim, "width_bits: 24", "width_bits: 64"), 4, "width_bits", "to 32"},
+      {"revolution_negative", with(sim, "4096", "-4096"), 4, "counts_per_revolution", "number"},
+      {"zero_pose_unknown", with(sim, "pose: upright", "pose: lying"), 5, "pose", "hanging"},
+      {"zero_counts_missing", with(sim, "cart_counts: 0, ", ""), 5, "cart_counts", "add"},
+      {"zero_counts_too_large", with(sim, "pendulum_counts: 0", "pendulum_counts: 99999999"), 5,
+       "pendulum_counts", "whole number"},
+      {"amplifier_limit_zero", with(sim, "15.0", "0"), 6, "limit_v", "above 0"},
+      {"amplifier_limit_infinite", with(sim, "15.0", ".inf"), 6, "limit_v", "number"},
+      {"track_limit_negative", with(sim, "limit_m: 0.4", "limit_m: -0.4"), 7, "limit_m", "above 0"},
+      {"fall_angle_in_degrees", with(sim, "fall_angle_rad: 0.6", "fall_angle_rad: 30"), 8, "fall_angle_rad",
+       "number"},
+      {"fall_angle_unit", with(sim, "fall_angle_rad", "fall_angle_deg"), 1, "fall_angle_rad", "add"},
+      {"watchdog_zero", with(sim, "watchdog_s: 0.1", "watchdog_s: 0"), 9, "watchdog_s", "above 0"},
+      {"watchdog_missing", with(sim, "watchdog_s: 0.1\n", ""), 1, "watchdog_s", "add"},
+      {"simulated_section_missing", sim.substr(0, sim.find("simulated:\n")), 1, "simulated", "add simulated"},
+      {"simulated_without_plant",
+       with(sim, "  plant: " UPRIGHT_SOURCE_DIR "/config/plants/viscous.yaml\n", ""), 11, "plant",
+       "add plant"},
+      {"simulated_noise_negative", with(sim, "1e-5", "-1e-5"), 14, "theta_rad", "from 0"},
+      {"simulated_quantise_yes", with(sim, "quantise: true", "quantise: yes"), 13, "quantise",
+       "true or false"},
+      {"simulated_unknown_key", sim + "  speed: 2\n", 16, "speed", "remove it"},
+      {"modbus_section_missing", tcp.substr(0, tcp.find("modbus:\n")), 1, "modbus", "add modbus"},
+      {"host_missing", with(tcp, "  host: 127.0.0.1\n", ""), 11, "host", "add host"},
+      {"port_zero", with(tcp, "1502", "0"), 12, "port", "from 1 to 65535"},
+      {"port_too_high", with(tcp, "1502", "70000"), 12, "port", "from 1 to 65535"},
+      {"unit_too_high", with(tcp, "unit: 1\n", "unit: 300\n"), 13, "unit", "from 0"},
+      {"timeout_zero", with(tcp, "0.0008", "0"), 14, "response_timeout_s", "number"},
+      {"timeout_beyond_watchdog", with(tcp, "0.0008", "0.5"), 14, "response_timeout_s", "less"},
+      {"exchange_unknown", with(tcp, "exchange: read_write", "exchange: 0x17"), 15, "exchange", "read_write"},
+      {"exchange_of_input_registers", with(tcp, "table: holding", "table: input"), 15, "exchange",
+       "separate"},
+      {"table_unknown", with(tcp, "table: holding", "table: coils"), 16, "table", "holding"},
+      {"address_negative", with(tcp, "cart_address: 0", "cart_address: -1"), 16, "cart_address", "from 0"},
+      {"address_beyond_the_last", with(tcp, "pendulum_address: 2", "pendulum_address: 70000"), 16,
+       "pendulum_address", "to 65535"},
+      {"counter_ends_beyond_the_last", with(tcp, "pendulum_address: 2", "pendulum_address: 65535"), 16,
+       "counters", "lower"},
+      {"counters_overlap", with(tcp, "pendulum_address: 2", "pendulum_address: 1"), 16, "counters",
+       "own registers"},
+      {"counters_too_far_apart", with(tcp, "pendulum_address: 2", "pendulum_address: 2000"), 16, "counters",
+       "125"},
+      {"registers_too_few_for_width", with(tcp, "registers: 2, ", "registers: 1, "), 16, "registers", "2"},
+      {"word_order_unknown", with(tcp, "high_first", "little"), 16, "word_order", "low_first"},
+      {"voltage_encoding_unknown", with(tcp, "int16", "double"), 18, "encoding", "float32"},
+      {"voltage_scale_negative", with(tcp, "1000.0", "-1000.0"), 18, "counts_per_v", "number"},
+      {"voltage_does_not_fit", with(tcp, "1000.0", "5000.0"), 18, "counts_per_v", "at most"},
+      {"voltage_on_a_counter", with(tcp, "address: 16", "address: 2"), 18, "voltage", "own registers"},
+      {"device_watchdog_zero", with(tcp, "time_s: 0.12", "time_s: 0"), 20, "time_s", "above 0"},
+      {"device_watchdog_does_not_fit", with(tcp, "seconds_per_count: 0.001", "seconds_per_count: 1e-6"), 20,
+       "time_s", "65535"},
+      {"serial_without_device", with(rtu, "  device: /dev/ttyUSB0\n", ""), 11, "device", "add device"},
+      {"serial_with_host", rtu + "  host: 127.0.0.1\n", 23, "host", "remove it"},
+      {"baud_unknown", with(rtu, "921600", "920000"), 12, "baud", "standard rate"},
+      {"baud_is_text", with(rtu, "921600", "fast"), 12, "baud", "number"},
+      {"parity_unknown", with(rtu, "parity: none", "parity: N"), 13, "parity", "even"},
+      {"stop_bits_three", with(rtu, "stop_bits: 1", "stop_bits: 3"), 14, "stop_bits", "from 1 to 2"},
+      {"rig_second_document", sim + "---\nbackend: simulated\n", 16, "second", "keep one"},
+  };
+}
+
 class MalformedFile : public ::testing::TestWithParam<Malformed> {};
 
 TEST_P(MalformedFile, IsRefusedWithRemedyFileLineAndKey) {
@@ -214,9 +338,15 @@ INSTANTIATE_TEST_SUITE_P(Plant, MalformedFile, ::testing::ValuesIn(malformed_pla
 
 INSTANTIATE_TEST_SUITE_P(Gains, MalformedFile, ::testing::ValuesIn(malformed_gains()), name_of_test);
 
+INSTANTIATE_TEST_SUITE_P(Rig, MalformedFile, ::testing::ValuesIn(malformed_rigs()), name_of_test);
+
 TEST(WellFormedFile, IsAccepted) {
   const TemporaryFolder folder;
-  for (const auto& [name, text] : {std::pair{"plant.yaml", plant}, {"gains.yaml", gains}}) {
+  for (const auto& [name, text] : {std::pair{"plant.yaml", plant},
+                                   {"gains.yaml", gains},
+                                   {"sim.yaml", simulated_rig},
+                                   {"tcp.yaml", modbus_rig},
+                                   {"rtu.yaml", serial_rig}}) {
     const CommandResult result = run_upright("check " + folder.write(name, text).string());
     EXPECT_EQ(result.exit_code, 0) << result.err;
   }

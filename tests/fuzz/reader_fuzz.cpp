@@ -6,6 +6,7 @@
 #include <string>
 
 #include "upright/control/gain_file.hpp"
+#include "upright/hal/rig_file.hpp"
 #include "upright/model/error.hpp"
 #include "upright/model/plant_file.hpp"
 
@@ -23,6 +24,12 @@ void read_gains_twice(const YamlMap& document) {
   const std::string once = upright::gain_text(upright::read_gains(document));
   const YamlMap again = YamlMap::from_text(once, "again.yaml");
   if (upright::gain_text(upright::read_gains(again)) != once) std::abort();
+}
+
+void read_rig_twice(const YamlMap& document) {
+  const std::string once = upright::rig_text(upright::read_rig(document));
+  const YamlMap again = YamlMap::from_text(once, "again.yaml");
+  if (upright::rig_text(upright::read_rig(again)) != once) std::abort();
 }
 
 /// An Error is the reader's good right; every other exception, crash or sanitizer report is a find.
@@ -43,5 +50,6 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const std::string text(reinterpret_cast<const char*>(data), size);
   feed(text, read_plant_twice);
   feed(text, read_gains_twice);
+  feed(text, read_rig_twice);
   return 0;
 }

@@ -62,6 +62,12 @@ TEST(YamlReader, RefusesASecondDocumentAndTextInWhichYamlCppFindsDocumentsForEve
   EXPECT_THROW(YamlMap::from_text("a:\n   , - b'\n", "f.yaml"), ConfigError);
 }
 
+TEST(YamlReader, AMissingKeyIsNeitherAPlainValueNorAMapNorAList) {
+  const YamlMap map = YamlMap::from_text("a: 1\n", "f.yaml");
+  EXPECT_TRUE(map.is_scalar("a"));
+  EXPECT_FALSE(map.is_scalar("b") || map.is_map("b") || map.is_list("b"));
+}
+
 TEST(YamlReader, BracketsInCommentsAndTextsAreNotNesting) {
   const std::string many(1000, '[');
   const YamlMap map = YamlMap::from_text("a: \"" + many + "\"  # " + many + "\n", "f.yaml");
