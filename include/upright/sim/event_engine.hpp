@@ -47,13 +47,12 @@ class EventEngine {
     S remaining = duration_s;
     while (value_of(remaining) > 0.0 && !halted_) {
       const bool held = budget_.spent(time_s_);
+      slaved_ = bristles_follow(value_of(state_.motor_v));
       const S step = next_step(remaining);
       FirstRate rate;
-      const PlantState<S> next = rk4(dynamics_, state_, contacts_, step, held_motor(dynamics_, step), &rate);
+      const PlantState<S> next = rk4(dynamics_, state_, step, held_motor(dynamics_, step), &rate);
       const PlantState<double> plain_next = plain_state(next);
-      const auto along = [&](double t) {
-        return rk4(plain_, plain_state(state_), contacts_, t, held_motor(plain_, t));
-      };
+      const auto along = [&](double t) { return rk4(plain_, plain_state(state_), t, held_motor(plain_, t)); };
       const auto found = first_event(plain_next, rate, value_of(step), held, along);
       if (!found) {
         state_ = next;
@@ -82,7 +81,8 @@ class EventEngine {
     const double end_s = time_s_ + duration_s;
     while (!halted_ && end_s - time_s_ > smallest_step_s) {
       const bool held = budget_.spent(time_s_);
-      double rate = plain_.fastest_rate_radps(state_);
+      slaved_ = bristles_follow(lag ? state_.motor_v : plain_.actuate(command(time_s_, state_)));
+      double rate = motion_rate();
       if (lag) rate += 1.0 / dynamics_.motor_time_constant_s();
       const double step = even_step(end_s - time_s_, std::min(rate_step(rate), most_step_s));
       const auto along = [&](double t) { return driven_rk4(command, lag, t).end; };
@@ -134,6 +134,11 @@ class EventEngine {
  private:
   static constexpr double least_lag_s = 1e-6;
   static constexpr double smallest_step_s = 1e-13;
+  /// From this relaxation on sliding bristles are taken as following; the error in force is of the order of
+  /// (rate of the motion / relaxation)^2.
+  static constexpr double stiff_bristles_radps = 5e4;
+  static constexpr double followed_within = 1e-4;
+  static constexpr double most_rate_radps = 2e6;
 
   struct Found {
     Watch watch;
@@ -177,6 +182,37 @@ class EventEngine {
     budget_.count();
   }
 
+  /// Whether stiff bristles have come to follow the sliding cart, so that steps need not resolve them.
+  bool bristles_follow(double motor_v) {
+    if (!dynamics_.has_bristle_state()) return false;
+    const PlantState<double> s = plain_state(state_);
+    if (plain_.bristle_relaxation_radps(s) < stiff_bristles_radps) return false;
+    const PlantState<double> rate = plain_.slaved_bristle_derivative(s, motor_v, contacts_);
+    speed_change_radps_ = std::abs(rate.cart_mps / s.cart_mps);
+    return std::abs(s.bristle_m - rate.bristle_m) < followed_within * std::abs(rate.bristle_m);
+  }
+
+  /// Rate of the motion itself, capped so that no plant costs unbounded work.
+  double motion_rate() const {
+    double rate = plain_.fastest_rate_radps(plain_state(state_), slaved_);
+    if (slaved_) rate += speed_change_radps_;
+    return std::min(rate, most_rate_radps);
+  }
+
+  template <class T>
+  PlantState<T> motion(const Dynamics<T>& dynamics, const PlantState<T>& s, const T& motor_v) const {
+    if (!slaved_) return dynamics.derivative(s, motor_v, contacts_);
+    PlantState<T> rate = dynamics.slaved_bristle_derivative(s, motor_v, contacts_);
+    rate.bristle_m = T(0.0);
+    return rate;
+  }
+
+  /// Puts slaved bristles where they are at the end of a step.
+  template <class T>
+  void let_bristles_follow(const Dynamics<T>& dynamics, PlantState<T>& s, const T& motor_v) const {
+    if (slaved_) s.bristle_m = dynamics.slaved_bristle_derivative(s, motor_v, contacts_).bristle_m;
+  }
+
   double rate_step(double rate) const { return std::min(options_.max_step_s, options_.step_fraction / rate); }
 
   static S even_step(const S& remaining, double limit) {
@@ -185,7 +221,7 @@ class EventEngine {
   }
 
   S next_step(const S& remaining) const {
-    double rate = plain_.fastest_rate_radps(plain_state(state_));
+    double rate = motion_rate();
     if (dynamics_.has_motor_lag()) {
       const double gap_v = std::abs(value_of(drive_) - value_of(state_.motor_v));
       constexpr double settled_v = 1e-9;
@@ -236,16 +272,17 @@ class EventEngine {
   }
 
   template <class T>
-  static PlantState<T> rk4(const Dynamics<T>& dynamics, const PlantState<T>& s, Contacts contacts, const T& h,
-                           const HeldMotor<T>& motor, FirstRate* first = nullptr) {
+  PlantState<T> rk4(const Dynamics<T>& dynamics, const PlantState<T>& s, const T& h,
+                    const HeldMotor<T>& motor, FirstRate* first = nullptr) const {
     const T half = T(0.5) * h;
-    const PlantState<T> k1 = dynamics.derivative(s, motor.begin_v, contacts);
-    const PlantState<T> k2 = dynamics.derivative(shifted(s, k1, half), motor.middle_v, contacts);
-    const PlantState<T> k3 = dynamics.derivative(shifted(s, k2, half), motor.middle_v, contacts);
-    const PlantState<T> k4 = dynamics.derivative(shifted(s, k3, h), motor.end_v, contacts);
+    const PlantState<T> k1 = motion(dynamics, s, motor.begin_v);
+    const PlantState<T> k2 = motion(dynamics, shifted(s, k1, half), motor.middle_v);
+    const PlantState<T> k3 = motion(dynamics, shifted(s, k2, half), motor.middle_v);
+    const PlantState<T> k4 = motion(dynamics, shifted(s, k3, h), motor.end_v);
     if (first != nullptr) *first = {value_of(k1.cart_mps), value_of(k1.theta_radps)};
     PlantState<T> end = combined(s, k1, k2, k3, k4, h);
     end.motor_v = motor.end_v;
+    let_bristles_follow(dynamics, end, motor.end_v);
     return end;
   }
 
@@ -259,7 +296,7 @@ class EventEngine {
   PlantState<double> driven_rate(const Command& command, bool lag, double t,
                                  const PlantState<double>& s) const {
     const double drive = plain_.actuate(command(t, s));
-    PlantState<double> rate = plain_.derivative(s, lag ? s.motor_v : drive, contacts_);
+    PlantState<double> rate = motion(plain_, s, lag ? s.motor_v : drive);
     rate.motor_v = lag ? (drive - s.motor_v) / plain_.motor_time_constant_s() : 0.0;
     return rate;
   }
@@ -280,6 +317,7 @@ class EventEngine {
     DrivenStep step{k1, combined(s, k1, k2, k3, k4, h)};
     step.end.motor_v = lag ? s.motor_v + h / 6.0 * (k1.motor_v + 2.0 * (k2.motor_v + k3.motor_v) + k4.motor_v)
                            : plain_.actuate(command(time_s_ + h, step.end));
+    let_bristles_follow(plain_, step.end, step.end.motor_v);
     return step;
   }
 
@@ -347,14 +385,14 @@ class EventEngine {
   /// Moves to an event and through it. Returns the time it took, with its derivative.
   S pass(const Found& found, bool held) {
     S taken(found.after_s);
-    PlantState<S> at = rk4(dynamics_, state_, contacts_, taken, held_motor(dynamics_, taken));
+    PlantState<S> at = rk4(dynamics_, state_, taken, held_motor(dynamics_, taken));
     if constexpr (!std::is_same_v<S, double>) {
       // The root moves with the parameters: dt = -dg / (dg/dt).
       const S g = event_indicator(dynamics_, at, contacts_, found.watch, options_);
       const double slope = indicator_slope(found);
       constexpr double flattest = 1e-9;  // a grazing event has no derivative; keep it finite
       const S shift = (S(value_of(g)) - g) / S(std::max(slope, flattest));
-      at = shifted(at, dynamics_.derivative(at, at.motor_v, contacts_), shift);
+      at = shifted(at, motion(dynamics_, at, at.motor_v), shift);
       if (dynamics_.has_motor_lag())
         at.motor_v = at.motor_v + shift * (drive_ - at.motor_v) / dynamics_.motor_time_constant_s();
       taken = taken + shift;
@@ -380,7 +418,7 @@ class EventEngine {
   double indicator_slope(const Found& found) const {
     constexpr double aside_s = 1e-7;
     const auto g = [&](double t) {
-      const PlantState<double> s = rk4(plain_, plain_state(state_), contacts_, t, held_motor(plain_, t));
+      const PlantState<double> s = rk4(plain_, plain_state(state_), t, held_motor(plain_, t));
       return event_indicator(plain_, s, contacts_, found.watch, options_);
     };
     return (g(found.after_s + aside_s) - g(found.after_s)) / aside_s;
@@ -393,6 +431,8 @@ class EventEngine {
   PlantState<S> state_{};
   Contacts contacts_;
   S drive_{};
+  bool slaved_ = false;              ///< the bristles follow the cart during this step
+  double speed_change_radps_ = 0.0;  ///< |acceleration / velocity| while they do
   double time_s_ = 0.0;
   std::optional<EventKind> halted_;
   EventBudget budget_;

@@ -1,0 +1,241 @@
+// Each effect's own answer through the physics it enters, and a registry that is whole.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <map>
+#include <set>
+#include <string>
+
+#include "plants.hpp"
+#include "upright/model/dynamics.hpp"
+#include "upright/model/registry.hpp"
+
+namespace upright {
+namespace {
+
+using test::paper_plant;
+using Physics = Dynamics<double>;
+
+Physics with(const char* kind, std::initializer_list<double> values) {
+  Plant plant = paper_plant();
+  plant.set(kind, values);
+  return Physics(make_model<double>(plant));
+}
+
+/// Force on the cart beyond motor and back-EMF.
+double cart_force(const Physics& physics, double x, double v) {
+  PlantState<double> s;
+  s.cart_m = x;
+  s.cart_mps = v;
+  return physics.cart_smooth_force(s, 0.0) + 7.682 * v;
+}
+
+Outputs<double> shown(const Physics& physics) {
+  PlantState<double> s;
+  s.cart_m = 0.1;
+  s.theta_rad = 0.2;
+  return physics.measure(s);
+}
+
+const std::map<std::string, std::function<void()>>& answers() {
+  static const std::map<std::string, std::function<void()>> all = {
+      {"viscous_friction",
+       [] { EXPECT_NEAR(cart_force(with("viscous_friction", {3.0}), 0.0, -0.4), 1.2, 1e-12); }},
+      {"coulomb_friction",
+       [] {
+         const Physics p = with("coulomb_friction", {0.4});
+         EXPECT_DOUBLE_EQ(p.cart_dry_level(0.3, 0.5, 1.0), 0.4);
+         EXPECT_DOUBLE_EQ(p.cart_dry_level(-0.3, 0.0, -1.0), 0.4);
+         EXPECT_TRUE(p.cart_can_stick());
+       }},
+      {"friction_asymmetry",
+       [] {
+         Plant plant = paper_plant();
+         plant.set("coulomb_friction", {0.4});
+         plant.set("friction_asymmetry", {0.1});
+         const Physics p(make_model<double>(plant));
+         EXPECT_DOUBLE_EQ(p.cart_dry_level(0.0, 0.2, 1.0), 0.5);
+         EXPECT_DOUBLE_EQ(p.cart_dry_level(0.0, 0.2, -1.0), 0.4 - 0.1);
+       }},
+      {"viscous_asymmetry",
+       [] {
+         const Physics p = with("viscous_asymmetry", {0.5});
+         EXPECT_NEAR(cart_force(p, 0.0, 0.4), -0.2, 1e-12);
+         EXPECT_NEAR(cart_force(p, 0.0, -0.4), -0.2, 1e-12);
+       }},
+      {"stribeck_friction",
+       [] {
+         const Physics p = with("stribeck_friction", {0.5, 0.1, 2.0});
+         EXPECT_DOUBLE_EQ(p.cart_dry_level(0.0, 0.0, 1.0), 0.5);
+         EXPECT_NEAR(p.cart_dry_level(0.0, 0.1, 1.0), 0.5 * std::exp(-1.0), 1e-15);
+         EXPECT_NEAR(with("stribeck_friction", {0.5, 0.1, 0.7}).cart_dry_level(0.0, 0.05, 1.0),
+                     0.5 * std::exp(-std::pow(0.5, 0.7)), 1e-12);
+       }},
+      {"position_dependent_friction",
+       [] {
+         Plant plant = paper_plant();
+         plant.set("coulomb_friction", {0.4});
+         plant.set("position_dependent_friction", {0.5});
+         const Physics p(make_model<double>(plant));
+         EXPECT_DOUBLE_EQ(p.cart_dry_level(0.2, 0.1, -1.0), 0.5);
+         EXPECT_EQ(p.cart_dry_level(-1.0, 0.1, 1.0), 0.0);
+       }},
+      {"bristle_friction",
+       [] {
+         Plant plant = paper_plant();
+         plant.set("coulomb_friction", {0.4});
+         plant.set("bristle_friction", {121.0, 70.0});
+         const Physics p(make_model<double>(plant));
+         PlantState<double> s;
+         s.cart_mps = 0.2;
+         s.bristle_m = 0.001;
+         const double rate = 0.2 - 121.0 * 0.2 * 0.001 / 0.4;
+         EXPECT_DOUBLE_EQ(p.derivative(s, 0.0, {}).bristle_m, rate);
+         EXPECT_FALSE(p.cart_can_stick());
+         plant.pendulum.reset();
+         const Physics cart(make_model<double>(plant));
+         EXPECT_NEAR(cart.derivative(s, 0.0, {}).cart_mps,
+                     (-7.682 * 0.2 - 121.0 * 0.001 - 70.0 * rate) / 0.815, 1e-12);
+       }},
+      {"quadratic_drag",
+       [] { EXPECT_NEAR(cart_force(with("quadratic_drag", {2.0}), 0.0, -0.5), 0.5, 1e-12); }},
+      {"constant_force",
+       [] { EXPECT_NEAR(cart_force(with("constant_force", {0.3}), 0.0, 0.0), 0.3, 1e-12); }},
+      {"cable_spring",
+       [] {
+         EXPECT_NEAR(cart_force(with("cable_spring", {2.0, 0.1}), 0.4, 0.0), -2.0 * 0.3, 1e-12);
+       }},
+      {"cogging_force",
+       [] {
+         const Physics p = with("cogging_force", {0.3, 0.01, 0.0});
+         EXPECT_NEAR(cart_force(p, 0.0025, 0.0), 0.3, 1e-12);
+         EXPECT_NEAR(cart_force(p, 0.0075, 0.0), -0.3, 1e-12);
+       }},
+      {"voltage_saturation",
+       [] {
+         const Physics p = with("voltage_saturation", {10.0});
+         EXPECT_EQ(p.actuate(12.0), 10.0);
+         EXPECT_EQ(p.actuate(-12.0), -10.0);
+         EXPECT_EQ(p.actuate(3.0), 3.0);
+       }},
+      {"voltage_dead_zone",
+       [] {
+         const Physics p = with("voltage_dead_zone", {0.5});
+         EXPECT_EQ(p.actuate(0.4), 0.0);
+         EXPECT_EQ(p.actuate(2.0), 1.5);
+         EXPECT_EQ(p.actuate(-2.0), -1.5);
+       }},
+      {"voltage_gain", [] { EXPECT_DOUBLE_EQ(with("voltage_gain", {0.9}).actuate(2.0), 1.8); }},
+      {"voltage_offset", [] { EXPECT_DOUBLE_EQ(with("voltage_offset", {0.2}).actuate(0.0), 0.2); }},
+      {"input_delay", [] { EXPECT_EQ(with("input_delay", {0.004}).input_delay_s(), 0.004); }},
+      {"motor_lag", [] { EXPECT_EQ(with("motor_lag", {0.01}).motor_time_constant_s(), 0.01); }},
+      {"pivot_viscous_friction",
+       [] { EXPECT_DOUBLE_EQ(with("pivot_viscous_friction", {0.002}).pivot_smooth_torque(-3.0), 0.006); }},
+      {"pivot_coulomb_friction",
+       [] {
+         EXPECT_EQ(with("pivot_coulomb_friction", {0.003}).pivot_dry_level(), 0.003);
+         EXPECT_TRUE(with("pivot_coulomb_friction", {0.003}).pivot_can_stick());
+       }},
+      {"pivot_quadratic_drag",
+       [] { EXPECT_DOUBLE_EQ(with("pivot_quadratic_drag", {0.001}).pivot_smooth_torque(-3.0), 0.009); }},
+      {"angle_offset",
+       [] {
+         EXPECT_DOUBLE_EQ(shown(with("angle_offset", {0.01})).theta_rad, 0.21);
+         Plant plant = paper_plant();  // the scale comes first: measured = scale x true + offset
+         plant.set("angle_offset", {0.01});
+         plant.set("angle_scale", {2.0});
+         EXPECT_DOUBLE_EQ(shown(Physics(make_model<double>(plant))).theta_rad, 0.41);
+       }},
+      {"cart_scale", [] { EXPECT_DOUBLE_EQ(shown(with("cart_scale", {1.02})).cart_m, 0.102); }},
+      {"angle_scale", [] { EXPECT_DOUBLE_EQ(shown(with("angle_scale", {0.98})).theta_rad, 0.196); }},
+      {"cart_mass", [] { EXPECT_DOUBLE_EQ(with("cart_mass", {1.1}).base().cart_mass_kg, 1.1 * 0.815); }},
+      {"pendulum_mass",
+       [] {
+         const Physics p = with("pendulum_mass", {1.1});
+         EXPECT_DOUBLE_EQ(p.base().pendulum_mass_kg, 1.1 * 0.21);
+         EXPECT_DOUBLE_EQ(p.base().inertia_about_pivot_kgm2,
+                          1.1 * paper_plant().pendulum->inertia_about_pivot_kgm2());
+       }},
+      {"pendulum_length",
+       [] {
+         const Physics p = with("pendulum_length", {1.1});
+         EXPECT_DOUBLE_EQ(p.base().length_to_com_m, 1.1 * 0.305);
+         EXPECT_NEAR(p.base().inertia_about_pivot_kgm2,
+                     1.21 * paper_plant().pendulum->inertia_about_pivot_kgm2(), 1e-15);
+       }},
+      {"back_emf", [] { EXPECT_DOUBLE_EQ(with("back_emf", {0.9}).base().back_emf_n_per_mps, 0.9 * 7.682); }},
+  };
+  return all;
+}
+
+class Effect : public testing::TestWithParam<std::size_t> {};
+
+TEST_P(Effect, GivesItsKnownAnswer) {
+  const std::string kind(effect_registry()[GetParam()].kind);
+  ASSERT_TRUE(answers().contains(kind)) << "no known answer for " << kind;
+  answers().at(kind)();
+}
+
+/// At its neutral values an effect changes nothing.
+TEST_P(Effect, IsNotThereAtItsNeutralValue) {
+  const EffectInfo& info = effect_registry()[GetParam()];
+  if (!std::isfinite(info.parameters[0].neutral) || info.kind == "motor_lag") return;
+  Plant plant = paper_plant();
+  std::array<double, most_effect_parameters> values{};
+  for (std::size_t i = 0; i < info.parameters.size(); ++i)
+    values[i] =
+        std::isfinite(info.parameters[i].neutral) ? info.parameters[i].neutral : info.parameters[i].typical;
+  plant.set(GetParam(), std::span<const double>(values.data(), info.parameters.size()));
+  const Physics bare(make_model<double>(paper_plant())), same(make_model<double>(plant));
+  PlantState<double> s{0.1, 0.2, 0.3, -0.4, 0.0, 0.0};
+  const auto a = bare.derivative(s, bare.actuate(2.0), {Contact::slip_forward, Contact::slip_backward});
+  const auto b = same.derivative(s, same.actuate(2.0), {Contact::slip_forward, Contact::slip_backward});
+  EXPECT_DOUBLE_EQ(a.cart_mps, b.cart_mps);
+  EXPECT_DOUBLE_EQ(a.theta_radps, b.theta_radps);
+  EXPECT_DOUBLE_EQ(bare.measure(s).theta_rad, same.measure(s).theta_rad);
+  EXPECT_DOUBLE_EQ(bare.measure(s).cart_m, same.measure(s).cart_m);
+  EXPECT_EQ(same.input_delay_s(), 0.0);
+}
+
+INSTANTIATE_TEST_SUITE_P(All, Effect, testing::Range(std::size_t{0}, effect_count), [](const auto& effect) {
+  return std::string(effect_registry()[effect.param].kind);
+});
+
+TEST(Registry, IsWhole) {
+  EXPECT_EQ(effect_count, 27u);
+  std::set<std::string_view> kinds;
+  std::size_t offset = 0;
+  for (std::size_t i = 0; i < effect_count; ++i) {
+    const EffectInfo& info = effect_registry()[i];
+    EXPECT_TRUE(kinds.insert(info.kind).second) << info.kind;
+    EXPECT_EQ(effect_number(info.kind), i);
+    EXPECT_EQ(effect_parameter_offset(i), offset);
+    offset += info.parameters.size();
+    EXPECT_FALSE(info.equation.empty() || info.meaning.empty()) << info.kind;
+    ASSERT_FALSE(info.parameters.empty()) << info.kind;
+    ASSERT_LE(info.parameters.size(), most_effect_parameters) << info.kind;
+    for (const ParameterInfo& parameter : info.parameters) {
+      EXPECT_FALSE(parameter.name.empty() || parameter.unit.empty() || parameter.meaning.empty())
+          << info.kind;
+      EXPECT_TRUE(parameter.range.contains(parameter.typical)) << info.kind << " " << parameter.name;
+    }
+  }
+  EXPECT_EQ(offset, all_parameter_count);
+  EXPECT_EQ(effect_number("no_such_effect"), effect_count);
+}
+
+TEST(Actuator, StagesComeInTheInterfacesOrder) {
+  Plant plant = paper_plant();
+  plant.set("voltage_saturation", {5.0});
+  plant.set("voltage_offset", {0.3});
+  plant.set("voltage_gain", {2.0});
+  plant.set("voltage_dead_zone", {0.5});
+  const Physics p(make_model<double>(plant));
+  EXPECT_DOUBLE_EQ(p.actuate(1.5), 2.0 * (1.5 - 0.5) + 0.3);
+  EXPECT_DOUBLE_EQ(p.actuate(0.2), 0.3);
+  EXPECT_DOUBLE_EQ(p.actuate(9.0), 5.0);
+}
+
+}  // namespace
+}  // namespace upright
