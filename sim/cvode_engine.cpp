@@ -107,6 +107,7 @@ class CvodeEngine::Work {
     time_s_ = time_s;
     halted_.reset();
     event_count_ = 0;
+    step_count_ = 0;
     budget_.restart(time_s);
     if (dynamics_.cart_locked()) state_.cart_mps = 0.0;
     if (!dynamics_.has_motor_lag()) state_.motor_v = dynamics_.actuate(voltage_v);
@@ -134,6 +135,7 @@ class CvodeEngine::Work {
   double time_s() const { return time_s_; }
   std::optional<EventKind> halted() const { return halted_; }
   std::uint64_t event_count() const { return event_count_; }
+  std::uint64_t step_count() const { return step_count_; }
   const Event& event(std::uint64_t index) const { return events_[index % kept_events]; }
 
  private:
@@ -216,6 +218,7 @@ class CvodeEngine::Work {
     if (volts_ != nullptr) corners_.watch((*volts_)(time_s_, state_), watches_);
     restart(stretch_end_s, most_step_s);
     while (true) {
+      ++step_count_;
       const double from_s = time_s_;
       double to_s = from_s;
       const double toward_s = std::min(stretch_end_s, from_s + most_step_s);
@@ -328,6 +331,7 @@ class CvodeEngine::Work {
   std::optional<EventKind> halted_;
   EventBudget budget_;
   std::uint64_t event_count_ = 0;
+  std::uint64_t step_count_ = 0;
   std::array<Event, kept_events> events_{};
 };
 
@@ -367,6 +371,9 @@ std::optional<EventKind> CvodeEngine::halted() const {
 }
 std::uint64_t CvodeEngine::event_count() const {
   return work_->event_count();
+}
+std::uint64_t CvodeEngine::step_count() const {
+  return work_->step_count();
 }
 const Event& CvodeEngine::event(std::uint64_t index) const {
   return work_->event(index);

@@ -40,6 +40,7 @@ class CvodeEngine {
   std::uint64_t event_count() const;
   const Event& event(std::uint64_t index) const;
   static constexpr std::uint64_t kept_events = 256;
+  std::uint64_t step_count() const;
 
  private:
   class Work;

@@ -31,6 +31,7 @@ class EventEngine {
     time_s_ = time_s;
     halted_.reset();
     event_count_ = 0;
+    step_count_ = 0;
     budget_.restart(time_s);
     if (dynamics_.cart_locked()) state_.cart_mps = S(0.0);
     hold(voltage_v);
@@ -46,6 +47,7 @@ class EventEngine {
     halt_where_ended();
     S remaining = duration_s;
     while (value_of(remaining) > 0.0 && !halted_) {
+      ++step_count_;
       const bool held = budget_.spent(time_s_);
       slaved_ = bristles_follow(value_of(state_.motor_v));
       const S step = next_step(remaining);
@@ -80,6 +82,7 @@ class EventEngine {
     halt_where_ended();
     const double end_s = time_s_ + duration_s;
     while (!halted_ && end_s - time_s_ > smallest_step_s) {
+      ++step_count_;
       const bool held = budget_.spent(time_s_);
       slaved_ = bristles_follow(lag ? state_.motor_v : plain_.actuate(command(time_s_, state_)));
       double rate = motion_rate();
@@ -130,6 +133,8 @@ class EventEngine {
   std::uint64_t event_count() const { return event_count_; }
   const Event& event(std::uint64_t index) const { return events_[index % kept_events]; }
   static constexpr std::uint64_t kept_events = 256;
+  /// Steps taken since `start`, the measure of work.
+  std::uint64_t step_count() const { return step_count_; }
 
  private:
   static constexpr double least_lag_s = 1e-6;
@@ -151,10 +156,11 @@ class EventEngine {
     double theta_radps2 = 0.0;
   };
 
-  /// Voltage at the motor at the beginning, in the middle and at the end of a step under constant drive.
+  /// Voltage at the motor under constant drive, as a Runge-Kutta step samples it (beginning, middle, end),
+  /// and what it is after the step.
   template <class T>
   struct HeldMotor {
-    T begin_v, middle_v, end_v;
+    T begin_v, middle_v, end_v, after_v;
   };
 
   static PlantState<double> plain_state(const PlantState<S>& s) {
@@ -225,7 +231,7 @@ class EventEngine {
     if (dynamics_.has_motor_lag()) {
       const double gap_v = std::abs(value_of(drive_) - value_of(state_.motor_v));
       constexpr double settled_v = 1e-9;
-      if (gap_v > settled_v) rate += 1.0 / value_of(dynamics_.motor_time_constant_s());
+      if (gap_v > settled_v) rate += options_.step_fraction / value_of(dynamics_.motor_time_constant_s());
     }
     return even_step(remaining, rate_step(rate));
   }
@@ -265,10 +271,24 @@ class EventEngine {
       drive = value_of(drive_);
       motor_v = value_of(state_.motor_v);
     }
-    if (!dynamics.has_motor_lag()) return {motor_v, drive, drive};
+    if (!dynamics.has_motor_lag()) return {motor_v, drive, drive, drive};
     using std::exp;
-    const T decay = exp(-(T(0.5) * h) / dynamics.motor_time_constant_s());
-    return {motor_v, drive + (motor_v - drive) * decay, drive + (motor_v - drive) * decay * decay};
+    const T gap = motor_v - drive;
+    const T r = h / dynamics.motor_time_constant_s();
+    constexpr double smooth_within_step = 0.1;
+    if (value_of(r) < smooth_within_step) {
+      const T half = exp(T(-0.5) * r);
+      return {motor_v, drive + gap * half, drive + gap * half * half, drive + gap * half * half};
+    }
+    // The parabola with the same zeroth, first and second moment as exp(-r u), u in [0, 1]: the step then
+    // gets the whole impulse right, however short the lag.
+    const T e = exp(-r);
+    const T m0 = (T(1.0) - e) / r;
+    const T m1 = (m0 - e) / r;
+    const T m2 = (T(2.0) * m1 - e) / r;
+    return {drive + gap * (T(9.0) * m0 - T(36.0) * m1 + T(30.0) * m2),
+            drive + gap * (T(-1.5) * m0 + T(15.0) * m1 - T(15.0) * m2),
+            drive + gap * (T(3.0) * m0 - T(24.0) * m1 + T(30.0) * m2), drive + gap * e};
   }
 
   template <class T>
@@ -281,8 +301,8 @@ class EventEngine {
     const PlantState<T> k4 = motion(dynamics, shifted(s, k3, h), motor.end_v);
     if (first != nullptr) *first = {value_of(k1.cart_mps), value_of(k1.theta_radps)};
     PlantState<T> end = combined(s, k1, k2, k3, k4, h);
-    end.motor_v = motor.end_v;
-    let_bristles_follow(dynamics, end, motor.end_v);
+    end.motor_v = motor.after_v;
+    let_bristles_follow(dynamics, end, motor.after_v);
     return end;
   }
 
@@ -437,6 +457,7 @@ class EventEngine {
   std::optional<EventKind> halted_;
   EventBudget budget_;
   std::uint64_t event_count_ = 0;
+  std::uint64_t step_count_ = 0;
   std::array<Event, kept_events> events_{};
 };
 

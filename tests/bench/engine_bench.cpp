@@ -1,0 +1,70 @@
+// Speed of the engines: whole 10 s closed-loop runs for each friction and loop form, and the worst single
+// period of the real-time plant over a grid of starts and delays.
+#include <benchmark/benchmark.h>
+
+#include <chrono>
+
+#include "../property/engine_runs.hpp"
+#include "../unit/plants.hpp"
+#include "upright/sim/cvode_engine.hpp"
+
+namespace upright {
+namespace {
+
+using namespace test;
+
+constexpr const char* plants[] = {"viscous", "exponential", "dynamic"};
+
+template <class Engine>
+void ten_seconds(benchmark::State& state) {
+  const Plant plant = config_plant(plants[state.range(0)]);
+  const RunCase run{static_cast<LoopForm>(state.range(1)), state.range(1) == 0 ? 0.0 : 0.006, 0.05, 10.0};
+  std::uint64_t steps = 0;
+  for (auto _ : state) steps = record<Engine>(plant, run).steps;
+  state.counters["steps"] = static_cast<double>(steps);
+  state.SetLabel(std::string(plants[state.range(0)]) + (state.range(1) == 0   ? " open"
+                                                        : state.range(1) == 1 ? " sampled"
+                                                                              : " continuous"));
+}
+BENCHMARK(ten_seconds<EventEngine<double>>)
+    ->ArgsProduct({{0, 1, 2}, {0, 1, 2}})
+    ->Unit(benchmark::kMillisecond);
+BENCHMARK(ten_seconds<CvodeEngine>)->ArgsProduct({{0, 1, 2}, {0, 1, 2}})->Unit(benchmark::kMillisecond);
+
+/// Every period of 200 runs of 2 s, timed one by one.
+template <class Engine>
+void worst_period(benchmark::State& state) {
+  const Plant plant = config_plant(plants[state.range(0)]);
+  const PlantModel<double> model = make_model<double>(plant);
+  std::vector<double> times_us;
+  for (auto _ : state) {
+    times_us.clear();
+    for (int i = 0; i < 20; ++i)
+      for (int j = 0; j < 10; ++j) {
+        EngineOptions options;
+        options.fall_angle_rad = 1.0;
+        SampledLoop<Engine> loop(model, 1000.0, options);
+        LateFeedback law(0.12 * j / 9.0);
+        loop.start({0.0, (i % 2 == 0 ? 1.0 : -1.0) * 1.7e-4 * std::pow(1000.0, (i / 2) / 9.0), 0.0, 0.0});
+        for (int k = 0; k < state.range(1) && !loop.engine().halted(); ++k) {
+          const auto begin = std::chrono::steady_clock::now();
+          loop.step(law);
+          times_us.push_back(
+              std::chrono::duration<double, std::micro>(std::chrono::steady_clock::now() - begin).count());
+        }
+      }
+  }
+  std::sort(times_us.begin(), times_us.end());
+  const auto quantile = [&](double q) {
+    return times_us[static_cast<std::size_t>(q * static_cast<double>(times_us.size() - 1))];
+  };
+  state.counters["median_us"] = quantile(0.5);
+  state.counters["p99.9_us"] = quantile(0.999);
+  state.counters["worst_us"] = times_us.back();
+  state.SetLabel(plants[state.range(0)]);
+}
+BENCHMARK(worst_period<EventEngine<double>>)->ArgsProduct({{0, 1, 2}, {2000}})->Iterations(1);
+BENCHMARK(worst_period<CvodeEngine>)->ArgsProduct({{0, 1, 2}, {100}})->Iterations(1);
+
+}  // namespace
+}  // namespace upright
