@@ -91,6 +91,7 @@ int run(int argc, char** argv) {
   int exit_code = 0;
   upright::cli::add_effects(app, exit_code);
   upright::cli::add_check(app, exit_code);
+  upright::cli::add_sweep(app, exit_code);
   upright::cli::add_design(app, exit_code);
   try {
     app.parse(argc, argv);

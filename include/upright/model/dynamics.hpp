@@ -236,6 +236,27 @@ class Dynamics {
     return value_of(bristle_stiffness()) * std::abs(v) / std::max(level, smallest_level_n);
   }
 
+  /// As `derivative`, with the contact of the cart as a number, so that lanes may differ: -1 or 1 slides that way, 0
+  /// rests. For plants whose cart can stick and whose pivot cannot.
+  PlantState<S> derivative_by_direction(const PlantState<S>& state, const S& motor_v,
+                                        const S& direction) const {
+    PlantState<S> rate{};
+    const S level = cart_dry_level(state.cart_m, positive_part(S(direction * state.cart_mps)), direction);
+    const S force = cart_smooth_force(state, motor_v) - level * direction;
+    const S torque = model_.has_pendulum ? pivot_smooth_torque(state.theta_radps) : S(0.0);
+    accelerate(state, force, torque, false, !model_.has_pendulum, rate);
+    const auto rests = direction == S(0.0);
+    rate.cart_mps = select(rests, S(0.0), rate.cart_mps);
+    rate.cart_m = select(rests, S(0.0), state.cart_mps);
+    rate.theta_rad = state.theta_radps;
+    if (model_.has_pendulum) {
+      using std::sin;
+      const S turn = (gravity_torque_ * sin(state.theta_rad) + torque) / base_.inertia_about_pivot_kgm2;
+      rate.theta_radps = select(rests, turn, rate.theta_radps);
+    }
+    return rate;
+  }
+
   /// The force that dry friction would have to balance to hold a resting cart: motor, smooth forces and the
   /// pendulum's reaction together, with the pivot as it is.
   S cart_load(const PlantState<S>& state, const S& motor_v, Contact pivot) const {
@@ -366,9 +387,10 @@ class Dynamics {
       return;
     }
     const S off_diagonal = coupling_ * cos(state.theta_rad);
-    const S determinant = total_mass_ * base_.inertia_about_pivot_kgm2 - off_diagonal * off_diagonal;
-    rate.cart_mps = (base_.inertia_about_pivot_kgm2 * push - off_diagonal * turn) / determinant;
-    rate.theta_radps = (total_mass_ * turn - off_diagonal * push) / determinant;
+    const S inverse_determinant =
+        S(1.0) / (total_mass_ * base_.inertia_about_pivot_kgm2 - off_diagonal * off_diagonal);
+    rate.cart_mps = (base_.inertia_about_pivot_kgm2 * push - off_diagonal * turn) * inverse_determinant;
+    rate.theta_radps = (total_mass_ * turn - off_diagonal * push) * inverse_determinant;
   }
 
   template <bool Stiffness>

@@ -3,8 +3,10 @@
 #pragma once
 
 #include <cmath>
+#include <type_traits>
 
 #include "upright/model/effect.hpp"
+#include "upright/model/scalar.hpp"
 
 namespace upright::effects {
 
@@ -37,14 +39,14 @@ struct StribeckFriction {
   static S decay(const S& u, const S& shape) {
     using std::exp;
     using std::log;
-    constexpr double smallest = 1e-12;  // keeps log finite at rest, where the excess is whole anyway
-    return exp(-exp(shape * log(u + S(smallest))));
-  }
-
-  static double decay(double u, double shape) {
-    if (shape == 2.0) return std::exp(-u * u);
-    if (shape == 1.0) return std::exp(-u);
-    return std::exp(-std::pow(u, shape));
+    if (is_plainly(shape, 2.0)) return exp(-(u * u));
+    if (is_plainly(shape, 1.0)) return exp(-u);
+    if constexpr (std::is_same_v<S, double>) {
+      return std::exp(-std::pow(u, shape));
+    } else {
+      constexpr double smallest = 1e-12;  // keeps log finite at rest, where the excess is whole anyway
+      return exp(-exp(shape * log(u + S(smallest))));
+    }
   }
 };
 

@@ -1,0 +1,21 @@
+// Sixteen closed-loop runs at once on SIMD lanes: the engine of sweeps.
+#pragma once
+
+#include <span>
+
+#include "upright/sim/lane_count.hpp"
+#include "upright/sim/loop_run.hpp"
+
+namespace upright {
+
+/// Whether `run_on_lanes` can do these runs. What it leaves to the event engine: continuous loops with true
+/// stick-slip, delay compensation, input delay, motor lag, dry friction of the pivot, a cart alone.
+bool lanes_can_run(const LoopSetup& setup);
+
+/// At most `lane_count` runs side by side. Sampled loops by RK4 with extra substeps where the friction turns;
+/// with true stick-slip a lane in which the cart stops or breaks away is taken through that period by the
+/// event engine. A run that fell costs nothing more once all of them did.
+/// A result depends on the runs that share its lanes in the last digits, so callers keep groups fixed.
+void run_on_lanes(const LoopSetup& setup, std::span<const LoopCase> cases, std::span<LoopResult> results);
+
+}  // namespace upright

@@ -1,0 +1,167 @@
+// `upright sweep`: outcomes over starting angle and delay, and the delays at which they change.
+#include "upright/analysis/sweep.hpp"
+
+#include <unistd.h>
+
+#include <array>
+#include <atomic>
+#include <chrono>
+#include <csignal>
+#include <cstdio>
+#include <iostream>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "commands.hpp"
+#include "upright/model/error.hpp"
+
+namespace upright::cli {
+
+namespace {
+
+std::atomic<bool> stop_asked{false};
+static_assert(std::atomic<bool>::is_always_lock_free);
+
+extern "C" void ask_to_stop(int) {
+  stop_asked = true;
+}
+
+/// SIGINT and SIGTERM ask the sweep to stop while one of these lives.
+class StopOnSignal {
+ public:
+  StopOnSignal()
+      : interrupt_(std::signal(SIGINT, ask_to_stop)), terminate_(std::signal(SIGTERM, ask_to_stop)) {}
+  ~StopOnSignal() {
+    std::signal(SIGINT, interrupt_);
+    std::signal(SIGTERM, terminate_);
+  }
+  StopOnSignal(const StopOnSignal&) = delete;
+  StopOnSignal& operator=(const StopOnSignal&) = delete;
+
+ private:
+  void (*interrupt_)(int);
+  void (*terminate_)(int);
+};
+
+/// A line on the terminal with the time left; nothing where stderr is not one.
+class ProgressBar {
+ public:
+  ProgressBar() : shown_(isatty(STDERR_FILENO) != 0) {}
+  ~ProgressBar() {
+    if (drawn_) std::fputs("\n", stderr);
+  }
+  ProgressBar(const ProgressBar&) = delete;
+  ProgressBar& operator=(const ProgressBar&) = delete;
+
+  void show(std::size_t done, std::size_t known) {
+    if (!shown_) return;
+    const auto now = std::chrono::steady_clock::now();
+    if (drawn_ && done < known && now - drawn_at_ < std::chrono::milliseconds(100)) return;
+    const double spent_s = std::chrono::duration<double>(now - begin_).count();
+    const double part = static_cast<double>(done) / static_cast<double>(known);
+    const double left_s = spent_s * static_cast<double>(known - done) / static_cast<double>(done);
+    constexpr int width = 30;
+    const std::string bar(static_cast<std::size_t>(width * part), '#');
+    std::fprintf(stderr, "\r[%-*s] %zu of %zu runs, %.0f s left   ", width, bar.c_str(), done, known, left_s);
+    std::fflush(stderr);
+    drawn_ = true;
+    drawn_at_ = now;
+  }
+
+ private:
+  bool shown_, drawn_ = false;
+  std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now(), drawn_at_{};
+};
+
+struct SweepArguments {
+  std::string file, out;
+  unsigned threads = 0;
+  bool overwrite = false, transitions_only = false, as_json = false;
+};
+
+using Json = nlohmann::ordered_json;
+
+Json number_or_null(double value) {
+  return value == value ? Json(value) : Json(nullptr);
+}
+
+Json json_of(const SweepConfig& config, const SweepResult& result, const std::string& folder) {
+  std::array<std::size_t, 3> counts{};
+  for (const SweepRun& run : result.runs)
+    ++counts[static_cast<std::size_t>(run.outcome(config.stable_below_rad))];
+  Json transitions = Json::array();
+  for (const Transition& t : result.transitions)
+    transitions.push_back({{"theta0_rad", t.theta0_rad},
+                           {"oscillates_from_s", number_or_null(t.oscillates_from_s)},
+                           {"falls_from_s", number_or_null(t.falls_from_s)}});
+  return {{"folder", folder},           {"finished", !result.interrupted},
+          {"runs", result.runs.size()}, {"runs_made", result.runs_made},
+          {"stable", counts[0]},        {"oscillating", counts[1]},
+          {"fell", counts[2]},          {"transitions", transitions}};
+}
+
+std::string milliseconds(double value_s) {
+  if (value_s != value_s) return "     -";
+  std::array<char, 32> text;
+  std::snprintf(text.data(), text.size(), "%6.1f", 1e3 * value_s);
+  return text.data();
+}
+
+void print(const SweepResult& result, const std::string& folder) {
+  std::printf("theta0 [deg]   oscillates from [ms]   falls from [ms]\n");
+  for (const Transition& t : result.transitions)
+    std::printf("%12.4f   %20s   %15s\n", t.theta0_rad * 57.29577951308232,
+                milliseconds(t.oscillates_from_s).c_str(), milliseconds(t.falls_from_s).c_str());
+  std::printf("%zu runs made, results in %s\n", result.runs_made, folder.c_str());
+  std::fflush(stdout);
+}
+
+int run(const SweepArguments& arguments) {
+  const SweepConfig config = read_sweep_file(arguments.file);
+  const std::string folder = !arguments.out.empty()
+                                 ? arguments.out
+                                 : "runs/sweep-" + std::filesystem::path(arguments.file).stem().string();
+  stop_asked = false;
+  SweepOptions options;
+  options.overwrite = arguments.overwrite;
+  options.transitions_only = arguments.transitions_only;
+  options.stop = &stop_asked;
+  const std::unique_ptr<SweepTeam> team = make_thread_team(config, arguments.threads);
+  SweepResult result;
+  {
+    const StopOnSignal on_signal;
+    ProgressBar bar;
+    options.progress = [&bar](std::size_t done, std::size_t known) { bar.show(done, known); };
+    result = run_sweep(config, folder, options, *team);
+  }
+  if (arguments.as_json)
+    std::cout << json_of(config, result, folder).dump(2) << "\n";
+  else if (!result.interrupted)
+    print(result, folder);
+  if (!result.interrupted) return static_cast<int>(ExitCode::done);
+  throw Error(ExitCode::stopped,
+              "give the same command again, it goes on from there: the sweep was stopped after " +
+                  std::to_string(result.runs_made) + " runs, kept in " + folder);
+}
+
+}  // namespace
+
+void add_sweep(CLI::App& app, int& exit_code) {
+  CLI::App* command = app.add_subcommand("sweep", "Outcomes over starting angle and delay");
+  command->footer(
+      "Example:  upright sweep config/sweeps/exponential.yaml --out runs/map && upright report runs/map\n"
+      "Stopped with Ctrl-C it keeps what is done; the same command goes on from there.");
+  const auto arguments = std::make_shared<SweepArguments>();
+  command->add_option("sweep", arguments->file, "Sweep file")->required();
+  command->add_option("--out", arguments->out, "Folder for the results; runs/sweep-NAME when not given");
+  command->add_option("--threads", arguments->threads, "Threads; one per processor when not given")
+      ->check(CLI::Range(1u, 1024u));
+  command->add_flag("--transitions-only", arguments->transitions_only,
+                    "Search the delays at which the outcome changes, without the whole grid");
+  command->add_flag("--overwrite", arguments->overwrite, "Replace the results that are in the folder");
+  command->add_flag("--json", arguments->as_json, "One JSON document");
+  command->callback([arguments, &exit_code] { exit_code = run(*arguments); });
+}
+
+}  // namespace upright::cli
