@@ -236,8 +236,8 @@ class Dynamics {
     return value_of(bristle_stiffness()) * std::abs(v) / std::max(level, smallest_level_n);
   }
 
-  /// As `derivative`, with the contact of the cart as a number, so that lanes may differ: -1 or 1 slides that way, 0
-  /// rests. For plants whose cart can stick and whose pivot cannot.
+  /// As `derivative`, with the contact of the cart as a number, so that lanes may differ: -1 or 1 slides that
+  /// way, 0 rests. For plants whose cart can stick and whose pivot cannot.
   PlantState<S> derivative_by_direction(const PlantState<S>& state, const S& motor_v,
                                         const S& direction) const {
     PlantState<S> rate{};
