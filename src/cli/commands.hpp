@@ -9,6 +9,7 @@ namespace upright::cli {
 
 void add_check(CLI::App& app, int& exit_code);
 void add_design(CLI::App& app, int& exit_code);
+void add_diagnose(CLI::App& app, int& exit_code);
 void add_effects(CLI::App& app, int& exit_code);
 void add_sweep(CLI::App& app, int& exit_code);
 

@@ -40,6 +40,8 @@ struct EngineOptions {
   double step_fraction = 0.2;
   /// Relative tolerance of the reference engine.
   double relative_tolerance = 1e-10;
+  /// How exactly the Runge-Kutta engine finds the time of an event.
+  double event_tolerance_s = 1e-14;
   std::optional<double> fall_angle_rad;  ///< the run halts where |theta| reaches it
   std::optional<double> track_limit_m;   ///< the run halts where |x| reaches it
 };
@@ -222,13 +224,13 @@ inline std::optional<EventKind> ended_at(double theta_rad, double cart_m, bool h
 /// negative (the last event was this one) it looks inside for a time at which the motion has left it; 0 where
 /// it never does. At most about 120 evaluations.
 template <class F>
-double turning_positive(F&& f, double f_low, double f_high, double h) {
+double turning_positive(F&& f, double f_low, double f_high, double h, double tolerance_s = 1e-14) {
   constexpr int most_iterations = 60;
-  constexpr double tolerance_s = 1e-14;
+  constexpr double nearest_s = 1e-14;
   double low = 0.0, high = h;
   if (!(f_low < 0.0)) {
     double inside = h;
-    for (int i = 0; i < most_iterations && inside > tolerance_s; ++i) {
+    for (int i = 0; i < most_iterations && inside > nearest_s; ++i) {
       inside *= 0.5;
       const double f_inside = f(inside);
       if (f_inside < 0.0) {

@@ -123,9 +123,18 @@ class EventEngine {
 
   const PlantState<S>& state() const { return state_; }
   Outputs<S> outputs() const { return dynamics_.measure(state_); }
+  /// Replaces the state at the present time: its derivatives, for callers that chain sensitivities
+  /// themselves, or its values too, for observers that correct it. A contact goes on resting as long as its
+  /// velocity stays zero.
+  void correct(const PlantState<S>& state) {
+    state_ = state;
+    if (value_of(state.cart_mps) != 0.0) contacts_.cart = direction_of(value_of(state.cart_mps));
+    if (value_of(state.theta_radps) != 0.0) contacts_.pivot = direction_of(value_of(state.theta_radps));
+  }
   Contacts contacts() const { return contacts_; }
   double time_s() const { return time_s_; }
   bool cart_at_rest() const { return dynamics_.cart_can_stick() && contacts_.cart == Contact::stick; }
+  bool pivot_at_rest() const { return dynamics_.pivot_can_stick() && contacts_.pivot == Contact::stick; }
   /// Why the run halted: fall or track_end.
   std::optional<EventKind> halted() const { return halted_; }
 
@@ -377,7 +386,7 @@ class EventEngine {
     const auto consider = [&](const Watch& watch, double within_s, double at_end) {
       const auto f = [&](double t) { return event_indicator(plain_, along(t), contacts_, watch, options_); };
       const double now = event_indicator(plain_, plain_state(state_), contacts_, watch, options_);
-      const double after = turning_positive(f, now, at_end, within_s);
+      const double after = turning_positive(f, now, at_end, within_s, options_.event_tolerance_s);
       if (!first || after < first->after_s) first = Found{watch, after};
     };
     for (const Watch& watch : list) {

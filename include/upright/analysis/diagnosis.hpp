@@ -1,0 +1,87 @@
+// Where a plant file and measured runs disagree, which effect is missing, and how much smaller the gap is
+// with it.
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "upright/analysis/fit.hpp"
+
+namespace upright {
+
+enum class Verdict { explained, no_discrepancy, unexplained, not_excited };
+std::string_view name_of(Verdict verdict);
+
+struct ParameterEstimate {
+  std::string name;
+  std::string unit;
+  double value = 0.0;
+  double low = 0.0, high = 0.0;  ///< 95 percent interval
+};
+
+/// An effect the data ask for.
+struct FoundEffect {
+  std::size_t effect = 0;
+  double gap_before = 0.0, gap_after = 0.0;
+  std::vector<ParameterEstimate> parameters;
+  std::vector<std::size_t> confusable_with;
+  std::string where;
+};
+
+struct CandidateScore {
+  std::size_t effect = 0;
+  double gap_after = 0.0;
+  double evidence = 0.0;  ///< fall of minus twice the log likelihood, training runs
+};
+
+/// Residual force and torque along a run, smoothed, with what they are seen against. For the report.
+struct ResidualTrace {
+  std::size_t run = 0;
+  std::vector<double> time_s, force_n, torque_nm, cart_m, cart_mps, voltage_v;
+};
+
+struct StructureTest {
+  bool structured = false;
+  std::string description;  ///< a sentence: what the remaining residual looks like
+};
+
+struct NextExperiment {
+  std::string name;
+  std::string description;
+  double distance = 0.0;  ///< smallest separation of the surviving explanations [noise standard deviations]
+};
+
+/// One simulated held-out segment beside its measurement, for the report.
+struct Comparison {
+  std::size_t run = 0;
+  std::vector<double> time_s, measured_cart_m, before_cart_m, after_cart_m, measured_theta_rad,
+      before_theta_rad, after_theta_rad;
+};
+
+struct Diagnosis {
+  Verdict verdict = Verdict::no_discrepancy;
+  double gap_before = 0.0, gap_after = 0.0;
+  std::vector<FoundEffect> effects;        ///< in the order found
+  std::vector<CandidateScore> candidates;  ///< of the first round, best first
+  std::optional<NextExperiment> next_experiment;
+  Plant model;  ///< the plant with the effects added
+  Noise noise;
+  std::vector<std::string> notes;  ///< how the data were read and split
+  std::string residual;            ///< what the remaining residual looks like
+  std::vector<std::size_t> held_out_runs;
+  std::vector<ResidualTrace> residual_before, residual_after;
+  std::vector<Comparison> comparisons;
+};
+
+struct DiagnosisOptions {
+  /// Told from time to time how far the work is (0 to 1) and what it does.
+  std::function<void(double, const std::string&)> progress;
+};
+
+/// Diagnoses. Throws ConfigError when the plant cannot be simulated or shares nothing with the runs.
+Diagnosis diagnose(const Plant& plant, const std::vector<Measurement>& runs,
+                   const DiagnosisOptions& options = {});
+
+}  // namespace upright

@@ -1,0 +1,110 @@
+// Multiple-shooting fit of a plant to measured runs.
+//
+// Every run is cut into segments. Each is followed from its own initial state with the recorded voltages by
+// an extended Kalman filter through the event engine, whose noise is the encoders' quantisation, timing
+// jitter, and a white force and torque that stand for what no model explains; without force and torque it is
+// a plain simulation. The sum of squared innovations and log variances is minus twice the log likelihood.
+// Parameters and initial states follow by Gauss-Newton with exact derivatives (dual numbers through the event
+// engine); the initial states are eliminated (Schur complement), and the noise is estimated by maximum
+// likelihood in turn.
+#pragma once
+
+#include <Eigen/Dense>
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include "upright/analysis/measurement.hpp"
+#include "upright/model/dynamics.hpp"
+#include "upright/model/plant.hpp"
+
+namespace upright {
+
+/// A parameter of an effect that the fit may move, and what is believed of it beforehand.
+struct FreeParameter {
+  std::size_t effect = 0;
+  std::size_t index = 0;
+  double low = 0.0;
+  double high = 0.0;
+  double scale = 1.0;  ///< its order of magnitude
+  double prior_mean = 0.0;
+  double prior_sigma = 0.0;  ///< 0: nothing is believed
+};
+
+/// Intensities of the noise; quantisation comes with each measurement.
+struct Noise {
+  double force = 0.0;     ///< white force on the cart [N sqrt(s)]
+  double torque = 0.0;    ///< white torque on the pendulum [N m sqrt(s)]
+  double jitter_s = 0.0;  ///< standard deviation of the time at which encoders are read
+};
+
+/// Samples first..last (inclusive) of a run, simulated from one initial state.
+struct Segment {
+  std::size_t run = 0;
+  std::size_t first = 0;
+  std::size_t last = 0;
+};
+
+/// Cuts runs into segments: at gaps in the record, and so short that a small error does not grow out of
+/// proportion where the pendulum stands upright.
+std::vector<Segment> cut_segments(const std::vector<Measurement>& runs, double longest_s = 2.0);
+
+/// A state at the start of each segment, from the data alone.
+std::vector<PlantState<double>> guess_starts(const std::vector<Measurement>& runs,
+                                             const std::vector<Segment>& segments, const Plant& plant);
+
+/// One sample of a followed segment, linearised along the filtered trajectory. State order: x, theta, v,
+/// omega, bristle.
+struct LinearStep {
+  static constexpr int states = 5;
+  double transition[states][states];  ///< from the sample before, after its update; identity at the first
+  double by_force[2], by_torque[2];   ///< accelerations of cart and pendulum per unit force and torque
+  double residual[2];                 ///< measured minus predicted from the samples before: cart, pendulum
+  double update[2][states];           ///< Kalman gain of each channel, taken in turn
+  double variance[2];                 ///< of each innovation
+  double gain[2];                     ///< d output / d state of the sensors
+  double rate[2];                     ///< velocities, for jitter
+  double period_s;
+};
+
+/// What a fit works on.
+struct FitData {
+  const std::vector<Measurement>* runs = nullptr;
+  std::vector<Segment> segments;
+};
+
+struct FitPoint {
+  Plant plant;
+  std::vector<PlantState<double>> starts;  ///< one per segment
+  Noise noise;
+};
+
+struct FitResult {
+  FitPoint point;
+  double objective = 0.0;                    ///< minus twice the log of likelihood and priors
+  std::vector<double> segment_objective;     ///< the likelihood part, by segment
+  std::vector<double> segment_chi_square;    ///< sum of squared whitened residuals, by segment
+  std::vector<std::size_t> segment_samples;  ///< how many numbers that sums
+  Eigen::MatrixXd covariance;                ///< of the free parameters, robust to noise that is not white
+  Eigen::MatrixXd information;               ///< of the free parameters, initial states eliminated
+  bool converged = false;
+};
+
+struct FitOptions {
+  int most_iterations = 12;
+  int noise_rounds = 2;      ///< how often the noise is estimated anew; 0: as given
+  bool starts_only = false;  ///< the plant is held: only initial states follow (held-out data)
+  double tolerance = 1e-4;   ///< relative fall of the objective per sample at which to stop
+};
+
+/// Fits. A fit that fails returns an infinite objective; it does not throw.
+FitResult fit(const FitData& data, const FitPoint& start, const std::vector<FreeParameter>& free,
+              const FitOptions& options = {});
+
+/// Linearised steps of every segment at a point, for residual analysis.
+std::vector<std::vector<LinearStep>> linearise(const FitData& data, const FitPoint& point);
+
+/// Root mean square over all samples of the whitened residuals [noise standard deviations].
+double whitened_rms(const FitResult& result);
+
+}  // namespace upright

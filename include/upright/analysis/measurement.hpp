@@ -1,0 +1,44 @@
+// Measured runs for diagnosis and identification: a run directory, a CSV, or a dataset file that maps a
+// foreign CSV.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+namespace upright {
+
+/// One run: encoders were read at time_s[k], then voltage_v[k] was commanded and held until time_s[k + 1].
+struct Measurement {
+  std::string name;
+  std::vector<double> time_s;
+  std::vector<double> voltage_v;
+  std::vector<double> cart_m;     ///< empty: not measured
+  std::vector<double> theta_rad;  ///< empty: not measured; unwrapped, 0 upright
+  bool cart_locked = false;
+  double cart_resolution_m = 0.0;     ///< 0: no steps are visible
+  double theta_resolution_rad = 0.0;  ///< 0: no steps are visible
+  std::vector<std::string> notes;     ///< what was found and assumed while reading
+
+  std::size_t size() const { return time_s.size(); }
+  bool has_cart() const { return !cart_m.empty(); }
+  bool has_theta() const { return !theta_rad.empty(); }
+  double median_period_s() const;
+  /// Standard deviation of the sensor noise that the data themselves show: quantisation and what lies above
+  /// it.
+  double cart_noise_m() const;
+  double theta_noise_rad() const;
+};
+
+/// Reads one item of `--data`. Throws ConfigError with remedy, file and line for everything that cannot be
+/// used: no common columns, one sample, constant data, values that are not finite, time that does not grow.
+Measurement read_measurement(const std::filesystem::path& path);
+
+/// The step of quantised values: the largest number of which all differences are multiples; 0 when there is
+/// none.
+double find_resolution(const std::vector<double>& values);
+
+/// Standard deviation of white noise under a smooth signal, from fourth differences.
+double find_noise(const std::vector<double>& values);
+
+}  // namespace upright

@@ -1,0 +1,78 @@
+// The search for missing effects: nested fits, forward by evidence, then backward deletion.
+#pragma once
+
+#include <map>
+#include <optional>
+#include <set>
+
+#include "upright/analysis/candidates.hpp"
+#include "upright/analysis/fit.hpp"
+
+namespace upright {
+
+/// A set of effects fitted to the training data and judged on held-out data.
+struct Hypothesis {
+  std::set<std::size_t> added;  ///< effects freed beyond what the plant file says
+  FitResult train;
+  FitResult held;                   ///< initial states only, plant from `train`
+  std::vector<FreeParameter> free;  ///< the parameters that moved, in the order of train.covariance
+  bool valid = false;               ///< fitted, and no parameter at a bound that makes it another effect
+};
+
+/// How much better one hypothesis is than another, robust to residuals that are not white: sums over
+/// segments.
+struct Improvement {
+  double train = 0.0;    ///< fall of the objective on training data
+  double held = 0.0;     ///< on held-out data
+  double t_value = 0.0;  ///< of the mean fall per segment, training and held-out together
+  double held_t = 0.0;
+};
+
+Improvement compare(const Hypothesis& simpler, const Hypothesis& richer);
+
+class Search {
+ public:
+  Search(const Plant& plant, const std::vector<Measurement>& runs, const FitData& train, const FitData& held);
+
+  const DataRange& range() const { return range_; }
+  const std::vector<std::size_t>& nuisances() const { return nuisances_; }
+  const FitData& train_data() const { return train_; }
+  const FitData& held_data() const { return held_; }
+
+  /// The plant file as it is: nothing moves.
+  Hypothesis as_given();
+  /// Base corrections and the plant's own effects within what is believed of them.
+  Hypothesis baseline();
+  /// Adds an effect to a hypothesis: a few steps from every start with the noise as it is, on a part of the
+  /// training data.
+  Hypothesis screened(const Hypothesis& base, std::size_t effect);
+  /// How much a screened hypothesis gains on that part.
+  double screened_gain(const Hypothesis& base, const Hypothesis& screened) const;
+  /// Brings a screened hypothesis to convergence on the whole training data, noise included, and judges it.
+  void refine(const Hypothesis& base, Hypothesis& hypothesis);
+  /// The same hypothesis without one effect.
+  Hypothesis without(const Hypothesis& base, std::size_t effect);
+  /// Exactly these effects free with nothing believed of them, everything else as in the plant file.
+  Hypothesis only(const std::vector<std::size_t>& effects, const Hypothesis& from, const Noise* fixed_noise);
+  void judge(Hypothesis& hypothesis, const Noise* noise = nullptr);
+
+ private:
+  std::vector<FreeParameter> free_of(const std::set<std::size_t>& added) const;
+  Plant plant_with(const Plant& current, const std::set<std::size_t>& added) const;
+  std::vector<std::vector<double>> starts_of(std::size_t effect, const Hypothesis& base) const;
+  std::vector<std::pair<double, double>> force_residual(const Hypothesis& base) const;
+  Hypothesis fitted(const std::set<std::size_t>& added, const FitPoint& start, const FitOptions& options,
+                    const std::vector<FreeParameter>& free);
+
+  Plant given_;  ///< the plant file
+  Plant plant_;  ///< the same with every correction at its neutral value
+  const std::vector<Measurement>& runs_;
+  FitData train_, held_;
+  FitData sieve_;  ///< every few training segments: enough to see which candidates are worth a whole fit
+  std::vector<std::size_t> sieve_places_;
+  DataRange range_;
+  std::vector<std::size_t> nuisances_;
+  std::vector<PlantState<double>> train_starts_, held_starts_;
+};
+
+}  // namespace upright

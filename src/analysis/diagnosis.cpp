@@ -1,0 +1,476 @@
+#include "upright/analysis/diagnosis.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <numbers>
+#include <sstream>
+
+#include "upright/analysis/next_experiment.hpp"
+#include "upright/analysis/residual.hpp"
+#include "upright/analysis/search.hpp"
+#include "upright/analysis/structure.hpp"
+#include "upright/model/error.hpp"
+
+namespace upright {
+
+namespace {
+
+constexpr double infinity = std::numeric_limits<double>::infinity();
+
+/// Minus twice the log likelihood that an effect must save on the training data before it is believed. About
+/// 30 candidates with up to three parameters are tried; 25 keeps chance below one in a thousand when noise is
+/// white.
+constexpr double least_evidence = 25.0;
+/// The same as a t value of the saving per segment, which stays honest where the noise is not white.
+constexpr double least_t = 3.0;
+/// What each parameter beyond the first must save on top: a simpler effect that does nearly as well is
+/// preferred.
+constexpr double parameter_price = 10.0;
+/// Two explanations whose evidence differs by less than this, or by less than its own scatter, are not told
+/// apart.
+constexpr double confusable_evidence = 16.0;
+/// A correction of the plant file is there when it is this many standard errors from nothing.
+constexpr double least_correction_z = 4.0;
+constexpr int most_rounds = 4;
+constexpr std::size_t finalists = 4;
+
+std::string kind_of(std::size_t effect) {
+  return std::string(effect_registry()[effect].kind);
+}
+
+void split(const std::vector<Measurement>& runs, Diagnosis& diagnosis, FitData& train, FitData& held) {
+  const std::vector<Segment> segments = cut_segments(runs);
+  train.runs = held.runs = &runs;
+  if (runs.size() == 1) {
+    const double from = runs[0].time_s.front() + 2.0 / 3.0 * (runs[0].time_s.back() - runs[0].time_s.front());
+    for (const Segment& segment : segments)
+      (runs[0].time_s[segment.first] >= from ? held : train).segments.push_back(segment);
+    diagnosis.notes.push_back("one run only: its last third is held out");
+  } else {
+    // Every third run, counted from the end of each three, so that what is held out is as varied as what is
+    // fitted.
+    for (const Segment& segment : segments) {
+      const bool out = runs.size() == 2 ? segment.run == 1 : segment.run % 3 == 2;
+      (out ? held : train).segments.push_back(segment);
+    }
+    for (std::size_t r = 0; r < runs.size(); ++r)
+      if (runs.size() == 2 ? r == 1 : r % 3 == 2) diagnosis.held_out_runs.push_back(r);
+  }
+  if (held.segments.empty() && train.segments.size() > 1) {
+    held.segments.push_back(train.segments.back());
+    train.segments.pop_back();
+  }
+}
+
+/// What a hypothesis says about one effect, as numbers with intervals.
+std::vector<ParameterEstimate> estimates_of(std::size_t effect, const Hypothesis& h) {
+  std::vector<ParameterEstimate> result;
+  const EffectInfo& info = effect_registry()[effect];
+  for (std::size_t i = 0; i < info.parameters.size(); ++i) {
+    ParameterEstimate e;
+    e.name = info.parameters[i].name;
+    e.unit = info.parameters[i].unit;
+    e.value = h.train.point.plant.find(effect)->values[i];
+    e.low = e.high = e.value;
+    for (std::size_t j = 0; j < h.free.size(); ++j) {
+      if (h.free[j].effect != effect || h.free[j].index != i) continue;
+      const auto at = static_cast<Eigen::Index>(j);
+      const double sigma = std::sqrt(std::max(h.train.covariance(at, at), 0.0));
+      e.low = e.value - 1.96 * sigma;
+      e.high = e.value + 1.96 * sigma;
+    }
+    result.push_back(e);
+  }
+  return result;
+}
+
+class Diagnostician {
+ public:
+  Diagnostician(const Plant& plant, const std::vector<Measurement>& runs, const DiagnosisOptions& options)
+      : plant_(plant), runs_(runs), options_(options) {
+    split(runs_, result_, train_, held_);
+    if (train_.segments.empty())
+      throw ConfigError("record longer runs: no stretch of the data is long enough to simulate");
+    search_.emplace(plant_, runs_, train_, held_);
+  }
+
+  Diagnosis run() {
+    tell(0.02, "comparing the model as given");
+    given_ = search_->baseline();
+    if (!std::isfinite(given_.train.objective))
+      throw ConfigError("check the plant file: the model cannot be simulated with these runs");
+    current_ = given_;
+    grow();
+    prune();
+    settle_corrections();
+    conclude();
+    return std::move(result_);
+  }
+
+ private:
+  void tell(double done, const std::string& what) {
+    if (options_.progress) options_.progress(done, what);
+  }
+
+  std::vector<std::size_t> open_candidates() const {
+    std::vector<std::size_t> candidates = candidate_effects(current_.train.point.plant, search_->range());
+    for (const std::size_t effect : search_->nuisances())
+      if (!current_.added.contains(effect)) candidates.push_back(effect);
+    return candidates;
+  }
+
+  /// A hypothesis in which the new effect does nothing, or is of a size that makes it another effect, has
+  /// lost.
+  static bool is_plausible(const Hypothesis& h, std::size_t effect) {
+    for (const FreeParameter& p : h.free) {
+      if (p.effect != effect) continue;
+      const double value = h.train.point.plant.find(effect)->values[p.index];
+      if (p.index == 0 && value == effect_registry()[effect].parameters[0].neutral) return false;
+      if (kind_of(effect).starts_with("angle_offset") && std::abs(value) < 1.5 * theta_resolution_)
+        return false;
+    }
+    return true;
+  }
+
+  static double price_of(std::size_t effect) {
+    return parameter_price * static_cast<double>(effect_registry()[effect].parameters.size() - 1);
+  }
+
+  bool is_believed(const Improvement& improvement, std::size_t effect) const {
+    return improvement.train - price_of(effect) > least_evidence && improvement.held > 0.0 &&
+           improvement.t_value > least_t;
+  }
+
+  void grow() {
+    for (const Measurement& run : runs_)
+      theta_resolution_ = std::max(theta_resolution_, run.theta_resolution_rad);
+    for (int round = 0; round < most_rounds; ++round) {
+      const std::vector<std::size_t> candidates = open_candidates();
+      std::vector<std::pair<double, Hypothesis>> screened;
+      for (std::size_t c = 0; c < candidates.size(); ++c) {
+        tell(0.05 + 0.2 * round + 0.12 * static_cast<double>(c) / static_cast<double>(candidates.size()),
+             "trying " + kind_of(candidates[c]));
+        Hypothesis h = search_->screened(current_, candidates[c]);
+        const double gain = search_->screened_gain(current_, h) - price_of(candidates[c]);
+        if (round == 0) result_.candidates.push_back({candidates[c], 0.0, std::max(gain, 0.0)});
+        screened.emplace_back(gain, std::move(h));
+      }
+      std::vector<std::size_t> ranking(candidates.size());
+      for (std::size_t i = 0; i < ranking.size(); ++i) ranking[i] = i;
+      std::stable_sort(ranking.begin(), ranking.end(),
+                       [&](std::size_t a, std::size_t b) { return screened[a].first > screened[b].first; });
+      std::optional<Hypothesis> best;
+      double best_score = 0.0;
+      std::size_t best_effect = 0;
+      for (std::size_t place = 0; place < std::min(finalists, ranking.size()); ++place) {
+        const std::size_t i = ranking[place];
+        if (screened[i].first < 0.4 * least_evidence) break;
+        tell(0.17 + 0.2 * round + 0.08 * static_cast<double>(place) / finalists,
+             "fitting " + kind_of(candidates[i]));
+        Hypothesis h = screened[i].second;
+        search_->refine(current_, h);
+        if (round == 0) finalists_.emplace_back(candidates[i], h);
+        const Improvement improvement = compare(current_, h);
+        if (!is_plausible(h, candidates[i]) || !is_believed(improvement, candidates[i])) continue;
+        const double score = improvement.train - price_of(candidates[i]);
+        if (!best || score > best_score) {
+          best = std::move(h);
+          best_score = score;
+          best_effect = candidates[i];
+        }
+      }
+      if (!best) return;
+      current_ = std::move(*best);
+      found_.push_back(best_effect);
+      // What gained a fair share of the same may be the same thing by another name.
+      std::vector<std::size_t>& near = near_[best_effect];
+      const auto winner = std::find(candidates.begin(), candidates.end(), best_effect) - candidates.begin();
+      const double winning = screened[static_cast<std::size_t>(winner)].first;
+      for (std::size_t i = 0; i < candidates.size(); ++i)
+        if (candidates[i] != best_effect && screened[i].first > 0.3 * winning) near.push_back(candidates[i]);
+    }
+  }
+
+  /// Backward deletion: what is no longer needed once others are there goes.
+  void prune() {
+    bool again = found_.size() > 1;
+    while (again) {
+      again = false;
+      for (std::size_t i = 0; i < found_.size(); ++i) {
+        tell(0.85, "is " + kind_of(found_[i]) + " still needed");
+        Hypothesis h = search_->without(current_, found_[i]);
+        if (!std::isfinite(h.train.objective)) continue;
+        const Improvement improvement = compare(h, current_);
+        if (improvement.train - price_of(found_[i]) > least_evidence && improvement.t_value > 0.7 * least_t)
+          continue;
+        current_ = std::move(h);
+        found_.erase(found_.begin() + static_cast<std::ptrdiff_t>(i));
+        again = found_.size() > 1;
+        break;
+      }
+    }
+  }
+
+  /// Which of the corrections that every fit was left room for are really there: the least certain is set
+  /// back to what the plant file says, the others follow (a Gaussian approximation of the likelihood), until
+  /// all that are left are certain.
+  void settle_corrections() {
+    const Hypothesis& h = current_;
+    std::vector<std::size_t> open;
+    for (std::size_t j = 0; j < h.free.size(); ++j) open.push_back(j);
+    Eigen::VectorXd value(static_cast<Eigen::Index>(h.free.size()));
+    for (std::size_t j = 0; j < h.free.size(); ++j)
+      value[static_cast<Eigen::Index>(j)] =
+          h.train.point.plant.find(h.free[j].effect)->values[h.free[j].index];
+    Eigen::MatrixXd covariance = h.train.covariance;
+    const auto is_correction = [&](std::size_t j) {
+      return std::find(found_.begin(), found_.end(), h.free[j].effect) == found_.end();
+    };
+    for (;;) {
+      double least = infinity;
+      std::size_t place = 0;
+      for (std::size_t a = 0; a < open.size(); ++a) {
+        if (!is_correction(open[a])) continue;
+        const auto at = static_cast<Eigen::Index>(a);
+        const double z = std::abs(value[at] - h.free[open[a]].prior_mean) /
+                         std::sqrt(std::max(covariance(at, at), 1e-300));
+        if (z < least) {
+          least = z;
+          place = a;
+        }
+      }
+      if (!(least < least_correction_z)) break;
+      const auto at = static_cast<Eigen::Index>(place);
+      const double step = h.free[open[place]].prior_mean - value[at];
+      const Eigen::VectorXd column = covariance.col(at) / std::max(covariance(at, at), 1e-300);
+      value += column * step;
+      covariance -= column * covariance.row(at).eval();
+      const Eigen::Index n = value.size();
+      Eigen::VectorXd smaller_value(n - 1);
+      Eigen::MatrixXd smaller(n - 1, n - 1);
+      for (Eigen::Index i = 0, a = 0; i < n; ++i) {
+        if (i == at) continue;
+        smaller_value[a] = value[i];
+        for (Eigen::Index j = 0, b = 0; j < n; ++j)
+          if (j != at) smaller(a, b++) = covariance(i, j);
+        ++a;
+      }
+      value = smaller_value;
+      covariance = smaller;
+      open.erase(open.begin() + static_cast<std::ptrdiff_t>(place));
+    }
+    std::vector<std::size_t> corrections;
+    for (const std::size_t j : open)
+      if (is_correction(j) && is_plausible(h, h.free[j].effect) &&
+          std::find(corrections.begin(), corrections.end(), h.free[j].effect) == corrections.end())
+        corrections.push_back(h.free[j].effect);
+    tell(0.88, "fitting what is left");
+    std::vector<std::size_t> all = found_;
+    all.insert(all.end(), corrections.begin(), corrections.end());
+    final_ = search_->only(all, current_, nullptr);
+    order_corrections(corrections);
+  }
+
+  double gap_of(const Hypothesis& h) const {
+    return held_.segments.empty() ? whitened_rms(h.train) : whitened_rms(h.held);
+  }
+
+  /// Corrections in the order of how much each closes.
+  void order_corrections(const std::vector<std::size_t>& corrections) {
+    const Noise noise = final_.train.point.noise;
+    std::vector<std::pair<double, std::size_t>> opened;
+    for (const std::size_t effect : corrections) {
+      std::vector<std::size_t> others = found_;
+      for (const std::size_t other : corrections)
+        if (other != effect) others.push_back(other);
+      opened.emplace_back(-gap_of(search_->only(others, final_, &noise)), effect);
+    }
+    std::sort(opened.begin(), opened.end());
+    for (const auto& [gap, effect] : opened) corrections_.push_back(effect);
+  }
+
+  void conclude() {
+    tell(0.92, "measuring the gap");
+    const ResidualStructure structure = examine();
+    const Noise noise = structure.structured ? sensor_noise() : final_.train.point.noise;
+    result_.noise = final_.train.point.noise;
+    std::vector<std::size_t> all = found_;
+    all.insert(all.end(), corrections_.begin(), corrections_.end());
+    Hypothesis step = search_->only({}, final_, &noise);
+    result_.gap_before = gap_of(step);
+    double gap = result_.gap_before;
+    for (std::size_t i = 0; i < all.size(); ++i) {
+      const std::vector<std::size_t> first(all.begin(), all.begin() + static_cast<std::ptrdiff_t>(i) + 1);
+      FoundEffect found;
+      found.effect = all[i];
+      found.gap_before = gap;
+      step = i + 1 == all.size() && !structure.structured ? final_ : search_->only(first, final_, &noise);
+      gap = gap_of(step);
+      found.gap_after = gap;
+      found.parameters = estimates_of(all[i], final_);
+      result_.effects.push_back(found);
+    }
+    result_.gap_after = gap;
+    result_.residual = structure.sentence;
+    result_.model = final_model();
+    for (auto& candidate : result_.candidates) {
+      candidate.gap_after = result_.gap_before;
+      for (const auto& [effect, h] : finalists_) {
+        if (effect != candidate.effect) continue;
+        candidate.evidence = compare(given_, h).train;
+        candidate.gap_after = gap_of(search_->only({effect}, h, &noise));
+      }
+    }
+    std::stable_sort(result_.candidates.begin(), result_.candidates.end(),
+                     [](const auto& a, const auto& b) { return a.evidence > b.evidence; });
+    decide(structure);
+    find_confusable();
+  }
+
+  Noise sensor_noise() const {
+    Noise noise = final_.train.point.noise;
+    noise.force = noise.torque = 0.0;
+    return noise;
+  }
+
+  ResidualStructure examine() {
+    FitData all{&runs_, train_.segments};
+    FitPoint point = final_.train.point;
+    all.segments.insert(all.segments.end(), held_.segments.begin(), held_.segments.end());
+    point.starts.insert(point.starts.end(), final_.held.point.starts.begin(), final_.held.point.starts.end());
+    ResidualStructure structure = examine_residuals(all, point);
+    const Noise quiet = sensor_noise();
+    structure.noise_ratio = gap_of(search_->only(all_found(), final_, &quiet));
+    judge_structure(structure);
+    return structure;
+  }
+
+  std::vector<std::size_t> all_found() const {
+    std::vector<std::size_t> all = found_;
+    all.insert(all.end(), corrections_.begin(), corrections_.end());
+    return all;
+  }
+
+  static void judge_structure(ResidualStructure& s) {
+    std::ostringstream text;
+    text.precision(3);
+    if (s.noise_ratio < 1.1) {
+      text << "what is left is the sensors' own noise";
+    } else if (s.dispersion > 1.6) {
+      s.structured = true;
+      text << "what is left comes in bursts: some stretches are " << s.dispersion
+           << " times as far off as most";
+    } else if (s.force_explained > 0.15 || s.torque_explained > 0.15) {
+      s.structured = true;
+      const bool force = s.force_explained >= s.torque_explained;
+      text << "what is left goes with " << (force ? s.force_feature : s.torque_feature) << " ("
+           << 100.0 * (force ? s.force_explained : s.torque_explained) << " percent of the residual "
+           << (force ? "force" : "torque") << ")";
+    } else {
+      text << "what is left is a disturbance that is the same all along and goes with nothing that was "
+              "measured";
+    }
+    s.sentence = text.str();
+  }
+
+  Plant final_model() const {
+    Plant model = plant_;
+    for (const std::size_t effect : all_found())
+      model.set(effect, final_.train.point.plant.find(effect)->values);
+    return model;
+  }
+
+  void decide(const ResidualStructure& structure) {
+    if (structure.structured) {
+      result_.verdict = Verdict::unexplained;
+    } else if (!result_.effects.empty()) {
+      result_.verdict = Verdict::explained;
+    } else {
+      result_.verdict = moved() ? Verdict::no_discrepancy : Verdict::not_excited;
+    }
+  }
+
+  /// Whether anything moved far enough to show an effect: well beyond the sensors' steps.
+  bool moved() const {
+    constexpr double least_steps = 30.0;
+    for (const Measurement& run : runs_) {
+      const auto range = [](const std::vector<double>& values) {
+        const auto [low, high] = std::minmax_element(values.begin(), values.end());
+        return values.empty() ? 0.0 : *high - *low;
+      };
+      if (range(run.cart_m) > least_steps * std::sqrt(12.0) * run.cart_noise_m()) return true;
+      if (range(run.theta_rad) > least_steps * std::sqrt(12.0) * run.theta_noise_rad()) return true;
+    }
+    return false;
+  }
+
+  /// Other effects that do as well in the place of one that was found.
+  void find_confusable() {
+    std::vector<std::pair<std::size_t, Plant>> rivals;
+    for (std::size_t i = 0; i < result_.effects.size() && i < found_.size(); ++i) {
+      const std::size_t effect = found_[i];
+      tell(0.94, "what else could be " + kind_of(effect));
+      const Hypothesis without = search_->without(current_, effect);
+      if (!std::isfinite(without.train.objective)) continue;
+      for (const std::size_t other : near_[effect]) {
+        if (std::find(found_.begin(), found_.end(), other) != found_.end()) continue;
+        Hypothesis rival = search_->screened(without, other);
+        if (!std::isfinite(rival.train.objective)) continue;
+        search_->refine(without, rival);
+        const Improvement worse = compare(rival, current_);
+        if (!is_plausible(rival, other)) continue;
+        const bool same = worse.train < confusable_evidence || worse.t_value < 2.0;
+        if (!same) continue;
+        result_.effects[i].confusable_with.push_back(other);
+        rivals.emplace_back(other, rival.train.point.plant);
+      }
+    }
+    if (!rivals.empty()) result_.next_experiment = choose_experiment(final_.train.point.plant, rivals, runs_);
+  }
+
+  const Plant plant_;
+  const std::vector<Measurement>& runs_;
+  const DiagnosisOptions& options_;
+  FitData train_, held_;
+  std::optional<Search> search_;
+  Hypothesis given_, current_, final_;
+  std::vector<std::size_t> found_, corrections_;
+  std::map<std::size_t, std::vector<std::size_t>> near_;
+  std::vector<std::pair<std::size_t, Hypothesis>> finalists_;
+  Diagnosis result_;
+  inline static double theta_resolution_ = 0.0;
+};
+
+}  // namespace
+
+std::string_view name_of(Verdict verdict) {
+  switch (verdict) {
+    case Verdict::explained:
+      return "explained";
+    case Verdict::no_discrepancy:
+      return "no_discrepancy";
+    case Verdict::unexplained:
+      return "unexplained";
+    case Verdict::not_excited:
+      return "not_excited";
+  }
+  return "";
+}
+
+Diagnosis diagnose(const Plant& plant, const std::vector<Measurement>& runs,
+                   const DiagnosisOptions& options) {
+  if (runs.empty()) throw ConfigError("name at least one run with --data");
+  const std::string fault = fault_of(plant);
+  if (!fault.empty()) throw ConfigError(fault);
+  const bool shared = std::any_of(runs.begin(), runs.end(), [&](const Measurement& run) {
+    return run.has_cart() || (run.has_theta() && plant.pendulum);
+  });
+  if (!shared)
+    throw ConfigError(
+        "add the pendulum to the plant file: the runs hold theta_rad only, and the model is a cart alone");
+  return Diagnostician(plant, runs, options).run();
+}
+
+}  // namespace upright

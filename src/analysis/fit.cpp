@@ -1,0 +1,785 @@
+#include "upright/analysis/fit.hpp"
+
+#include <ceres/jet.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "upright/analysis/parallel.hpp"
+#include "upright/sim/simulator.hpp"
+
+namespace upright {
+
+namespace {
+
+constexpr int states = LinearStep::states;
+constexpr double infinity = std::numeric_limits<double>::infinity();
+
+using StateMatrix = double[states][states];
+using NormalMatrix = Eigen::MatrixXd;
+
+/// Information on the initial state beyond the data: nearly none, enough to keep unmeasured states in place.
+constexpr std::array<double, states> start_information = {1.0, 1.0, 0.1, 0.01, 1e4};
+
+template <class S>
+std::array<S*, states> as_array(PlantState<S>& s) {
+  return {&s.cart_m, &s.theta_rad, &s.cart_mps, &s.theta_radps, &s.bristle_m};
+}
+
+EngineOptions fit_options() {
+  EngineOptions options;
+  options.max_step_s = 4e-3;
+  options.step_fraction = 0.5;
+  options.event_tolerance_s = 1e-9;
+  return options;
+}
+
+/// How much of a record before a segment can still be acting at its start.
+template <class S>
+void start_segment(Simulator<S>& simulator, const Measurement& run, const Segment& segment,
+                   PlantState<S> state) {
+  const Dynamics<S>& dynamics = simulator.engine().dynamics();
+  const double delay = value_of(dynamics.input_delay_s());
+  const double start = run.time_s[segment.first];
+  double history = delay;
+  if (dynamics.has_motor_lag()) history += 12.0 * value_of(dynamics.motor_time_constant_s());
+  std::size_t k = segment.first;
+  while (k > 0 && run.time_s[k] > start - history) --k;
+  if (dynamics.has_motor_lag()) {
+    // The lag is linear: follow it exactly over the part of the record that it still remembers.
+    S lagged = dynamics.actuate(S(run.voltage_v[k]));
+    S acting = lagged;
+    S now = S(run.time_s[k]);
+    const auto relax = [&](const S& until) {
+      using std::exp;
+      lagged = acting + (lagged - acting) * exp(-(until - now) / dynamics.motor_time_constant_s());
+      now = until;
+    };
+    for (std::size_t j = k; j < segment.first; ++j) {
+      const S acts = S(run.time_s[j]) + dynamics.input_delay_s();
+      if (value_of(acts) >= start) break;
+      relax(acts);
+      acting = dynamics.actuate(S(run.voltage_v[j]));
+    }
+    relax(S(start));
+    state.motor_v = lagged;
+  }
+  double acting_v = run.voltage_v[k];
+  std::size_t next = k;
+  while (next < segment.first && run.time_s[next] + delay <= start) acting_v = run.voltage_v[next++];
+  simulator.start(state, start, acting_v);
+  for (; next < segment.first; ++next) simulator.command(run.time_s[next], run.voltage_v[next]);
+}
+
+double measured(const Measurement& run, int channel, std::size_t k) {
+  return channel == 0 ? run.cart_m[k] : run.theta_rad[k];
+}
+
+bool has_channel(const Measurement& run, const Plant& plant, int channel) {
+  return channel == 0 ? run.has_cart() : run.has_theta() && plant.pendulum.has_value();
+}
+
+/// The Kalman filter that whitens residuals, and any columns that pass through it alike.
+class Whitener {
+ public:
+  Whitener(const Measurement& run, const Plant& plant, const Noise& noise)
+      : noise_(noise),
+        present_{has_channel(run, plant, 0), has_channel(run, plant, 1)},
+        sensor_variance_{square(run.has_cart() ? run.cart_noise_m() : 1.0),
+                         square(run.has_theta() ? run.theta_noise_rad() : 1.0)} {}
+
+  /// Carries the covariance to the next sample.
+  void predict(const LinearStep& step) {
+    if (noise_.force == 0.0 && noise_.torque == 0.0) return;
+    active_ = true;
+    const double f = square(noise_.force) * step.period_s, t = square(noise_.torque) * step.period_s;
+    for (int i = 0; i < 2; ++i)
+      for (int j = 0; j < 2; ++j)
+        p_[2 + i][2 + j] +=
+            f * step.by_force[i] * step.by_force[j] + t * step.by_torque[i] * step.by_torque[j];
+    StateMatrix half;
+    for (int i = 0; i < states; ++i)
+      for (int j = 0; j < states; ++j) {
+        double sum = 0.0;
+        for (int k = 0; k < states; ++k) sum += step.transition[i][k] * p_[k][j];
+        half[i][j] = sum;
+      }
+    for (int i = 0; i < states; ++i)
+      for (int j = 0; j <= i; ++j) {
+        double sum = 0.0;
+        for (int k = 0; k < states; ++k) sum += half[i][k] * step.transition[j][k];
+        p_[i][j] = p_[j][i] = sum;
+      }
+  }
+
+  bool present(int channel) const { return present_[channel]; }
+
+  /// Prepares the update with one channel: gain and innovation variance.
+  void prepare(const LinearStep& step, int channel) {
+    const double c = step.gain[channel];
+    variance_ = sensor_variance_[channel] + square(noise_.jitter_s * step.rate[channel]);
+    if (!active_) return;
+    variance_ += c * c * p_[channel][channel];
+    for (int i = 0; i < states; ++i) gain_[i] = c * p_[i][channel] / variance_;
+    for (int i = 0; i < states; ++i)
+      for (int j = 0; j < states; ++j) updated_[i][j] = p_[i][j] - gain_[i] * c * p_[channel][j];
+    std::copy(&updated_[0][0], &updated_[0][0] + states * states, &p_[0][0]);
+  }
+
+  double variance() const { return variance_; }
+  const double* gain() const { return gain_; }
+
+ private:
+  static double square(double x) { return x * x; }
+
+  Noise noise_;
+  bool present_[2];
+  double sensor_variance_[2];
+  bool active_ = false;
+  StateMatrix p_{}, updated_{};
+  double gain_[states] = {}, variance_ = 1.0;
+};
+
+struct Likelihood {
+  double chi_square = 0.0;
+  double log_variance = 0.0;
+  std::size_t samples = 0;
+  double objective() const { return chi_square + log_variance; }
+};
+
+/// Adds one innovation to a likelihood. A value that is not finite makes it infinite.
+void count(Likelihood& sum, double e, double variance) {
+  sum.chi_square += std::isfinite(e) ? e * e / variance : infinity;
+  sum.log_variance += std::log(variance);
+  ++sum.samples;
+}
+
+/// Likelihood of a segment that is linearised, had the noise been another: to first order the filtered
+/// trajectory moves by what the other gains would have corrected.
+Likelihood whiten(const std::vector<LinearStep>& steps, const Measurement& run, const Plant& plant,
+                  const Noise& noise) {
+  Whitener whitener(run, plant, noise);
+  Likelihood sum;
+  double shift[states] = {}, moved[states];
+  for (std::size_t k = 0; k < steps.size(); ++k) {
+    const LinearStep& step = steps[k];
+    if (k > 0) {
+      whitener.predict(step);
+      for (int i = 0; i < states; ++i) {
+        moved[i] = 0.0;
+        for (int j = 0; j < states; ++j) moved[i] += step.transition[i][j] * shift[j];
+      }
+      std::copy(moved, moved + states, shift);
+    }
+    double update[states] = {}, former[states] = {};
+    for (int channel = 0; channel < 2; ++channel) {
+      if (!whitener.present(channel)) continue;
+      whitener.prepare(step, channel);
+      const double c = step.gain[channel];
+      const double e = step.residual[channel] - c * (shift[channel] + update[channel]);
+      const double e_former = step.residual[channel] - c * former[channel];
+      count(sum, e, whitener.variance());
+      for (int i = 0; i < states; ++i) {
+        update[i] += whitener.gain()[i] * e;
+        former[i] += step.update[channel][i] * e_former;
+      }
+    }
+    for (int i = 0; i < states; ++i) shift[i] += update[i] - former[i];
+  }
+  return sum;
+}
+
+/// Normal equations of one segment: initial state (first) and parameters, whitened.
+struct Normal {
+  NormalMatrix h;
+  Eigen::VectorXd g;
+  Likelihood likelihood;
+};
+
+/// Adds a filter's correction to the state of an engine. A velocity at rest stays at rest: its gain is zero
+/// there.
+template <class S>
+void correct_state(EventEngine<S>& engine, const double (&update)[states]) {
+  if (std::all_of(update, update + states, [](double u) { return u == 0.0; })) return;
+  PlantState<S> state = engine.state();
+  const auto values = as_array(state);
+  for (int i = 0; i < states; ++i) *values[static_cast<std::size_t>(i)] += S(update[i]);
+  engine.correct(state);
+}
+
+/// Follows a segment with dual numbers, a sample at a time; chains the derivatives and whitens them on the
+/// way.
+template <int N>
+void linearise_segment(const Measurement& run, const Segment& segment, const FitPoint& point,
+                       const PlantState<double>& start, const std::vector<FreeParameter>& free,
+                       bool with_normal, std::vector<LinearStep>& steps, Normal& normal) {
+  using Jet = ceres::Jet<double, N>;
+  const int parameters = static_cast<int>(free.size());
+  const int columns = states + parameters;
+  PlantModel<Jet> model = make_model<Jet>(point.plant, run.cart_locked);
+  for (int j = 0; j < parameters; ++j)
+    model
+        .parameters[effect_parameter_offset(free[static_cast<std::size_t>(j)].effect) +
+                    free[static_cast<std::size_t>(j)].index]
+        .v[states + j] = 1.0;
+  Simulator<Jet> simulator(model, fit_options(), 64 + segment.last - segment.first);
+  PlantState<Jet> state;
+  {
+    PlantState<double> plain = start;
+    const auto from = as_array(plain);
+    const auto to = as_array(state);
+    for (int i = 0; i < states; ++i)
+      *to[static_cast<std::size_t>(i)] = Jet(*from[static_cast<std::size_t>(i)]);
+  }
+  start_segment(simulator, run, segment, state);
+  const Dynamics<Jet>& dynamics = simulator.engine().dynamics();
+  // Noise is pushed through the plant file's own masses: were they the fitted ones, the fit could shrink its
+  // noise by making the plant heavier.
+  const std::optional<Pendulum>& pendulum = point.plant.pendulum;
+  const double total_mass = point.plant.cart_mass_kg + (pendulum ? pendulum->mass_kg : 0.0);
+  const double coupling = pendulum ? pendulum->mass_kg * pendulum->length_to_com_m : 0.0;
+  const double inertia = pendulum ? pendulum->inertia_about_pivot_kgm2() : 1.0;
+  const bool bristles = dynamics.has_bristle_state();
+
+  using Column = Eigen::Matrix<double, states, Eigen::Dynamic, Eigen::RowMajor, states, N + states>;
+  Column sensitivity(states, columns), moved(states, columns);
+  sensitivity.setZero();
+  for (int i = 0; i < states; ++i) sensitivity(i, i) = 1.0;
+  Eigen::Matrix<double, 1, Eigen::Dynamic, Eigen::RowMajor, 1, N + states> row(columns);
+  Whitener whitener(run, point.plant, point.noise);
+  steps.resize(segment.last - segment.first + 1);
+  if (with_normal) {
+    normal.h.setZero(columns, columns);
+    normal.g.setZero(columns);
+    normal.likelihood = {};
+  }
+
+  for (std::size_t k = segment.first; k <= segment.last; ++k) {
+    LinearStep& step = steps[k - segment.first];
+    const bool first = k == segment.first;
+    step.period_s = first ? 0.0 : run.time_s[k] - run.time_s[k - 1];
+    // Each sample starts with fresh unit derivatives; a contact at rest forgets a push on its velocity at
+    // once.
+    PlantState<Jet> seeded = simulator.engine().state();
+    const auto seed = as_array(seeded);
+    const bool rests[states] = {run.cart_locked, !dynamics.has_pendulum(),
+                                run.cart_locked || simulator.engine().cart_at_rest(),
+                                !dynamics.has_pendulum() || simulator.engine().pivot_at_rest(), !bristles};
+    for (int i = 0; i < states; ++i) {
+      seed[static_cast<std::size_t>(i)]->v.setZero();
+      if (!rests[i]) seed[static_cast<std::size_t>(i)]->v[i] = 1.0;
+    }
+    simulator.engine().correct(seeded);
+    if (!first) {
+      simulator.command(run.time_s[k - 1], run.voltage_v[k - 1]);
+      simulator.advance_to(run.time_s[k]);
+    }
+    PlantState<Jet> reached = simulator.engine().state();
+    const auto end = as_array(reached);
+    for (int i = 0; i < states; ++i)
+      for (int j = 0; j < states; ++j)
+        step.transition[i][j] = first ? (i == j ? 1.0 : 0.0) : end[static_cast<std::size_t>(i)]->v[j];
+    const Outputs<Jet> outputs = simulator.engine().outputs();
+    const double simulated[2] = {value_of(outputs.cart_m), value_of(outputs.theta_rad)};
+    for (int channel = 0; channel < 2; ++channel) {
+      step.gain[channel] = 1.0;
+      step.residual[channel] =
+          whitener.present(channel) ? measured(run, channel, k) - simulated[channel] : 0.0;
+    }
+    // Sensor scales: d measured / d state, by re-measuring a unit seed.
+    PlantState<Jet> unit = reached;
+    const auto units = as_array(unit);
+    for (int i = 0; i < states; ++i) {
+      units[static_cast<std::size_t>(i)]->v.setZero();
+      units[static_cast<std::size_t>(i)]->v[i] = 1.0;
+    }
+    const Outputs<Jet> sensed = dynamics.measure(unit);
+    step.gain[0] = sensed.cart_m.v[0];
+    step.gain[1] = sensed.theta_rad.v[1];
+    step.rate[0] = value_of(reached.cart_mps);
+    step.rate[1] = value_of(reached.theta_radps);
+    const double off = coupling * std::cos(value_of(reached.theta_rad));
+    if (run.cart_locked) {
+      step.by_force[0] = step.by_force[1] = step.by_torque[0] = 0.0;
+      step.by_torque[1] = 1.0 / inertia;
+    } else if (!dynamics.has_pendulum()) {
+      step.by_force[0] = 1.0 / total_mass;
+      step.by_force[1] = step.by_torque[0] = step.by_torque[1] = 0.0;
+    } else {
+      const double determinant = total_mass * inertia - off * off;
+      step.by_force[0] = inertia / determinant;
+      step.by_force[1] = step.by_torque[0] = -off / determinant;
+      step.by_torque[1] = total_mass / determinant;
+    }
+    if (!first) {
+      whitener.predict(step);
+      if (with_normal) {
+        for (int i = 0; i < states; ++i) {
+          moved.row(i).setZero();
+          for (int j = 0; j < states; ++j)
+            if (step.transition[i][j] != 0.0) moved.row(i) += step.transition[i][j] * sensitivity.row(j);
+          for (int j = 0; j < parameters; ++j)
+            moved(i, states + j) += end[static_cast<std::size_t>(i)]->v[states + j];
+        }
+        sensitivity = moved;
+      }
+    }
+    double update[states] = {};
+    for (int channel = 0; channel < 2; ++channel) {
+      if (!whitener.present(channel)) continue;
+      whitener.prepare(step, channel);
+      step.variance[channel] = whitener.variance();
+      std::copy(whitener.gain(), whitener.gain() + states, step.update[channel]);
+      const double e = step.residual[channel] - step.gain[channel] * update[channel];
+      for (int i = 0; i < states; ++i) update[i] += whitener.gain()[i] * e;
+      if (!with_normal) continue;
+      count(normal.likelihood, e, whitener.variance());
+      if (!std::isfinite(e)) return;
+      const Jet& shown = channel == 0 ? sensed.cart_m : sensed.theta_rad;
+      row = step.gain[channel] * sensitivity.row(channel);
+      for (int j = 0; j < parameters; ++j) row[states + j] += shown.v[states + j];
+      const double weight = 1.0 / whitener.variance();
+      normal.h.template selfadjointView<Eigen::Lower>().rankUpdate(row.transpose(), weight);
+      normal.g += row.transpose() * (weight * e);
+      for (int i = 0; i < states; ++i)
+        if (whitener.gain()[i] != 0.0) sensitivity.row(i) -= whitener.gain()[i] * row;
+    }
+    correct_state(simulator.engine(), update);
+  }
+  if (with_normal) normal.h.template triangularView<Eigen::StrictlyUpper>() = normal.h.transpose();
+}
+
+template <class Work>
+void with_jet_size(std::size_t parameters, Work&& work) {
+  const std::size_t slots = parameters + states;
+  if (slots <= 8) return work.template operator()<8>();
+  if (slots <= 16) return work.template operator()<16>();
+  return work.template operator()<32>();
+}
+
+double prior_objective(const Plant& plant, const std::vector<FreeParameter>& free) {
+  double sum = 0.0;
+  for (const FreeParameter& p : free) {
+    if (p.prior_sigma <= 0.0) continue;
+    const double off = (plant.find(p.effect)->values[p.index] - p.prior_mean) / p.prior_sigma;
+    sum += off * off;
+  }
+  return sum;
+}
+
+/// Inverse of an information matrix; directions that hold no information at all get none (a pseudo-inverse
+/// after scaling).
+NormalMatrix inverse_of(const NormalMatrix& h) {
+  const Eigen::VectorXd scale = h.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
+  const Eigen::SelfAdjointEigenSolver<NormalMatrix> solver(scale.asDiagonal() * h * scale.asDiagonal());
+  constexpr double least = 1e-13;
+  const Eigen::VectorXd inverse =
+      solver.eigenvalues().unaryExpr([](double v) { return v > least ? 1.0 / v : 0.0; });
+  return scale.asDiagonal() * solver.eigenvectors() * inverse.asDiagonal() *
+         solver.eigenvectors().transpose() * scale.asDiagonal();
+}
+
+class Fitter {
+ public:
+  Fitter(const FitData& data, const FitPoint& start, const std::vector<FreeParameter>& free,
+         const FitOptions& options)
+      : data_(data),
+        free_(options.starts_only ? std::vector<FreeParameter>{} : free),
+        options_(options),
+        point_(start) {
+    steps_.resize(data.segments.size());
+    normals_.resize(data.segments.size());
+  }
+
+  FitResult run() {
+    FitResult result;
+    double objective = evaluate();
+    for (int round = 0;; ++round) {
+      if (round < options_.noise_rounds && std::isfinite(objective)) {
+        estimate_noise();
+        objective = evaluate();
+      }
+      descend(objective);
+      if (round >= options_.noise_rounds || !std::isfinite(objective)) break;
+    }
+    result.converged = converged_;
+    finish(result);
+    return result;
+  }
+
+ private:
+  const Measurement& run_of(std::size_t s) const { return (*data_.runs)[data_.segments[s].run]; }
+
+  void linearise_all() {
+    parallel_for(data_.segments.size(), [&](std::size_t s) {
+      with_jet_size(free_.size(), [&]<int N>() {
+        linearise_segment<N>(run_of(s), data_.segments[s], point_, point_.starts[s], free_, true, steps_[s],
+                             normals_[s]);
+      });
+    });
+  }
+
+  /// Linearises at the present point; its objective.
+  double evaluate() {
+    linearise_all();
+    return likelihood_of_normals() + prior_objective(point_.plant, free_);
+  }
+
+  double likelihood_of_normals() const {
+    double sum = 0.0;
+    for (const Normal& normal : normals_) sum += normal.likelihood.objective();
+    return sum;
+  }
+
+  std::size_t sample_count() const {
+    std::size_t count = 0;
+    for (const Normal& normal : normals_) count += normal.likelihood.samples;
+    return count;
+  }
+
+  /// Gauss-Newton with damping. A step counts only if the whole objective falls, weights and log variances
+  /// included.
+  void descend(double& objective) {
+    double damping = 1e-4;
+    converged_ = false;
+    for (int iteration = 0; iteration < options_.most_iterations && std::isfinite(objective); ++iteration) {
+      const FitPoint former = point_;
+      auto former_steps = steps_;
+      auto former_normals = normals_;
+      double next_objective = infinity;
+      for (int attempt = 0; attempt < 4; ++attempt) {
+        point_ = step(damping);
+        next_objective = evaluate();
+        if (next_objective < objective) break;
+        point_ = former;
+        normals_ = former_normals;
+        damping = std::max(damping, 1e-4) * 30.0;
+      }
+      if (!(next_objective < objective)) {
+        steps_ = std::move(former_steps);
+        converged_ = true;
+        break;
+      }
+      damping = std::max(damping * 0.1, 1e-9);
+      const double fall = objective - next_objective;
+      objective = next_objective;
+      if (fall < options_.tolerance * static_cast<double>(sample_count()) * 0.1 + 0.02) {
+        converged_ = true;
+        break;
+      }
+    }
+  }
+
+  Eigen::VectorXd prior_gradient() const {
+    Eigen::VectorXd g(static_cast<Eigen::Index>(free_.size()));
+    for (std::size_t j = 0; j < free_.size(); ++j) {
+      const FreeParameter& p = free_[j];
+      const double value = point_.plant.find(p.effect)->values[p.index];
+      g[static_cast<Eigen::Index>(j)] =
+          p.prior_sigma > 0.0 ? (p.prior_mean - value) / (p.prior_sigma * p.prior_sigma) : 0.0;
+    }
+    return g;
+  }
+
+  /// The Gauss-Newton step of all segments: parameters first (initial states eliminated), then each initial
+  /// state.
+  FitPoint step(double damping) const {
+    const auto np = static_cast<Eigen::Index>(free_.size());
+    NormalMatrix h = NormalMatrix::Zero(np, np);
+    Eigen::VectorXd g = prior_gradient();
+    for (Eigen::Index j = 0; j < np; ++j) {
+      const FreeParameter& p = free_[static_cast<std::size_t>(j)];
+      if (p.prior_sigma > 0.0) h(j, j) += 1.0 / (p.prior_sigma * p.prior_sigma);
+    }
+    std::vector<Eigen::Matrix<double, states, Eigen::Dynamic>> back(normals_.size());
+    std::vector<Eigen::Matrix<double, states, 1>> base(normals_.size());
+    for (std::size_t s = 0; s < normals_.size(); ++s) {
+      const Normal& n = normals_[s];
+      Eigen::Matrix<double, states, states> hii = n.h.topLeftCorner<states, states>();
+      for (int i = 0; i < states; ++i)
+        hii(i, i) += start_information[static_cast<std::size_t>(i)] + damping * hii(i, i);
+      const Eigen::LDLT<Eigen::Matrix<double, states, states>> solver(hii);
+      back[s] = solver.solve(n.h.topRightCorner(states, np));
+      base[s] = solver.solve(n.g.head<states>());
+      h += n.h.bottomRightCorner(np, np) - n.h.bottomLeftCorner(np, states) * back[s];
+      g += n.g.tail(np) - n.h.bottomLeftCorner(np, states) * base[s];
+    }
+    const Eigen::VectorXd delta = bounded_step(h, g, damping);
+    FitPoint trial = point_;
+    for (Eigen::Index j = 0; j < np; ++j) {
+      const FreeParameter& p = free_[static_cast<std::size_t>(j)];
+      PlantEffect effect = *trial.plant.find(p.effect);
+      effect.values[p.index] = std::clamp(effect.values[p.index] + delta[j], p.low, p.high);
+      trial.plant.set(p.effect, effect.values);
+    }
+    for (std::size_t s = 0; s < normals_.size(); ++s) {
+      const Eigen::Matrix<double, states, 1> d = base[s] - back[s] * delta;
+      const auto values = as_array(trial.starts[s]);
+      constexpr std::array<double, states> longest = {0.01, 0.3, 0.5, 3.0, 0.01};
+      for (int i = 0; i < states; ++i)
+        *values[static_cast<std::size_t>(i)] +=
+            std::clamp(d[i], -longest[static_cast<std::size_t>(i)], longest[static_cast<std::size_t>(i)]);
+    }
+    return trial;
+  }
+
+  /// Solves for the parameters; those held at a bound by the data stay there, and no step is longer than
+  /// makes sense.
+  Eigen::VectorXd bounded_step(const NormalMatrix& h, const Eigen::VectorXd& g, double damping) const {
+    const Eigen::Index np = g.size();
+    std::vector<bool> held(static_cast<std::size_t>(np), false);
+    Eigen::VectorXd delta = Eigen::VectorXd::Zero(np);
+    for (int pass = 0; pass < 3; ++pass) {
+      std::vector<Eigen::Index> moving;
+      for (Eigen::Index j = 0; j < np; ++j)
+        if (!held[static_cast<std::size_t>(j)]) moving.push_back(j);
+      const auto n = static_cast<Eigen::Index>(moving.size());
+      if (n == 0) break;
+      NormalMatrix small(n, n);
+      Eigen::VectorXd right(n);
+      for (Eigen::Index a = 0; a < n; ++a) {
+        const double sa = free_[static_cast<std::size_t>(moving[static_cast<std::size_t>(a)])].scale;
+        right[a] = g[moving[static_cast<std::size_t>(a)]] * sa;
+        for (Eigen::Index b = 0; b < n; ++b)
+          small(a, b) = h(moving[static_cast<std::size_t>(a)], moving[static_cast<std::size_t>(b)]) * sa *
+                        free_[static_cast<std::size_t>(moving[static_cast<std::size_t>(b)])].scale;
+      }
+      for (Eigen::Index a = 0; a < n; ++a) small(a, a) += damping * small(a, a) + 1e-6;
+      const Eigen::VectorXd solved = small.ldlt().solve(right);
+      delta.setZero();
+      bool again = false;
+      for (Eigen::Index a = 0; a < n; ++a) {
+        const Eigen::Index j = moving[static_cast<std::size_t>(a)];
+        const FreeParameter& p = free_[static_cast<std::size_t>(j)];
+        const double value = point_.plant.find(p.effect)->values[p.index];
+        const double limit = std::max(0.5 * std::abs(value), 0.5 * p.scale);
+        delta[j] = std::clamp(std::isfinite(solved[a]) ? solved[a] * p.scale : 0.0, -limit, limit);
+        const bool below = value <= p.low && delta[j] < 0.0;
+        const bool above = value >= p.high && delta[j] > 0.0;
+        if (below || above) {
+          held[static_cast<std::size_t>(j)] = true;
+          again = true;
+        }
+      }
+      if (!again) break;
+    }
+    return delta;
+  }
+
+  double noise_objective(const Noise& noise) const {
+    std::vector<double> parts(data_.segments.size());
+    parallel_for(data_.segments.size(), [&](std::size_t s) {
+      parts[s] = whiten(steps_[s], run_of(s), point_.plant, noise).objective();
+    });
+    double sum = 0.0;
+    for (const double part : parts) sum += part;
+    return sum;
+  }
+
+  /// Maximum likelihood of the noise by a pattern search over decades, finer and finer.
+  void estimate_noise() {
+    Noise best = point_.noise;
+    double least = noise_objective(best);
+    bool cart = false, pendulum = false;
+    for (const Measurement& run : *data_.runs) {
+      cart = cart || run.has_cart();
+      pendulum = pendulum || (run.has_theta() && point_.plant.pendulum);
+    }
+    struct Knob {
+      double Noise::*value;
+      double smallest, largest;
+      bool used;
+    };
+    const std::array<Knob, 3> knobs = {Knob{&Noise::force, 1e-5, 10.0, cart},
+                                       Knob{&Noise::torque, 1e-7, 1.0, pendulum},
+                                       Knob{&Noise::jitter_s, 1e-6, 1e-2, true}};
+    for (const double factor : {10.0, 3.0, 1.5, 1.15}) {
+      bool better = true;
+      for (int sweep = 0; sweep < 3 && better; ++sweep) {
+        better = false;
+        for (const Knob& knob : knobs) {
+          if (!knob.used) continue;
+          for (const double move : {factor, 1.0 / factor}) {
+            for (;;) {
+              Noise next = best;
+              const double now = best.*knob.value;
+              const double moved = now == 0.0 ? (move > 1.0 ? knob.smallest * 10.0 : 0.0) : now * move;
+              next.*knob.value = moved < knob.smallest ? 0.0 : std::min(moved, knob.largest);
+              if (next.*knob.value == now) break;
+              const double objective = noise_objective(next);
+              if (!(objective < least - 1e-3)) break;
+              least = objective;
+              best = next;
+              better = true;
+            }
+          }
+        }
+      }
+    }
+    point_.noise = best;
+  }
+
+  void finish(FitResult& result) const {
+    result.point = point_;
+    result.objective = prior_objective(point_.plant, free_);
+    const auto np = static_cast<Eigen::Index>(free_.size());
+    NormalMatrix h = NormalMatrix::Zero(np, np), spread = NormalMatrix::Zero(np, np);
+    for (Eigen::Index j = 0; j < np; ++j) {
+      const FreeParameter& p = free_[static_cast<std::size_t>(j)];
+      if (p.prior_sigma > 0.0) h(j, j) += 1.0 / (p.prior_sigma * p.prior_sigma);
+    }
+    for (const Normal& n : normals_) {
+      result.segment_objective.push_back(n.likelihood.objective());
+      result.segment_chi_square.push_back(n.likelihood.chi_square);
+      result.segment_samples.push_back(n.likelihood.samples);
+      result.objective += n.likelihood.objective();
+      if (np == 0) continue;
+      NormalMatrix hii = n.h.topLeftCorner(states, states);
+      for (int i = 0; i < states; ++i) hii(i, i) += start_information[static_cast<std::size_t>(i)];
+      const Eigen::LDLT<NormalMatrix> solver(hii);
+      const NormalMatrix back = solver.solve(n.h.topRightCorner(states, np));
+      h += n.h.bottomRightCorner(np, np) - n.h.bottomLeftCorner(np, states) * back;
+      const Eigen::VectorXd score = n.g.tail(np) - back.transpose() * n.g.head(states);
+      spread += score * score.transpose();
+    }
+    if (!std::isfinite(result.objective)) result.objective = infinity;
+    result.information = h;
+    if (np == 0) return;
+    const NormalMatrix inverse = inverse_of(h);
+    const auto segments = static_cast<double>(normals_.size());
+    const double small_sample = segments > np + 1.0 ? segments / (segments - 1.0) : 2.0;
+    const NormalMatrix sandwich = inverse * spread * inverse * small_sample;
+    // Noise that is whiter than it looks must not shrink the interval below what the likelihood itself says.
+    result.covariance = sandwich;
+    for (Eigen::Index j = 0; j < np; ++j)
+      if (sandwich(j, j) < inverse(j, j)) {
+        const double stretch = std::sqrt(inverse(j, j) / std::max(sandwich(j, j), 1e-300));
+        result.covariance.row(j) *= stretch;
+        result.covariance.col(j) *= stretch;
+      }
+  }
+
+  const FitData& data_;
+  std::vector<FreeParameter> free_;
+  FitOptions options_;
+  FitPoint point_;
+  std::vector<std::vector<LinearStep>> steps_;
+  std::vector<Normal> normals_;
+  bool converged_ = false;
+};
+
+/// Least squares of a parabola over samples around k: value and slope there.
+std::pair<double, double> local_fit(const std::vector<double>& t, const std::vector<double>& y, std::size_t k,
+                                    std::size_t first, std::size_t last, double width_s) {
+  std::size_t a = k, b = k;
+  while (a > first && t[k] - t[a - 1] <= width_s) --a;
+  while (b < last && t[b + 1] - t[k] <= width_s) ++b;
+  while (b - a < 4 && (a > first || b < last)) {
+    if (a > first) --a;
+    if (b < last) ++b;
+  }
+  Eigen::Matrix3d h = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d g = Eigen::Vector3d::Zero();
+  bool constant = true;
+  for (std::size_t i = a; i <= b; ++i) {
+    const double u = (t[i] - t[k]) / width_s;
+    const Eigen::Vector3d basis(1.0, u, u * u);
+    h += basis * basis.transpose();
+    g += basis * (y[i] - y[k]);
+    constant = constant && y[i] == y[k];
+  }
+  if (constant) return {y[k], 0.0};
+  const Eigen::Vector3d fitted = (h + 1e-12 * Eigen::Matrix3d::Identity()).ldlt().solve(g);
+  return {y[k] + fitted[0], fitted[1] / width_s};
+}
+
+}  // namespace
+
+std::vector<Segment> cut_segments(const std::vector<Measurement>& runs, double longest_s) {
+  std::vector<Segment> segments;
+  for (std::size_t r = 0; r < runs.size(); ++r) {
+    const Measurement& run = runs[r];
+    const double period = run.median_period_s();
+    constexpr double largest_growth = 2.5;  // of the logarithm of an error
+    constexpr double upright_rate = 5.0;    // 1/s, of a pendulum of arm's length
+    double growth = 0.0;
+    std::size_t first = 0;
+    const auto close = [&](std::size_t last) {
+      if (last >= first + 8) segments.push_back({r, first, last});
+    };
+    for (std::size_t k = 1; k < run.size(); ++k) {
+      const bool gap = run.time_s[k] - run.time_s[k - 1] > 5.0 * period;
+      if (run.has_theta())
+        growth +=
+            upright_rate * std::max(0.0, std::cos(run.theta_rad[k])) * (run.time_s[k] - run.time_s[k - 1]);
+      if (gap) {
+        close(k - 1);
+        first = k;
+        growth = 0.0;
+      } else if (growth > largest_growth || run.time_s[k] - run.time_s[first] >= longest_s ||
+                 k + 1 == run.size()) {
+        close(k);
+        first = k;
+        growth = 0.0;
+      }
+    }
+  }
+  return segments;
+}
+
+std::vector<PlantState<double>> guess_starts(const std::vector<Measurement>& runs,
+                                             const std::vector<Segment>& segments, const Plant& plant) {
+  const PlantModel<double> model = make_model<double>(plant);
+  const Dynamics<double> dynamics(model);
+  std::vector<PlantState<double>> starts;
+  for (const Segment& segment : segments) {
+    const Measurement& run = runs[segment.run];
+    constexpr double width_s = 0.03;
+    PlantState<double> s;
+    // Unmeasured angle: hanging at rest.
+    s.theta_rad = plant.pendulum ? std::numbers::pi : 0.0;
+    if (run.has_cart())
+      std::tie(s.cart_m, s.cart_mps) =
+          local_fit(run.time_s, run.cart_m, segment.first, segment.first, segment.last, width_s);
+    if (run.has_theta() && plant.pendulum)
+      std::tie(s.theta_rad, s.theta_radps) =
+          local_fit(run.time_s, run.theta_rad, segment.first, segment.first, segment.last, width_s);
+    if (dynamics.has_bristle_state() && s.cart_mps != 0.0) {
+      const double direction = s.cart_mps > 0.0 ? 1.0 : -1.0;
+      s.bristle_m = direction * dynamics.cart_dry_level(s.cart_m, std::abs(s.cart_mps), direction) /
+                    dynamics.bristle_stiffness();
+    }
+    starts.push_back(s);
+  }
+  return starts;
+}
+
+FitResult fit(const FitData& data, const FitPoint& start, const std::vector<FreeParameter>& free,
+              const FitOptions& options) {
+  return Fitter(data, start, free, options).run();
+}
+
+std::vector<std::vector<LinearStep>> linearise(const FitData& data, const FitPoint& point) {
+  std::vector<std::vector<LinearStep>> steps(data.segments.size());
+  parallel_for(data.segments.size(), [&](std::size_t s) {
+    Normal unused;
+    linearise_segment<8>((*data.runs)[data.segments[s].run], data.segments[s], point, point.starts[s], {},
+                         false, steps[s], unused);
+  });
+  return steps;
+}
+
+double whitened_rms(const FitResult& result) {
+  double sum = 0.0;
+  double count = 0.0;
+  for (std::size_t s = 0; s < result.segment_chi_square.size(); ++s) {
+    sum += result.segment_chi_square[s];
+    count += static_cast<double>(result.segment_samples[s]);
+  }
+  return std::sqrt(sum / std::max(count, 1.0));
+}
+
+}  // namespace upright

@@ -1,0 +1,153 @@
+// `upright diagnose`: where model and data disagree, which effect is missing, the model with it.
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <iostream>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "commands.hpp"
+#include "options.hpp"
+#include "upright/analysis/diagnosis.hpp"
+#include "upright/analysis/diagnosis_json.hpp"
+#include "upright/model/error.hpp"
+#include "upright/model/plant_file.hpp"
+
+namespace upright::cli {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+struct DiagnoseFlags {
+  std::string model;
+  std::vector<std::string> data;
+  std::string out;
+  bool as_json = false;
+};
+
+std::string kind_of(std::size_t effect) {
+  return std::string(effect_registry()[effect].kind);
+}
+
+/// A bar on stderr, only where a person watches.
+void show_progress(double done, const std::string& what) {
+  constexpr int width = 30;
+  const int filled = static_cast<int>(std::clamp(done, 0.0, 1.0) * width);
+  std::fprintf(stderr, "\r[%s%s] %-44.44s", std::string(static_cast<std::size_t>(filled), '#').c_str(),
+               std::string(static_cast<std::size_t>(width - filled), '.').c_str(), what.c_str());
+  std::fflush(stderr);
+}
+
+std::string in_words(const ParameterEstimate& p) {
+  char text[160];
+  std::snprintf(text, sizeof text, "%s = %.5g %s (95%%: %.5g to %.5g)", p.name.c_str(), p.value,
+                p.unit.c_str(), p.low, p.high);
+  return text;
+}
+
+void print(const Diagnosis& d, const std::string& out) {
+  switch (d.verdict) {
+    case Verdict::explained:
+      std::printf("Explained: the model lacked what is listed here.\n");
+      break;
+    case Verdict::no_discrepancy:
+      std::printf("No discrepancy: the model says what the data say.\n");
+      break;
+    case Verdict::unexplained:
+      std::printf("Unexplained: something is missing that no known effect accounts for.\n");
+      break;
+    case Verdict::not_excited:
+      std::printf("Not excited: too little moves in these data to show anything.\n");
+      break;
+  }
+  std::printf("Gap on held-out data, in units of the noise: %.2f before, %.2f after.\n", d.gap_before,
+              d.gap_after);
+  for (const FoundEffect& effect : d.effects) {
+    std::printf("  %-28s gap %.2f -> %.2f\n", kind_of(effect.effect).c_str(), effect.gap_before,
+                effect.gap_after);
+    for (const ParameterEstimate& p : effect.parameters) std::printf("      %s\n", in_words(p).c_str());
+    if (!effect.where.empty()) std::printf("      %s\n", effect.where.c_str());
+    if (effect.confusable_with.empty()) continue;
+    std::string names;
+    for (const std::size_t other : effect.confusable_with)
+      names += (names.empty() ? "" : ", ") + kind_of(other);
+    std::printf("      these data cannot tell it from: %s\n", names.c_str());
+  }
+  std::printf("Remaining: %s.\n", d.residual.c_str());
+  if (d.next_experiment)
+    std::printf("Next run, to tell them apart: %s (%s).\n", d.next_experiment->name.c_str(),
+                d.next_experiment->description.c_str());
+  for (const std::string& note : d.notes) std::printf("Note: %s.\n", note.c_str());
+  if (!out.empty()) std::printf("Written: %s\n", out.c_str());
+}
+
+std::vector<std::string> provenance(const Diagnosis& d, const DiagnoseFlags& flags) {
+  std::vector<std::string> lines = {"Diagnosed from " + flags.model + " by upright " UPRIGHT_VERSION "."};
+  for (const std::string& data : flags.data) lines.push_back("data: " + data);
+  for (const FoundEffect& effect : d.effects) {
+    char text[200];
+    std::snprintf(text, sizeof text, "added %s: gap %.3g -> %.3g", kind_of(effect.effect).c_str(),
+                  effect.gap_before, effect.gap_after);
+    lines.emplace_back(text);
+  }
+  return lines;
+}
+
+void write_results(const Diagnosis& d, const DiagnoseFlags& flags) {
+  std::error_code problem;
+  fs::create_directories(flags.out, problem);
+  if (problem)
+    throw ConfigError("choose another folder with --out: cannot make " + flags.out + " (" +
+                      problem.message() + ")");
+  write_plant_file(d.model, fs::path(flags.out) / "model.yaml", provenance(d, flags));
+  const fs::path file = fs::path(flags.out) / "diagnosis.json";
+  std::ofstream json(file);
+  json << diagnosis_json(d).dump(2) << "\n";
+  json.close();
+  if (!json)
+    throw ConfigError("free some space or choose another folder with --out: cannot write " + file.string());
+}
+
+void run_diagnose(const DiagnoseFlags& flags) {
+  const Plant plant = read_plant_file(flags.model);
+  std::vector<Measurement> runs;
+  for (const std::string& data : flags.data) runs.push_back(read_measurement(data));
+  if (!flags.out.empty() && fs::exists(fs::path(flags.out) / "diagnosis.json"))
+    throw ConfigError("choose another folder with --out: " + flags.out + " holds a diagnosis already");
+  DiagnosisOptions options;
+  const bool watched = isatty(STDERR_FILENO) != 0;
+  if (watched) options.progress = show_progress;
+  const Diagnosis diagnosis = diagnose(plant, runs, options);
+  if (watched) std::fprintf(stderr, "\r%80s\r", "");
+  if (!flags.out.empty()) write_results(diagnosis, flags);
+  if (flags.as_json) {
+    std::cout << diagnosis_json(diagnosis).dump(2) << "\n";
+  } else {
+    print(diagnosis, flags.out);
+    std::fflush(stdout);
+  }
+  finish_output();
+}
+
+}  // namespace
+
+void add_diagnose(CLI::App& app, int&) {
+  CLI::App* command =
+      app.add_subcommand("diagnose", "Find the effect that a model lacks, from measured runs");
+  command->footer(
+      "Example:  upright diagnose --model config/plants/viscous.yaml --data runs/a runs/b --out diagnosis");
+  const auto flags = std::make_shared<DiagnoseFlags>();
+  command->add_option("--model", flags->model, "Plant file: what is believed of the rig")->required();
+  command->add_option("--data", flags->data, "Runs: run directories, CSV or dataset files")->required();
+  command->add_option("--out", flags->out, "Folder for diagnosis.json and model.yaml");
+  command->add_flag("--json", flags->as_json, "One JSON document on stdout");
+  command->callback([flags] { run_diagnose(*flags); });
+}
+
+}  // namespace upright::cli
