@@ -1,0 +1,91 @@
+#include "virtual_plant.hpp"
+
+#include "upright/model/error.hpp"
+#include "upright/model/plant_model.hpp"
+
+namespace upright {
+
+namespace {
+
+constexpr std::int64_t trace_every_ns = 1'000'000;
+constexpr std::int64_t flush_every_ns = 100'000'000;
+
+PlantState<double> resting_at(const Pose& pose) {
+  PlantState<double> state;
+  state.cart_m = pose.cart_m;
+  state.theta_rad = pose.theta_rad;
+  return state;
+}
+
+}  // namespace
+
+VirtualPlant::VirtualPlant(const RigFile& rig, const Plant& plant, const VirtualRigOptions& options)
+    : calibration_(rig.calibration),
+      limit_v_(rig.amplifier.limit_v),
+      initial_(resting_at({options.cart0_m, options.theta0_rad})),
+      simulator_(make_model<double>(plant)) {
+  simulator_.start(initial_);
+  if (options.trace.empty()) return;
+  trace_.open(options.trace);
+  if (!trace_) throw ConfigError("check the folder and its permissions: cannot write " + options.trace.string());
+  trace_ << "monotonic_s,voltage_v,cart_m,theta_rad,held\n";
+}
+
+void VirtualPlant::move_to(std::int64_t time_ns) {
+  if (!held_) simulator_.advance_to(seconds(time_ns));
+  now_ns_ = time_ns;
+}
+
+void VirtualPlant::advance_to(std::int64_t time_ns) {
+  if (voltage_v_ != 0.0 && expires_ns_ <= time_ns) {
+    move_to(std::max(expires_ns_, now_ns_));
+    command(0.0);
+  }
+  move_to(time_ns);
+}
+
+EncoderCounts VirtualPlant::counts() const {
+  const Outputs<double> seen = simulator_.engine().outputs();
+  return counts_at(Pose{seen.cart_m, seen.theta_rad}, calibration_);
+}
+
+void VirtualPlant::command(double voltage_v) {
+  const double safe_v = safe_voltage(voltage_v, limit_v_);
+  if (safe_v == voltage_v_) return;
+  trace(true);
+  voltage_v_ = safe_v;
+  if (!held_) simulator_.command(seconds(now_ns_), safe_v);
+  trace(true);
+}
+
+void VirtualPlant::feed(double watchdog_s) {
+  fed_ns_ = now_ns_;
+  expires_ns_ = now_ns_ + static_cast<std::int64_t>(watchdog_s * 1e9);
+}
+
+void VirtualPlant::let_go() {
+  if (!held_) return;
+  held_ = false;
+  let_go_ns_ = now_ns_;
+  simulator_.start(initial_, 0.0, 0.0);
+  simulator_.command(0.0, voltage_v_);
+}
+
+void VirtualPlant::put_back() {
+  command(0.0);
+  held_ = true;
+  simulator_.start(initial_);
+}
+
+void VirtualPlant::trace(bool now) {
+  if (!trace_.is_open() || (!now && now_ns_ - traced_ns_ < trace_every_ns)) return;
+  traced_ns_ = now_ns_;
+  const PlantState<double>& state = simulator_.engine().state();
+  trace_ << exact_text(static_cast<double>(now_ns_) * 1e-9) << ',' << exact_text(voltage_v_) << ','
+         << exact_text(state.cart_m) << ',' << exact_text(state.theta_rad) << ',' << (held_ ? 1 : 0) << '\n';
+  if (now_ns_ - flushed_ns_ < flush_every_ns) return;
+  flushed_ns_ = now_ns_;
+  trace_.flush();
+}
+
+}  // namespace upright

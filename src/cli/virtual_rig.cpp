@@ -1,0 +1,108 @@
+// `upright virtual-rig`: the plant in real time behind a real Modbus server.
+#include <csignal>
+#include <iostream>
+#include <memory>
+#include <numbers>
+#include <string>
+
+#include "commands.hpp"
+#include "upright/hal/virtual_rig.hpp"
+#include "upright/model/error.hpp"
+#include "upright/model/plant_file.hpp"
+
+namespace upright::cli {
+
+namespace {
+
+struct Flags {
+  std::string rig, tcp, rtu, plant, trace;
+  double theta0_deg = 0.0, duration_s = 0.0, late_ms = 0.0;
+  bool theta0_given = false;
+  bool no_pace = false;
+  InjectedFaults faults;
+};
+
+std::atomic<bool> stopped{false};
+
+void stop_on_signal(int) { stopped.store(true); }
+
+/// "HOST:PORT", ":PORT" or "PORT"; without a host the loopback.
+void take_address(const std::string& text, VirtualRigOptions& options) {
+  const std::size_t colon = text.rfind(':');
+  const std::string host = colon == std::string::npos ? "" : text.substr(0, colon);
+  const std::string port = colon == std::string::npos ? text : text.substr(colon + 1);
+  options.tcp_host = host.empty() ? "127.0.0.1" : host == "localhost" ? "127.0.0.1" : host;
+  const bool digits = !port.empty() && port.size() <= 5 && port.find_first_not_of("0123456789") == std::string::npos;
+  options.tcp_port = digits ? std::stoi(port) : -1;
+  if (options.tcp_port < 0 || options.tcp_port > 65535)
+    throw ConfigError("give --tcp HOST:PORT with a port from 0 (a free one) to 65535: '" + text + "' has none");
+}
+
+Plant plant_for(const Flags& flags, const RigFile& rig) {
+  if (!flags.plant.empty()) return read_plant_file(flags.plant);
+  if (rig.simulated) return read_plant_file(rig.simulated->plant);
+  throw ConfigError("give --plant, or add a simulated section with a plant: " + rig.file.string() +
+                    ":1: simulated.plant is missing");
+}
+
+void serve(const Flags& flags) {
+  const RigFile rig = read_rig_file(flags.rig);
+  VirtualRigOptions options;
+  if (flags.tcp.empty() == flags.rtu.empty())
+    throw ConfigError("give either --tcp HOST:PORT or --rtu TTY: virtual-rig serves one link");
+  if (!flags.tcp.empty()) take_address(flags.tcp, options);
+  options.serial_line = flags.rtu;
+  options.pace = !flags.no_pace;
+  if (rig.simulated) {
+    options.theta0_rad = rig.simulated->initial.theta_rad;
+    options.cart0_m = rig.simulated->initial.cart_m;
+  }
+  if (flags.theta0_given) options.theta0_rad = flags.theta0_deg * std::numbers::pi / 180.0;
+  options.trace = flags.trace;
+  options.duration_s = flags.duration_s;
+  options.faults = flags.faults;
+  options.faults.late_s = flags.late_ms * 1e-3;
+  options.listening = [](const std::string& name) { std::cout << "listening on " << name << std::endl; };
+  const Plant plant = plant_for(flags, rig);
+  std::signal(SIGINT, stop_on_signal);
+  std::signal(SIGTERM, stop_on_signal);
+  serve_virtual_rig(rig, plant, options, stopped);
+}
+
+}  // namespace
+
+void add_virtual_rig(CLI::App& app, int& exit_code) {
+  auto flags = std::make_shared<Flags>();
+  CLI::App* command = app.add_subcommand("virtual-rig", "Serve a plant in real time behind a Modbus server");
+  command->footer(
+      "Example: upright virtual-rig --rig config/rigs/modbus-tcp.yaml --tcp 127.0.0.1:1502 --theta0-deg 3\n"
+      "prints 'listening on 127.0.0.1:1502' and serves until interrupted. The pendulum is held until the\n"
+      "controller takes over. Faults are injected into replies from then on.");
+  command->add_option("--rig", flags->rig, "Rig file with the register map")->required();
+  command->add_option("--tcp", flags->tcp, "HOST:PORT to listen on; port 0 takes a free one");
+  command->add_option("--rtu", flags->rtu, "Serial line; where nothing exists, a pseudo-terminal gets this name");
+  CLI::Option* theta0 = command->add_option("--theta0-deg", flags->theta0_deg, "Initial angle, 0 upright")
+                            ->check(CLI::Range(-360.0, 360.0));
+  command->add_option("--plant", flags->plant, "Plant file, in place of the rig file's");
+  command->add_option("--trace", flags->trace, "CSV of the plant's side: time, voltage, position, angle");
+  command->add_option("--duration", flags->duration_s, "Seconds to serve; 0 until interrupted")
+      ->check(CLI::Range(0.0, 1e6));
+  command->add_flag("--no-pace", flags->no_pace, "Do not slow a pseudo-terminal down to its baud rate");
+  const auto every = CLI::Range(0, 1'000'000'000);
+  command->add_option("--inject-seed", flags->faults.seed, "Seed of the injected faults");
+  command->add_option("--inject-late-ms", flags->late_ms, "How late a late reply is")->check(CLI::Range(0.0, 1e5));
+  command->add_option("--inject-late-every", flags->faults.late_every, "One reply in N is late")->check(every);
+  command->add_option("--inject-drop-every", flags->faults.drop_every, "One reply in N is dropped")->check(every);
+  command->add_option("--inject-corrupt-every", flags->faults.corrupt_every, "One reply in N has a wrong bit")
+      ->check(every);
+  command->add_option("--inject-restart-after", flags->faults.restart_after_s,
+                      "Restart the device once, this many seconds after the controller took over")
+      ->check(CLI::Range(0.0, 1e6));
+  command->callback([flags, theta0, &exit_code] {
+    flags->theta0_given = theta0->count() > 0;
+    serve(*flags);
+    exit_code = static_cast<int>(ExitCode::done);
+  });
+}
+
+}  // namespace upright::cli
