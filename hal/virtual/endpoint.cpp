@@ -21,10 +21,13 @@ namespace upright {
 namespace {
 
 constexpr std::uint32_t partial_request_us = 20'000;  // a request that stops in the middle is given up
-constexpr std::uint32_t exception_pause_us = 100;     // libmodbus sleeps this long before it reports an exception
+constexpr std::uint32_t exception_pause_us =
+    100;  // libmodbus sleeps this long before it reports an exception
 constexpr int most_clients = 8;
 
-std::string reason() { return std::strerror(errno); }
+std::string reason() {
+  return std::strerror(errno);
+}
 
 void configure(modbus_t* context, int unit) {
   modbus_set_slave(context, unit);

@@ -27,7 +27,8 @@ VirtualPlant::VirtualPlant(const RigFile& rig, const Plant& plant, const Virtual
   simulator_.start(initial_);
   if (options.trace.empty()) return;
   trace_.open(options.trace);
-  if (!trace_) throw ConfigError("check the folder and its permissions: cannot write " + options.trace.string());
+  if (!trace_)
+    throw ConfigError("check the folder and its permissions: cannot write " + options.trace.string());
   trace_ << "monotonic_s,voltage_v,cart_m,theta_rad,held\n";
 }
 

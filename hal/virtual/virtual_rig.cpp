@@ -49,7 +49,8 @@ class Registers {
                               rig.boot_count_address.value_or(0), rig.watchdog ? rig.watchdog->address : 0})
       last = std::max(last, address);
     const auto count = static_cast<unsigned>(last) + 1;
-    mapping_.reset(modbus_mapping_new_start_address(0, 0, 0, 0, 0, count, 0, rig.input_registers ? count : 0));
+    mapping_.reset(
+        modbus_mapping_new_start_address(0, 0, 0, 0, 0, count, 0, rig.input_registers ? count : 0));
     if (!mapping_) throw DeviceError("free some memory: no registers could be made");
   }
 
@@ -59,7 +60,8 @@ class Registers {
     std::uint16_t* table = config_.input_registers ? mapping_->tab_input_registers : mapping_->tab_registers;
     encode_counter(counts.cart, config_.counter, {table + config_.cart_address, 2});
     encode_counter(counts.pendulum, config_.counter, {table + config_.pendulum_address, 2});
-    if (config_.boot_count_address) table[*config_.boot_count_address] = static_cast<std::uint16_t>(boot_count);
+    if (config_.boot_count_address)
+      table[*config_.boot_count_address] = static_cast<std::uint16_t>(boot_count);
   }
   double voltage_v() const {
     return decode_voltage({mapping_->tab_registers + config_.voltage_address, 2}, config_.voltage);
@@ -72,7 +74,8 @@ class Registers {
     return mapping_->tab_registers[config_.watchdog->address] * config_.watchdog->seconds_per_count;
   }
   void clear_voltage() {
-    for (int i = 0; i < config_.voltage.registers(); ++i) mapping_->tab_registers[config_.voltage_address + i] = 0;
+    for (int i = 0; i < config_.voltage.registers(); ++i)
+      mapping_->tab_registers[config_.voltage_address + i] = 0;
   }
   /// As after power-up.
   void reset() {
@@ -153,7 +156,8 @@ class Server {
 
   void accept_clients() {
     while (endpoint_.accept_client())
-      if (!plant_.held() && motor_off() && registers_.has_enable() && !registers_.enabled()) plant_.put_back();
+      if (!plant_.held() && motor_off() && registers_.has_enable() && !registers_.enabled())
+        plant_.put_back();
   }
 
   static bool has_request(const Peer& peer) {
@@ -229,10 +233,9 @@ class Server {
     for (Peer& peer : endpoint_.peers()) {
       while (!peer.replies.empty() && peer.replies.front().leaves_ns <= now_ns()) {
         const std::vector<std::uint8_t>& bytes = peer.replies.front().bytes;
-        const ssize_t sent = endpoint_.serial()
-                                 ? ::write(peer.descriptor.get(), bytes.data(), bytes.size())
-                                 : ::send(peer.descriptor.get(), bytes.data(), bytes.size(),
-                                          MSG_NOSIGNAL | MSG_DONTWAIT);
+        const ssize_t sent = endpoint_.serial() ? ::write(peer.descriptor.get(), bytes.data(), bytes.size())
+                                                : ::send(peer.descriptor.get(), bytes.data(), bytes.size(),
+                                                         MSG_NOSIGNAL | MSG_DONTWAIT);
         if (sent < 0 && !endpoint_.serial()) peer.gone = true;
         peer.replies.pop_front();
       }

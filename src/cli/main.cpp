@@ -93,6 +93,7 @@ int run(int argc, char** argv) {
   upright::cli::add_check(app, exit_code);
   upright::cli::add_sweep(app, exit_code);
   upright::cli::add_design(app, exit_code);
+  upright::cli::add_virtual_rig(app, exit_code);
   try {
     app.parse(argc, argv);
     upright::cli::finish_output();

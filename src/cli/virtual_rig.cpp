@@ -1,4 +1,6 @@
 // `upright virtual-rig`: the plant in real time behind a real Modbus server.
+#include "upright/hal/virtual_rig.hpp"
+
 #include <csignal>
 #include <iostream>
 #include <memory>
@@ -6,7 +8,6 @@
 #include <string>
 
 #include "commands.hpp"
-#include "upright/hal/virtual_rig.hpp"
 #include "upright/model/error.hpp"
 #include "upright/model/plant_file.hpp"
 
@@ -24,7 +25,9 @@ struct Flags {
 
 std::atomic<bool> stopped{false};
 
-void stop_on_signal(int) { stopped.store(true); }
+void stop_on_signal(int) {
+  stopped.store(true);
+}
 
 /// "HOST:PORT", ":PORT" or "PORT"; without a host the loopback.
 void take_address(const std::string& text, VirtualRigOptions& options) {
@@ -32,10 +35,12 @@ void take_address(const std::string& text, VirtualRigOptions& options) {
   const std::string host = colon == std::string::npos ? "" : text.substr(0, colon);
   const std::string port = colon == std::string::npos ? text : text.substr(colon + 1);
   options.tcp_host = host.empty() ? "127.0.0.1" : host == "localhost" ? "127.0.0.1" : host;
-  const bool digits = !port.empty() && port.size() <= 5 && port.find_first_not_of("0123456789") == std::string::npos;
+  const bool digits =
+      !port.empty() && port.size() <= 5 && port.find_first_not_of("0123456789") == std::string::npos;
   options.tcp_port = digits ? std::stoi(port) : -1;
   if (options.tcp_port < 0 || options.tcp_port > 65535)
-    throw ConfigError("give --tcp HOST:PORT with a port from 0 (a free one) to 65535: '" + text + "' has none");
+    throw ConfigError("give --tcp HOST:PORT with a port from 0 (a free one) to 65535: '" + text +
+                      "' has none");
 }
 
 Plant plant_for(const Flags& flags, const RigFile& rig) {
@@ -80,7 +85,8 @@ void add_virtual_rig(CLI::App& app, int& exit_code) {
       "controller takes over. Faults are injected into replies from then on.");
   command->add_option("--rig", flags->rig, "Rig file with the register map")->required();
   command->add_option("--tcp", flags->tcp, "HOST:PORT to listen on; port 0 takes a free one");
-  command->add_option("--rtu", flags->rtu, "Serial line; where nothing exists, a pseudo-terminal gets this name");
+  command->add_option("--rtu", flags->rtu,
+                      "Serial line; where nothing exists, a pseudo-terminal gets this name");
   CLI::Option* theta0 = command->add_option("--theta0-deg", flags->theta0_deg, "Initial angle, 0 upright")
                             ->check(CLI::Range(-360.0, 360.0));
   command->add_option("--plant", flags->plant, "Plant file, in place of the rig file's");
@@ -90,13 +96,17 @@ void add_virtual_rig(CLI::App& app, int& exit_code) {
   command->add_flag("--no-pace", flags->no_pace, "Do not slow a pseudo-terminal down to its baud rate");
   const auto every = CLI::Range(0, 1'000'000'000);
   command->add_option("--inject-seed", flags->faults.seed, "Seed of the injected faults");
-  command->add_option("--inject-late-ms", flags->late_ms, "How late a late reply is")->check(CLI::Range(0.0, 1e5));
-  command->add_option("--inject-late-every", flags->faults.late_every, "One reply in N is late")->check(every);
-  command->add_option("--inject-drop-every", flags->faults.drop_every, "One reply in N is dropped")->check(every);
+  command->add_option("--inject-late-ms", flags->late_ms, "How late a late reply is")
+      ->check(CLI::Range(0.0, 1e5));
+  command->add_option("--inject-late-every", flags->faults.late_every, "One reply in N is late")
+      ->check(every);
+  command->add_option("--inject-drop-every", flags->faults.drop_every, "One reply in N is dropped")
+      ->check(every);
   command->add_option("--inject-corrupt-every", flags->faults.corrupt_every, "One reply in N has a wrong bit")
       ->check(every);
-  command->add_option("--inject-restart-after", flags->faults.restart_after_s,
-                      "Restart the device once, this many seconds after the controller took over")
+  command
+      ->add_option("--inject-restart-after", flags->faults.restart_after_s,
+                   "Restart the device once, this many seconds after the controller took over")
       ->check(CLI::Range(0.0, 1e6));
   command->callback([flags, theta0, &exit_code] {
     flags->theta0_given = theta0->count() > 0;

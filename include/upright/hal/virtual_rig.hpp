@@ -1,11 +1,12 @@
-// The virtual rig: the plant in real time behind a real Modbus server, over TCP or a serial line, with the faults that
-// a link can have on request.
+// The virtual rig: the plant in real time behind a real Modbus server, over TCP or a serial line, with the
+// faults that a link can have on request.
 //
-// The pendulum and the cart are held at their initial pose, as an operator would, until the controller takes over: the
-// first command that is not zero volts, or the amplifier being enabled where the rig has a register for that. When a
-// controller that had gone, leaving the motor off, comes back, the operator has put the pendulum back.
-// A voltage acts from the moment its request arrived until the next, or until no valid request came for the watchdog's
-// time; then the motor is at zero volts. The watchdog's time is what the master programmed, the rig file's until then.
+// The pendulum and the cart are held at their initial pose, as an operator would, until the controller takes
+// over: the first command that is not zero volts, or the amplifier being enabled where the rig has a register
+// for that. When a controller that had gone, leaving the motor off, comes back, the operator has put the
+// pendulum back. A voltage acts from the moment its request arrived until the next, or until no valid request
+// came for the watchdog's time; then the motor is at zero volts. The watchdog's time is what the master
+// programmed, the rig file's until then.
 #pragma once
 
 #include <atomic>
@@ -19,25 +20,28 @@
 
 namespace upright {
 
-/// Faults of the link, from when the pendulum is let go. Each reply is hit with probability 1/every; 0 is never.
+/// Faults of the link, from when the pendulum is let go. Each reply is hit with probability 1/every; 0 is
+/// never.
 struct InjectedFaults {
   std::uint64_t seed = 1;
   int late_every = 0;
   double late_s = 0.0;
   int drop_every = 0;
-  int corrupt_every = 0;         ///< one bit of a reply is wrong
-  double restart_after_s = 0.0;  ///< the device restarts once, this long after the pendulum was let go; 0 is never
+  int corrupt_every = 0;  ///< one bit of a reply is wrong
+  double restart_after_s =
+      0.0;  ///< the device restarts once, this long after the pendulum was let go; 0 is never
 };
 
 struct VirtualRigOptions {
-  std::string tcp_host;      ///< empty: a serial line
-  int tcp_port = 0;          ///< 0: a free one
-  std::string serial_line;   ///< a terminal; where nothing exists, a new pseudo-terminal gets this name
-  bool pace = true;          ///< a pseudo-terminal takes as long as its baud rate says
+  std::string tcp_host;     ///< empty: a serial line
+  int tcp_port = 0;         ///< 0: a free one
+  std::string serial_line;  ///< a terminal; where nothing exists, a new pseudo-terminal gets this name
+  bool pace = true;         ///< a pseudo-terminal takes as long as its baud rate says
   double theta0_rad = 0.0;
   double cart0_m = 0.0;
-  std::filesystem::path trace;  ///< CSV of the plant's side: monotonic_s,voltage_v,cart_m,theta_rad,held; empty: none
-  double duration_s = 0.0;      ///< 0: until stopped
+  std::filesystem::path
+      trace;  ///< CSV of the plant's side: monotonic_s,voltage_v,cart_m,theta_rad,held; empty: none
+  double duration_s = 0.0;  ///< 0: until stopped
   InjectedFaults faults;
   std::function<void(const std::string&)> listening;  ///< called once with "HOST:PORT" or the line's name
 };
