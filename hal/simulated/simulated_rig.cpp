@@ -1,0 +1,109 @@
+#include "upright/hal/simulated_rig.hpp"
+
+#include <cmath>
+#include <random>
+
+#include "upright/model/error.hpp"
+#include "upright/model/plant_file.hpp"
+#include "upright/sim/simulator.hpp"
+
+namespace upright {
+
+namespace {
+
+PlantState<double> initial_state(const SimulatedRig& rig, const std::optional<double>& theta0_rad) {
+  PlantState<double> state;
+  state.cart_m = rig.initial.cart_m;
+  state.theta_rad = theta0_rad.value_or(rig.initial.theta_rad);
+  state.cart_mps = rig.initial_cart_mps;
+  state.theta_radps = rig.initial_theta_radps;
+  return state;
+}
+
+class SimulatedPlantRig final : public Rig {
+ public:
+  SimulatedPlantRig(const RigFile& rig, const Plant& plant, Clock& clock, const SimulatedRigOptions& options)
+      : calibration_(calibration_in_use(rig)),
+        config_(*rig.simulated),
+        limit_v_(rig.amplifier.limit_v),
+        clock_(clock),
+        seed_(options.seed),
+        initial_(initial_state(config_, options.theta0_rad)),
+        simulator_(make_model<double>(plant)) {}
+
+  void open() override {
+    random_.seed(seed_);
+    normal_.reset();
+    sequence_ = 0;
+    held_ = true;
+    simulator_.start(initial_);
+  }
+
+  RigReading read() noexcept override {
+    std::int64_t now = clock_.now_ns();
+    if (config_.timing_jitter_s > 0.0) {
+      const double late_s = std::abs(normal_(random_)) * config_.timing_jitter_s;
+      clock_.sleep_until(now + static_cast<std::int64_t>(late_s * 1e9));
+      now = clock_.now_ns();
+    }
+    advance_to(now);
+    const Outputs<double> seen = simulator_.engine().outputs();
+    Pose pose{seen.cart_m, seen.theta_rad};
+    if (config_.cart_noise_m > 0.0) pose.cart_m += config_.cart_noise_m * normal_(random_);
+    if (config_.theta_noise_rad > 0.0) pose.theta_rad += config_.theta_noise_rad * normal_(random_);
+    const EncoderCounts counts = counts_at(pose, calibration_);
+    RigReading reading;
+    reading.cart_counts = counts.cart;
+    reading.pendulum_counts = counts.pendulum;
+    reading.time_ns = now;
+    reading.sequence = ++sequence_;
+    reading.status = RigStatus::fresh;
+    return reading;
+  }
+
+  RigFault write(double voltage_v) noexcept override {
+    const std::int64_t now = clock_.now_ns();
+    if (held_) {
+      held_ = false;
+      start_ns_ = now;
+    }
+    advance_to(now);
+    simulator_.command(seconds_at(now), safe_voltage(voltage_v, limit_v_));
+    return std::isfinite(voltage_v) ? RigFault::none : RigFault::not_finite;
+  }
+
+  void stop() noexcept override {
+    if (!held_) write(0.0);
+  }
+
+ private:
+  double seconds_at(std::int64_t now_ns) const noexcept {
+    return static_cast<double>(now_ns - start_ns_) / 1e9;
+  }
+  void advance_to(std::int64_t now_ns) noexcept {
+    if (!held_) simulator_.advance_to(seconds_at(now_ns));
+  }
+
+  Calibration calibration_;
+  SimulatedRig config_;
+  double limit_v_;
+  Clock& clock_;
+  std::uint64_t seed_;
+  PlantState<double> initial_;
+  Simulator<double> simulator_;
+  std::mt19937_64 random_;
+  std::normal_distribution<double> normal_;
+  std::uint64_t sequence_ = 0;
+  std::int64_t start_ns_ = 0;
+  bool held_ = true;
+};
+
+}  // namespace
+
+std::unique_ptr<Rig> make_simulated_rig(const RigFile& rig, Clock& clock,
+                                        const SimulatedRigOptions& options) {
+  if (!rig.simulated) throw ConfigError("add the section simulated: " + rig.file.string() + " has none");
+  return std::make_unique<SimulatedPlantRig>(rig, read_plant_file(rig.simulated->plant), clock, options);
+}
+
+}  // namespace upright

@@ -1,0 +1,118 @@
+// The fixed-rate loop: read, compute, write at once, log, sleep. One function for every rig, real or
+// simulated.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <string>
+
+#include "upright/control/controller.hpp"
+#include "upright/hal/calibration.hpp"
+#include "upright/hal/clock.hpp"
+#include "upright/hal/rig.hpp"
+#include "upright/runtime/run_log.hpp"
+#include "upright/runtime/sleep_policy.hpp"
+#include "upright/runtime/timing_stats.hpp"
+
+namespace upright {
+
+/// Why a run ended. Everything but `duration` is a safety stop, which is latched: the loop does not go on.
+enum class StopReason : std::uint8_t {
+  duration,  ///< the asked-for time is over
+  signal,
+  not_finite,
+  stale_encoder,
+  link_lost,
+  rig_fault,
+  track_limit,
+  fell,
+  overrun,
+  emergency_stop,
+  log_failed,
+};
+
+/// "duration", "signal", "not_finite", ...
+const char* name_of(StopReason reason) noexcept;
+
+struct LoopLimits {
+  std::uint64_t periods = 0;    ///< rows of a complete run
+  double track_limit_m = 0.0;   ///< stop where |x| reaches it
+  double fall_angle_rad = 0.0;  ///< stop where |theta| reaches it
+  /// Stop when there was no fresh reading, or no good write, for longer than this.
+  double watchdog_s = 0.0;
+  /// Stop when more periods than this in a row ended late or were missed.
+  std::uint64_t most_periods_late = 0;
+};
+
+/// The latest of the loop, for whoever shows it. Written by the loop, read by others; each field for itself.
+struct LiveStatus {
+  std::atomic<double> time_s{0.0}, cart_m{0.0}, theta_rad{0.0}, voltage_v{0.0}, worst_late_us{0.0};
+  std::atomic<bool> running{false};
+};
+
+struct LoopCounts {
+  std::uint64_t periods = 0;  ///< cycles that ran
+  std::uint64_t fresh = 0, stale = 0, faults = 0;
+  std::uint64_t missed = 0;  ///< periods that passed without a cycle
+  std::uint64_t overruns_wake = 0, overruns_read = 0, overruns_compute = 0, overruns_write = 0;
+  std::uint64_t saturated = 0, writes_failed = 0;
+};
+
+struct LoopOutcome {
+  StopReason reason = StopReason::duration;
+  RigFault fault = RigFault::none;  ///< behind a stop by the rig or the link
+  int signal = 0;
+  std::uint64_t tick = 0;            ///< cycle in which the run ended
+  std::uint64_t first_bad_tick = 0;  ///< of the trouble that ended it
+  double time_s = 0.0;               ///< at the end
+  double worst_theta_rad = 0.0;      ///< largest |theta|
+  double worst_cart_m = 0.0;         ///< largest |x|
+  double last_theta_rad = 0.0, last_cart_m = 0.0;
+  LoopCounts counts;
+  DurationHistogram wake_late, read, compute, write, cycle;
+};
+
+/// One sentence: what ended the run, the first bad cycle and what to do.
+std::string sentence_of(const LoopOutcome& outcome, const LoopLimits& limits);
+
+/// Set by a signal handler: the signal's number, or 0.
+using SignalFlag = std::atomic<int>;
+
+/// Runs until the periods are over or a safety stop. The rig is open; when this returns it has been stopped.
+/// Neither allocates, locks nor throws from the first cycle on, except that in virtual time it waits for the
+/// log.
+class ControlLoop {
+ public:
+  ControlLoop(Rig& rig, Clock& clock, Controller& controller, PoseScaler& scaler, RunLog& log,
+              const LoopLimits& limits, const SignalFlag& signal, LiveStatus& live);
+
+  /// `outcome` is filled in while the loop runs.
+  void run(LoopOutcome& outcome) noexcept;
+
+ private:
+  void stop(LoopOutcome& outcome, StopReason reason, std::uint64_t first_bad) noexcept;
+  void run_cycle(const Wake& wake, std::int64_t woke_ns, LoopOutcome& outcome) noexcept;
+  bool accept(const RigReading& reading, const Wake& wake, LoopOutcome& outcome) noexcept;
+  void compute(const Wake& wake, LoopOutcome& outcome) noexcept;
+  void write(const Wake& wake, LoopOutcome& outcome) noexcept;
+  void attribute_overrun(const Wake& wake, std::int64_t end_ns, LoopOutcome& outcome) noexcept;
+  void show(const LoopOutcome& outcome) noexcept;
+
+  Rig& rig_;
+  Clock& clock_;
+  Controller& controller_;
+  PoseScaler& scaler_;
+  RunLog& log_;
+  LoopLimits limits_;
+  const SignalFlag& signal_;
+  LiveStatus& live_;
+
+  LoopPhase phase_;
+  LogRecord row_;  ///< the latest: a cycle without fresh counts repeats its pose and voltage
+  std::int64_t watchdog_ns_ = 0, last_fresh_ns_ = 0, last_write_ns_ = 0, read_done_ns_ = 0;
+  std::uint64_t first_held_tick_ = 0, first_unwritten_tick_ = 0, first_late_tick_ = 0, periods_late_ = 0;
+  RigFault last_fault_ = RigFault::none;
+  bool held_ = false, unwritten_ = false, begun_ = false, stopped_ = false;
+};
+
+}  // namespace upright

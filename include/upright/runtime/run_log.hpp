@@ -1,0 +1,69 @@
+// From the loop to samples.csv: a lock-free queue, a thread that writes and a thread that syncs.
+#pragma once
+
+#include <atomic>
+#include <boost/lockfree/spsc_queue.hpp>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <thread>
+
+#include "upright/runtime/log_record.hpp"
+
+namespace upright {
+
+/// Longest a row takes as text, with its end of line.
+inline constexpr std::size_t longest_row = 512;
+
+/// Writes a row as text that reads back to the same bits; returns its length (at most `longest_row`).
+std::size_t format_row(const LogRecord& record, char* out) noexcept;
+
+/// Owns samples.csv. A row is in the kernel within about 20 ms of `push` and asked onto the disk every 50 ms,
+/// each by its own thread, so that a slow disk delays neither the loop nor the writing.
+class RunLog {
+ public:
+  struct Options {
+    std::size_t queue_rows = 16384;
+    /// False: only once at the end (virtual time, where nothing but the simulation is lost).
+    bool sync_while_running = true;
+  };
+
+  /// Creates the file with its header line. Throws Error when that fails.
+  RunLog(const std::filesystem::path& file, const Options& options);
+  ~RunLog();
+  RunLog(const RunLog&) = delete;
+  RunLog& operator=(const RunLog&) = delete;
+
+  /// From the loop: false, and counted, when the queue is full.
+  bool push(const LogRecord& record) noexcept;
+  /// From a loop in virtual time: waits for room, so that no row is dropped.
+  void push_waiting(const LogRecord& record) noexcept;
+  /// True once a write failed: no further row will arrive. `failure` says why.
+  bool failed() const noexcept { return error_.load(std::memory_order_relaxed) != 0; }
+
+  /// Writes what is queued, syncs and closes. Safe to call twice.
+  void close() noexcept;
+  std::uint64_t rows_written() const noexcept { return rows_.load(std::memory_order_relaxed); }
+  std::uint64_t rows_dropped() const noexcept { return dropped_.load(std::memory_order_relaxed); }
+  /// Empty, or why the log ended early, remedy first.
+  std::string failure() const;
+
+ private:
+  void write_loop() noexcept;
+  void sync_loop() noexcept;
+  /// Writes text that ends with a whole row; on failure cuts the file back to whole rows.
+  bool write_all(const char* text, std::size_t size) noexcept;
+
+  std::filesystem::path file_;
+  Options options_;
+  int fd_ = -1;
+  boost::lockfree::spsc_queue<LogRecord> queue_;
+  std::atomic<std::uint64_t> rows_{0}, dropped_{0};
+  std::atomic<int> error_{0};
+  std::atomic<bool> closing_{false}, unsynced_{false};
+  std::int64_t size_ = 0;
+  std::thread writer_, syncer_;
+};
+
+}  // namespace upright

@@ -1,0 +1,46 @@
+// A run from its first file to its last: run directory, log, loop thread, outcome.
+#pragma once
+
+#include <atomic>
+#include <filesystem>
+#include <functional>
+#include <memory>
+
+#include "upright/hal/clock.hpp"
+#include "upright/hal/rig.hpp"
+#include "upright/runtime/control_loop.hpp"
+#include "upright/runtime/run_directory.hpp"
+
+namespace upright {
+
+/// The default of LoopLimits::most_periods_late: so many periods as make 50 ms, at least 3. Well above the
+/// hiccups of a kernel without real-time scheduling, well below the time in which the pendulum falls.
+std::uint64_t default_periods_late(double period_s);
+
+struct SessionOptions {
+  std::filesystem::path out = "runs";  ///< the folder that run directories go to
+  RealtimeRequest realtime;            ///< not asked for in virtual time
+  std::unique_ptr<DelayCompensator> compensator;
+  /// Called about five times per second from the calling thread while the loop runs; may be empty.
+  std::function<void(const LiveStatus&)> show;
+};
+
+struct SessionResult {
+  std::filesystem::path directory;
+  LoopOutcome outcome;
+  LogSummary log;
+  RealtimeGrant scheduling;
+  bool outcome_written = false;
+  double elapsed_s = 0.0;  ///< of the machine's time
+};
+
+/// Makes zero counts of a calibration that takes its zero at the start: reads the rig until it has fresh
+/// counts. The rig is open. Throws DeviceError when there are none within `patience_s`.
+void find_zero(Rig& rig, Clock& clock, RigFile& file, double patience_s);
+
+/// Runs the loop of `setup` on a rig that is open, and leaves a complete run directory. The rig is stopped
+/// when this returns or throws.
+SessionResult run_session(RunSetup setup, Rig& rig, Clock& clock, const SignalFlag& signal,
+                          SessionOptions options);
+
+}  // namespace upright

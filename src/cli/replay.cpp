@@ -1,0 +1,77 @@
+// `upright replay`: feeds a run's counts through its controller again.
+#include "upright/runtime/replay.hpp"
+
+#include <cstdio>
+#include <iostream>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "commands.hpp"
+#include "upright/model/error.hpp"
+#include "upright/model/yaml_reader.hpp"
+
+namespace upright::cli {
+
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json json_of(const RunRecord& run, const ReplayResult& result) {
+  Json document{{"run_directory", run.path.string()},
+                {"exact", !result.first_mismatch.has_value()},
+                {"rows", result.rows},
+                {"truncated", run.samples.truncated},
+                {"first_mismatch", nullptr}};
+  if (result.first_mismatch) {
+    const ReplayMismatch& m = *result.first_mismatch;
+    document["first_mismatch"] = {{"tick", m.tick},
+                                  {"logged_requested_v", m.logged_requested_v},
+                                  {"computed_requested_v", m.computed_requested_v},
+                                  {"logged_v", m.logged_v},
+                                  {"computed_v", m.computed_v}};
+  }
+  return document;
+}
+
+void print(const RunRecord& run, const ReplayResult& result) {
+  if (result.first_mismatch) {
+    const ReplayMismatch& m = *result.first_mismatch;
+    std::cout << "Differs first at tick " << m.tick << ": the log has " << exact_text(m.logged_v)
+              << " V (requested " << exact_text(m.logged_requested_v) << " V), the controller gives "
+              << exact_text(m.computed_v) << " V (requested " << exact_text(m.computed_requested_v)
+              << " V).\n";
+    if (result.first_lost_tick && *result.first_lost_tick <= m.tick)
+      std::cout << "The log lost rows before tick " << *result.first_lost_tick << ".\n";
+    return;
+  }
+  std::cout << "All " << result.rows << " voltages came out bit for bit.\n";
+  if (run.samples.truncated) std::cout << "The last line of the log was cut and left out.\n";
+}
+
+ExitCode replay_run(const std::string& directory, bool as_json) {
+  const RunRecord run = read_run(directory);
+  const ReplayResult result = replay(run);
+  if (as_json)
+    std::cout << json_of(run, result).dump(2, ' ', false, Json::error_handler_t::replace) << "\n";
+  else
+    print(run, result);
+  return result.first_mismatch ? ExitCode::stopped : ExitCode::done;
+}
+
+}  // namespace
+
+void add_replay(CLI::App& app, int& exit_code) {
+  CLI::App* command = app.add_subcommand(
+      "replay", "Feed a run's counts through its controller: the voltages must come out bit for bit");
+  command->footer(
+      "Example:  upright replay runs/20260101T120000Z-run\n"
+      "Exit code 3 when a voltage differs.");
+  const auto directory = std::make_shared<std::string>();
+  const auto as_json = std::make_shared<bool>(false);
+  command->add_option("run", *directory, "The run directory")->required();
+  command->add_flag("--json", *as_json, "One JSON document");
+  command->callback(
+      [directory, as_json, &exit_code] { exit_code = static_cast<int>(replay_run(*directory, *as_json)); });
+}
+
+}  // namespace upright::cli

@@ -1,0 +1,251 @@
+// `upright run`: closes the loop on a rig and leaves a run directory.
+#include <signal.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <fstream>
+#include <iostream>
+#include <iterator>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <numbers>
+#include <string>
+
+#include "commands.hpp"
+#include "options.hpp"
+#include "upright/hal/rig_factory.hpp"
+#include "upright/hal/simulated_rig.hpp"
+#include "upright/model/error.hpp"
+#include "upright/model/plant_file.hpp"
+#include "upright/runtime/session.hpp"
+
+namespace upright::cli {
+
+namespace {
+
+constexpr double degrees_per_rad = 180.0 / std::numbers::pi;
+
+struct Arguments {
+  std::string rig, gains, out = "runs", label = "run";
+  std::optional<double> delay_s, theta0_deg;
+  double duration_s = 10.0;
+  std::optional<std::uint64_t> seed;
+  int priority = RealtimeRequest{}.priority, cpu = RealtimeRequest{}.cpu;
+  bool fast = false, as_json = false;
+};
+
+SignalFlag caught_signal{0};
+static_assert(SignalFlag::is_always_lock_free);
+
+void note_signal(int number) {
+  caught_signal.store(number, std::memory_order_relaxed);
+}
+
+void catch_signals() {
+  struct sigaction action {};
+  action.sa_handler = note_signal;
+  for (const int number : {SIGINT, SIGTERM, SIGHUP}) sigaction(number, &action, nullptr);
+  // A file size limit shall be a failed write, which stops the motor, not the end of the process.
+  action.sa_handler = SIG_IGN;
+  sigaction(SIGXFSZ, &action, nullptr);
+}
+
+bool is_simulated(const RigFile& rig) {
+  return rig.encoders == Backend::simulated && rig.output == Backend::simulated;
+}
+
+void refuse_what_only_simulation_can(const Arguments& arguments) {
+  const std::string why = ": " + arguments.rig + " is not a simulated rig";
+  if (arguments.fast) throw ConfigError("remove --fast, or name a simulated rig" + why);
+  if (arguments.theta0_deg) throw ConfigError("remove --theta0-deg, or name a simulated rig" + why);
+  if (arguments.seed) throw ConfigError("remove --seed, or name a simulated rig" + why);
+}
+
+/// The command as it was typed.
+std::string command_line() {
+  std::ifstream in("/proc/self/cmdline", std::ios::binary);
+  std::string text((std::istreambuf_iterator<char>(in)), std::istreambuf_iterator<char>());
+  while (!text.empty() && text.back() == '\0') text.pop_back();
+  std::replace(text.begin(), text.end(), '\0', ' ');
+  return text;
+}
+
+RunSetup make_setup(const Arguments& arguments) {
+  RunSetup setup;
+  setup.command = command_line();
+  setup.label = arguments.label;
+  setup.duration_s = arguments.duration_s;
+  setup.fast = arguments.fast;
+  setup.seed = arguments.seed.value_or(1);
+  setup.control = read_gain_file(arguments.gains);
+  if (arguments.delay_s) setup.control.delay_s = *arguments.delay_s;
+  setup.rig = read_rig_file(arguments.rig);
+  if (is_simulated(setup.rig))
+    setup.plant = read_plant_file(setup.rig.simulated->plant);
+  else
+    refuse_what_only_simulation_can(arguments);
+  if (arguments.theta0_deg) setup.theta0_rad = *arguments.theta0_deg / degrees_per_rad;
+  setup.limits.periods =
+      static_cast<std::uint64_t>(std::llround(arguments.duration_s * setup.control.sample_rate_hz));
+  setup.limits.track_limit_m = setup.rig.track_limit_m;
+  setup.limits.fall_angle_rad = setup.rig.fall_angle_rad;
+  setup.limits.watchdog_s = setup.rig.watchdog_s;
+  setup.limits.most_periods_late = default_periods_late(setup.control.period_s());
+  return setup;
+}
+
+std::unique_ptr<Rig> make(const RunSetup& setup, Clock& clock) {
+  if (is_simulated(setup.rig)) return make_simulated_rig(setup.rig, clock, {setup.seed, setup.theta0_rad});
+  return make_rig(setup.rig, {setup.control.period_s()});
+}
+
+void show_live(const LiveStatus& live) {
+  std::fprintf(stderr, "\r%8.1f s  angle %+7.2f deg  %+6.2f V  worst lateness %7.0f us ", live.time_s.load(),
+               live.theta_rad.load() * degrees_per_rad, live.voltage_v.load(), live.worst_late_us.load());
+}
+
+using Json = nlohmann::ordered_json;
+
+Json json_of(const DurationHistogram& h) {
+  return {{"mean_us", h.mean_us()},
+          {"p50_us", h.quantile_us(0.5)},
+          {"p99_us", h.quantile_us(0.99)},
+          {"p99_9_us", h.quantile_us(0.999)},
+          {"max_us", h.max_us()}};
+}
+
+Json json_of(const SessionResult& result, const LoopLimits& limits) {
+  const LoopOutcome& o = result.outcome;
+  const LoopCounts& c = o.counts;
+  return {{"run_directory", result.directory.string()},
+          {"outcome", result_of(o)},
+          {"reason", name_of(o.reason)},
+          {"sentence", sentence_of(o, limits)},
+          {"stayed_up", o.reason == StopReason::duration},
+          {"time_s", o.time_s},
+          {"tick", o.first_bad_tick},
+          {"worst_theta_rad", o.worst_theta_rad},
+          {"worst_cart_m", o.worst_cart_m},
+          {"rows_written", result.log.rows_written},
+          {"rows_dropped", result.log.rows_dropped},
+          {"counts",
+           {{"periods", c.periods},
+            {"fresh", c.fresh},
+            {"stale", c.stale},
+            {"faults", c.faults},
+            {"missed", c.missed},
+            {"overruns_wake", c.overruns_wake},
+            {"overruns_read", c.overruns_read},
+            {"overruns_compute", c.overruns_compute},
+            {"overruns_write", c.overruns_write},
+            {"saturated", c.saturated},
+            {"writes_failed", c.writes_failed}}},
+          {"timing",
+           {{"wake_late", json_of(o.wake_late)},
+            {"read", json_of(o.read)},
+            {"compute", json_of(o.compute)},
+            {"write", json_of(o.write)},
+            {"cycle", json_of(o.cycle)}}},
+          {"scheduling", result.scheduling.note},
+          {"elapsed_s", result.elapsed_s}};
+}
+
+void print_summary(const SessionResult& result, const LoopLimits& limits, bool fast) {
+  const LoopOutcome& o = result.outcome;
+  const LoopCounts& c = o.counts;
+  if (o.reason == StopReason::duration)
+    std::printf("Stayed up for %.4g s.\n", o.time_s);
+  else
+    std::printf("%s after %.4g s: %s.\n", o.reason == StopReason::fell ? "Fell" : "Stopped at zero volts",
+                o.time_s, sentence_of(o, limits).c_str());
+  std::printf(
+      "Worst angle %.3f deg, worst cart position %.1f mm, %llu of %llu periods at the voltage limit.\n",
+      o.worst_theta_rad * degrees_per_rad, o.worst_cart_m * 1e3, static_cast<unsigned long long>(c.saturated),
+      static_cast<unsigned long long>(c.periods));
+  if (fast) {
+    std::printf("Virtual time: %.3g times faster than real time.\n", o.time_s / result.elapsed_s);
+  } else {
+    std::printf("Timing: woke late by %.0f us (99.9 %%), %.0f us at worst; a cycle took %.0f us at worst.\n",
+                o.wake_late.quantile_us(0.999), o.wake_late.max_us(), o.cycle.max_us());
+    std::printf("Overruns: %llu waking, %llu reading, %llu computing, %llu writing; %llu periods missed.\n",
+                static_cast<unsigned long long>(c.overruns_wake),
+                static_cast<unsigned long long>(c.overruns_read),
+                static_cast<unsigned long long>(c.overruns_compute),
+                static_cast<unsigned long long>(c.overruns_write), static_cast<unsigned long long>(c.missed));
+    std::printf("Scheduling: %s.\n", result.scheduling.note.c_str());
+  }
+  if (c.stale + c.faults + c.writes_failed > 0)
+    std::printf("Link: %llu stale and %llu failed readings, %llu failed writes.\n",
+                static_cast<unsigned long long>(c.stale), static_cast<unsigned long long>(c.faults),
+                static_cast<unsigned long long>(c.writes_failed));
+  if (result.log.rows_dropped > 0)
+    std::printf("Log: %llu rows were dropped, the disk was too slow.\n",
+                static_cast<unsigned long long>(result.log.rows_dropped));
+  std::printf("%s\n", result.directory.c_str());
+  std::fflush(stdout);
+}
+
+ExitCode run(const Arguments& arguments) {
+  RunSetup setup = make_setup(arguments);
+  catch_signals();
+  MonotonicClock real_clock;
+  VirtualClock virtual_clock;
+  Clock& clock = arguments.fast ? static_cast<Clock&>(virtual_clock) : real_clock;
+  const std::unique_ptr<Rig> rig = make(setup, clock);
+  rig->open();
+  constexpr double patience_s = 2.0;
+  find_zero(*rig, clock, setup.rig, patience_s);
+
+  SessionOptions options;
+  options.out = arguments.out;
+  options.realtime = {arguments.priority, arguments.cpu};
+  const bool on_terminal = ::isatty(STDERR_FILENO) != 0;
+  if (on_terminal && !arguments.fast) options.show = show_live;
+  const LoopLimits limits = setup.limits;
+  const SessionResult result = run_session(std::move(setup), *rig, clock, caught_signal, std::move(options));
+  if (on_terminal && !arguments.fast) std::fputs("\n", stderr);
+
+  if (arguments.as_json)
+    std::cout << json_of(result, limits).dump(2, ' ', false, Json::error_handler_t::replace) << "\n";
+  else
+    print_summary(result, limits, arguments.fast);
+  if (!result.log.failure.empty()) std::cerr << "upright: " << result.log.failure << "\n";
+  if (!result.outcome_written)
+    std::cerr << "upright: free space where the run directory goes: run.yaml could not be completed\n";
+  if (result.outcome.reason == StopReason::duration) return ExitCode::done;
+  if (arguments.as_json) std::cerr << "upright: " << sentence_of(result.outcome, limits) << "\n";
+  return ExitCode::stopped;
+}
+
+}  // namespace
+
+void add_run(CLI::App& app, int& exit_code) {
+  CLI::App* command = app.add_subcommand("run", "Close the loop on a rig and log it");
+  command->footer(
+      "Example:  upright run --rig config/rigs/simulated.yaml --gains config/gains/exponential.yaml "
+      "--duration 60 --theta0-deg 3 --fast\n"
+      "The last line of the output is the run directory.");
+  const auto a = std::make_shared<Arguments>();
+  command->add_option("--rig", a->rig, "Rig file")->required();
+  command->add_option("--gains", a->gains, "Gain file")->required();
+  command->add_option("--delay", a->delay_s, "Delay of the feedback [s], in place of the gain file's")
+      ->check(number_in(Range::within(0.0, DelayLine::longest_delay_s)));
+  constexpr double longest_run_s = 1e6;
+  command->add_option("--duration", a->duration_s, "How long to run [s] (10)")
+      ->check(number_in({0.0, longest_run_s, true}));
+  command->add_option("--theta0-deg", a->theta0_deg, "Initial angle [degree], simulated rigs only")
+      ->check(number_in(Range::within(-180.0, 180.0)));
+  command->add_option("--seed", a->seed, "Of noise and jitter, simulated rigs only (1)");
+  command->add_flag("--fast", a->fast, "Virtual time: as fast as it goes, simulated rigs only");
+  command->add_option("--out", a->out, "The folder that the run directory is made in (runs)");
+  command->add_option("--label", a->label, "End of the run directory's name (run)");
+  command->add_option("--priority", a->priority, "Real-time priority to ask for (80)")
+      ->check(CLI::Range(1, 99));
+  command->add_option("--cpu", a->cpu, "Processor to stay on (the last one)")->check(CLI::Range(0, 1023));
+  command->add_flag("--json", a->as_json, "One JSON document");
+  command->callback([a, &exit_code] { exit_code = static_cast<int>(run(*a)); });
+}
+
+}  // namespace upright::cli

@@ -1,0 +1,197 @@
+#include "upright/runtime/run_log.hpp"
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <charconv>
+#include <chrono>
+#include <cstring>
+#include <vector>
+
+#include "upright/model/error.hpp"
+
+namespace upright {
+
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr auto writer_pause = 10ms;
+constexpr auto sync_pause = 50ms;
+constexpr std::size_t buffer_bytes = 64 * 1024;
+constexpr std::size_t rows_at_once = 64;
+
+char* put(char* out, double value) noexcept {
+  return std::to_chars(out, out + 40, value).ptr;
+}
+template <class Integer>
+char* put_integer(char* out, Integer value) noexcept {
+  return std::to_chars(out, out + 24, value).ptr;
+}
+
+/// A count of 10^-digits as a decimal fraction, exactly.
+char* put_fixed(char* out, std::int64_t value, int digits) noexcept {
+  std::uint64_t magnitude = static_cast<std::uint64_t>(value);
+  if (value < 0) {
+    *out++ = '-';
+    magnitude = 0 - magnitude;
+  }
+  std::uint64_t unit = 1;
+  for (int i = 0; i < digits; ++i) unit *= 10;
+  out = put_integer(out, magnitude / unit);
+  std::uint64_t rest = magnitude % unit;
+  if (rest == 0) return out;
+  *out++ = '.';
+  for (; rest != 0; rest %= unit) {
+    unit /= 10;
+    *out++ = static_cast<char>('0' + rest / unit);
+  }
+  return out;
+}
+
+}  // namespace
+
+std::size_t format_row(const LogRecord& r, char* const begin) noexcept {
+  constexpr int nanoseconds = 9, nanoseconds_of_us = 3;
+  char* out = put_integer(begin, r.tick);
+  *out++ = ',';
+  out = put_fixed(out, r.time_ns, nanoseconds);
+  for (const std::int64_t counts : {r.cart_counts, r.pendulum_counts}) {
+    *out++ = ',';
+    out = put_integer(out, counts);
+  }
+  for (const double value : {r.cart_m, r.theta_rad, r.cart_velocity_mps, r.pendulum_rate_radps,
+                             r.voltage_requested_v, r.voltage_v}) {
+    *out++ = ',';
+    out = put(out, value);
+  }
+  for (const std::int64_t ns : {r.wake_late_ns, r.read_ns, r.compute_ns, r.write_ns}) {
+    *out++ = ',';
+    out = put_fixed(out, ns, nanoseconds_of_us);
+  }
+  *out++ = ',';
+  out = put_integer(out, r.flags);
+  *out++ = ',';
+  out = put_integer(out, r.sequence);
+  *out++ = '\n';
+  return static_cast<std::size_t>(out - begin);
+}
+
+RunLog::RunLog(const std::filesystem::path& file, const Options& options)
+    : file_(file), options_(options), queue_(options.queue_rows) {
+  fd_ = ::open(file.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0644);
+  if (fd_ < 0)
+    throw Error(ExitCode::usage, "check the folder and its free space: cannot create " + file.string() +
+                                     " (" + std::strerror(errno) + ")");
+  const std::string header = std::string(sample_columns) + "\n";
+  if (!write_all(header.data(), header.size())) {
+    ::close(fd_);
+    throw Error(ExitCode::usage, failure());
+  }
+  try {
+    writer_ = std::thread([this] { write_loop(); });
+    if (options_.sync_while_running) syncer_ = std::thread([this] { sync_loop(); });
+  } catch (const std::exception&) {
+    close();
+    throw Error(ExitCode::device, "raise the limit on threads (ulimit -u): the log's writer could not start");
+  }
+}
+
+RunLog::~RunLog() {
+  close();
+}
+
+bool RunLog::push(const LogRecord& record) noexcept {
+  if (queue_.push(record)) return true;
+  dropped_.fetch_add(1, std::memory_order_relaxed);
+  return false;
+}
+
+void RunLog::push_waiting(const LogRecord& record) noexcept {
+  while (!queue_.push(record)) std::this_thread::yield();
+}
+
+bool RunLog::write_all(const char* text, std::size_t size) noexcept {
+  std::size_t done = 0;
+  while (done < size) {
+    const ssize_t written = ::write(fd_, text + done, size - done);
+    if (written > 0) {
+      done += static_cast<std::size_t>(written);
+      continue;
+    }
+    if (written < 0 && errno == EINTR) continue;
+    error_.store(written == 0 ? ENOSPC : errno, std::memory_order_relaxed);
+    break;
+  }
+  if (done == size) {
+    size_ += static_cast<std::int64_t>(size);
+    return true;
+  }
+  // What arrived stays, up to its last whole row.
+  while (done > 0 && text[done - 1] != '\n') --done;
+  size_ += static_cast<std::int64_t>(done);
+  rows_.fetch_add(static_cast<std::uint64_t>(std::count(text, text + done, '\n')), std::memory_order_relaxed);
+  if (::ftruncate(fd_, size_) != 0) return false;
+  return false;
+}
+
+void RunLog::write_loop() noexcept {
+  static_assert(buffer_bytes > rows_at_once * longest_row);
+  std::array<LogRecord, rows_at_once> records;
+  static thread_local std::array<char, buffer_bytes> buffer;
+  std::size_t used = 0;
+  std::uint64_t rows = 0;
+  const auto flush = [&] {
+    if (used == 0) return;
+    if (!failed() && write_all(buffer.data(), used)) {
+      rows_.fetch_add(rows, std::memory_order_relaxed);
+      unsynced_.store(true, std::memory_order_relaxed);
+    }
+    used = 0;
+    rows = 0;
+  };
+  for (;;) {
+    const bool last_round = closing_.load(std::memory_order_acquire);
+    const std::size_t count = queue_.pop(records.data(), records.size());
+    // After a failure rows are still taken, so that a waiting loop goes on to its stop.
+    if (!failed())
+      for (std::size_t i = 0; i < count; ++i) {
+        if (used + longest_row > buffer.size()) flush();
+        used += format_row(records[i], buffer.data() + used);
+        ++rows;
+      }
+    if (count > 0) continue;
+    flush();
+    if (last_round) return;
+    std::this_thread::sleep_for(writer_pause);
+  }
+}
+
+void RunLog::sync_loop() noexcept {
+  while (!closing_.load(std::memory_order_acquire)) {
+    if (unsynced_.exchange(false) && ::fdatasync(fd_) != 0 && errno != EINVAL)
+      error_.store(errno, std::memory_order_relaxed);
+    std::this_thread::sleep_for(sync_pause);
+  }
+}
+
+void RunLog::close() noexcept {
+  if (fd_ < 0) return;
+  closing_.store(true, std::memory_order_release);
+  if (writer_.joinable()) writer_.join();
+  if (syncer_.joinable()) syncer_.join();
+  if (::fdatasync(fd_) != 0 && errno != EINVAL && !failed()) error_.store(errno, std::memory_order_relaxed);
+  ::close(fd_);
+  fd_ = -1;
+}
+
+std::string RunLog::failure() const {
+  if (!failed()) return {};
+  return "free space where the run directory goes: " + file_.string() + " could not be written (" +
+         std::strerror(error_.load(std::memory_order_relaxed)) + ")";
+}
+
+}  // namespace upright

@@ -1,0 +1,102 @@
+#include "upright/runtime/session.hpp"
+
+#include <chrono>
+#include <cmath>
+#include <exception>
+#include <future>
+#include <thread>
+
+#include "upright/model/error.hpp"
+
+namespace upright {
+
+namespace {
+
+using namespace std::chrono_literals;
+
+/// Whatever happens, the motor ends at zero volts.
+class StopAtEnd {
+ public:
+  explicit StopAtEnd(Rig& rig) : rig_(rig) {}
+  ~StopAtEnd() { rig_.stop(); }
+  StopAtEnd(const StopAtEnd&) = delete;
+  StopAtEnd& operator=(const StopAtEnd&) = delete;
+
+ private:
+  Rig& rig_;
+};
+
+}  // namespace
+
+std::uint64_t default_periods_late(double period_s) {
+  constexpr double tolerated_s = 0.05;
+  constexpr std::uint64_t at_least = 3;
+  return std::max(at_least, static_cast<std::uint64_t>(std::ceil(tolerated_s / period_s)));
+}
+
+void find_zero(Rig& rig, Clock& clock, RigFile& file, double patience_s) {
+  if (!file.calibration.zero_at_start) return;
+  if (file.encoders == Backend::simulated) {
+    // Its counters are zero at the pose that the zero names, wherever it starts.
+    file.calibration.zero_at_start = false;
+    return;
+  }
+  constexpr std::int64_t pause_ns = 1'000'000;
+  const std::int64_t until_ns = clock.now_ns() + static_cast<std::int64_t>(patience_s * 1e9);
+  for (;;) {
+    const RigReading reading = rig.read();
+    if (reading.status == RigStatus::fresh) {
+      file.calibration.cart_zero_counts = reading.cart_counts;
+      file.calibration.pendulum_zero_counts = reading.pendulum_counts;
+      file.calibration.zero_at_start = false;
+      return;
+    }
+    const std::int64_t now_ns = clock.now_ns();
+    if (now_ns > until_ns) break;
+    clock.sleep_until(now_ns + pause_ns);
+  }
+  throw DeviceError("check the encoders' link: no fresh counts came to take the zero from");
+}
+
+SessionResult run_session(RunSetup setup, Rig& rig, Clock& clock, const SignalFlag& signal,
+                          SessionOptions options) {
+  const StopAtEnd stop_at_end(rig);
+  Controller controller(setup.control, setup.rig.amplifier.limit_v, std::move(options.compensator));
+  PoseScaler scaler(calibration_in_use(setup.rig));
+  RunDirectory directory(options.out, setup.label);
+  RunLog::Options log_options;
+  log_options.sync_while_running = !clock.is_virtual();
+  RunLog log(directory.samples(), log_options);
+  LiveStatus live;
+  ControlLoop loop(rig, clock, controller, scaler, log, setup.limits, signal, live);
+
+  SessionResult result;
+  result.directory = directory.path();
+  const auto started = std::chrono::steady_clock::now();
+  std::promise<void> finished;
+  std::future<void> over = finished.get_future();
+  std::thread thread([&] {
+    try {
+      if (!clock.is_virtual()) setup.scheduling = enter_realtime(options.realtime);
+      directory.write_start(setup);
+      loop.run(result.outcome);
+      finished.set_value();
+    } catch (...) {
+      finished.set_exception(std::current_exception());
+    }
+  });
+  while (over.wait_for(200ms) != std::future_status::ready)
+    if (options.show) options.show(live);
+  thread.join();
+  over.get();
+  log.close();
+  result.elapsed_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - started).count();
+  result.scheduling = setup.scheduling;
+  result.log = {log.rows_written(), log.rows_dropped(), log.failure()};
+  if (log.failed() && result.outcome.reason == StopReason::duration)
+    result.outcome.reason = StopReason::log_failed;
+  result.outcome_written = directory.write_outcome(result.outcome, setup.limits, result.log);
+  return result;
+}
+
+}  // namespace upright

@@ -1,0 +1,489 @@
+#include <gtest/gtest.h>
+#include <pthread.h>
+#include <stdlib.h>
+#include <sys/resource.h>
+
+#include <csignal>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <limits>
+#include <numbers>
+#include <random>
+#include <set>
+#include <sstream>
+#include <thread>
+
+#include "upright/hal/simulated_rig.hpp"
+#include "upright/model/error.hpp"
+#include "upright/model/plant_file.hpp"
+#include "upright/runtime/replay.hpp"
+#include "upright/runtime/session.hpp"
+#include "upright/runtime/sleep_policy.hpp"
+
+namespace upright {
+namespace {
+
+namespace fs = std::filesystem;
+
+class TemporaryFolder {
+ public:
+  TemporaryFolder() {
+    std::string name = (fs::temp_directory_path() / "upright-XXXXXX").string();
+    path_ = ::mkdtemp(name.data());
+  }
+  ~TemporaryFolder() {
+    std::error_code ignored;
+    fs::remove_all(path_, ignored);
+  }
+  const fs::path& path() const { return path_; }
+
+ private:
+  fs::path path_;
+};
+
+std::string text_of(const fs::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  std::stringstream text;
+  text << in.rdbuf();
+  return text.str();
+}
+
+TEST(SleepPolicy, KeepsThePhaseAndRunsALateCycleOnce) {
+  LoopPhase phase{1000, 100, 0};
+  Wake wake = wake_at(phase, 1000);
+  EXPECT_EQ(wake.tick, 0u);
+  EXPECT_EQ(wake.late_ns, 0);
+  wake = wake_at(phase, 1130);  // late within its own period
+  EXPECT_EQ(wake.tick, 1u);
+  EXPECT_EQ(wake.missed, 0u);
+  EXPECT_EQ(wake.late_ns, 30);
+  wake = wake_at(phase, 1555);  // cycles 2, 3 and 4 are overtaken
+  EXPECT_EQ(wake.tick, 5u);
+  EXPECT_EQ(wake.missed, 3u);
+  EXPECT_EQ(wake.late_ns, 355);
+  EXPECT_EQ(phase.due_ns(phase.next_tick), 1600);
+}
+
+TEST(SleepPolicy, NeverRunsATickTwiceNorMovesThePhase) {
+  std::mt19937_64 random(3);
+  std::uniform_int_distribution<std::int64_t> pause(0, 450);
+  LoopPhase phase{500, 100, 0};
+  std::int64_t now = 500;
+  std::uint64_t cycles = 0, missed = 0, last = 0;
+  for (int i = 0; i < 10000; ++i) {
+    now = std::max(now, phase.due_ns(phase.next_tick));
+    const Wake wake = wake_at(phase, now);
+    if (i > 0) {
+      ASSERT_GT(wake.tick, last);
+    }
+    last = wake.tick;
+    ++cycles;
+    missed += wake.missed;
+    ASSERT_EQ(cycles + missed, wake.tick + 1);
+    ASSERT_LE(phase.due_ns(wake.tick), now);
+    ASSERT_GT(phase.due_ns(phase.next_tick), now);
+    now += pause(random);
+  }
+}
+
+TEST(DurationHistogram, BoundsQuantilesFromAboveByAnEighthOfAnOctave) {
+  DurationHistogram histogram;
+  for (int i = 1; i <= 100000; ++i) histogram.add(i);
+  for (const double part : {0.001, 0.5, 0.99, 0.999}) {
+    const double exact_us = part * 100.0;
+    EXPECT_GE(histogram.quantile_us(part), exact_us * 0.999);
+    EXPECT_LE(histogram.quantile_us(part), exact_us * 1.13);
+  }
+  EXPECT_EQ(histogram.max_us(), 100.0);
+  EXPECT_EQ(histogram.quantile_us(1.0), 100.0);
+  histogram.add(std::numeric_limits<std::int64_t>::max());
+  histogram.add(-5);
+  EXPECT_EQ(histogram.count(), 100002u);
+}
+
+TEST(RunLog, RowsReadBackToTheSameBits) {
+  TemporaryFolder folder;
+  std::mt19937_64 random(11);
+  std::uniform_real_distribution<double> any(-1e3, 1e3);
+  std::uniform_int_distribution<std::int64_t> whole(-1'000'000'000'000, 1'000'000'000'000);
+  std::vector<LogRecord> rows;
+  for (std::uint64_t i = 0; i < 3000; ++i) {
+    LogRecord r;
+    r.tick = i;
+    r.time_ns = std::abs(whole(random));
+    r.cart_counts = whole(random);
+    r.pendulum_counts = whole(random);
+    r.cart_m = any(random) * 1e-9;
+    r.theta_rad = any(random);
+    r.cart_velocity_mps = i % 2 == 0 ? 0.0 : -0.0;
+    r.pendulum_rate_radps = any(random) * 1e12;
+    r.voltage_requested_v = i % 7 == 0 ? std::numeric_limits<double>::infinity() : any(random);
+    r.voltage_v = any(random);
+    r.wake_late_ns = std::abs(whole(random)) / 1000;
+    r.flags = static_cast<std::uint32_t>(i);
+    r.sequence = i * 3;
+    rows.push_back(r);
+  }
+  {
+    RunLog log(folder.path() / "samples.csv", {});
+    for (const LogRecord& r : rows) log.push_waiting(r);
+    log.close();
+    EXPECT_EQ(log.rows_written(), rows.size());
+    EXPECT_FALSE(log.failed());
+  }
+  const Samples samples = read_samples(folder.path() / "samples.csv");
+  EXPECT_FALSE(samples.truncated);
+  ASSERT_EQ(samples.rows.size(), rows.size());
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    EXPECT_EQ(samples.rows[i].time_ns, rows[i].time_ns);
+    EXPECT_EQ(samples.rows[i].cart_counts, rows[i].cart_counts);
+    EXPECT_EQ(samples.rows[i].cart_m, rows[i].cart_m);
+    EXPECT_EQ(samples.rows[i].pendulum_rate_radps, rows[i].pendulum_rate_radps);
+    EXPECT_EQ(std::signbit(samples.rows[i].cart_velocity_mps), std::signbit(rows[i].cart_velocity_mps));
+    EXPECT_EQ(samples.rows[i].voltage_requested_v, rows[i].voltage_requested_v);
+    EXPECT_EQ(samples.rows[i].wake_late_ns, rows[i].wake_late_ns);
+    EXPECT_EQ(samples.rows[i].flags, rows[i].flags);
+    EXPECT_EQ(samples.rows[i].sequence, rows[i].sequence);
+  }
+}
+
+TEST(RunLog, CountsWhatTheQueueCouldNotHold) {
+  TemporaryFolder folder;
+  RunLog::Options options;
+  options.queue_rows = 4;
+  RunLog log(folder.path() / "samples.csv", options);
+  std::uint64_t pushed = 0;
+  for (int i = 0; i < 5000; ++i)
+    if (log.push({})) ++pushed;
+  log.close();
+  EXPECT_EQ(pushed + log.rows_dropped(), 5000u);
+  EXPECT_GT(log.rows_dropped(), 0u);
+  EXPECT_EQ(log.rows_written(), pushed);
+}
+
+TEST(ReadSamples, LeavesOutALastLineThatWasCutAndWhatAPowerCutLeaves) {
+  TemporaryFolder folder;
+  const fs::path file = folder.path() / "samples.csv";
+  const std::string header = std::string(sample_columns) + "\n";
+  const std::string row = "0,0,1,2,0,0,0,0,1.5,1.5,0,0,0,0,0,1\n";
+  const auto write = [&](const std::string& text) { std::ofstream(file, std::ios::binary) << text; };
+  for (std::size_t cut = 1; cut < row.size(); ++cut) {
+    write(header + row + row.substr(0, cut));
+    const Samples samples = read_samples(file);
+    EXPECT_EQ(samples.rows.size(), 1u) << cut;
+    EXPECT_TRUE(samples.truncated) << cut;
+  }
+  write(header + row + std::string(500, '\0'));
+  EXPECT_EQ(read_samples(file).rows.size(), 1u);
+  write(header.substr(0, 20));
+  EXPECT_TRUE(read_samples(file).truncated);
+  write(header + row + "0,0,what\n" + row);
+  EXPECT_THROW(read_samples(file), ConfigError);
+  write("tick,time_s\n0,0\n");
+  EXPECT_THROW(read_samples(file), ConfigError);
+}
+
+RigFile simulated_file(const std::string& plant = "exponential") {
+  RigFile rig = read_rig_file(UPRIGHT_SOURCE_DIR "/config/rigs/simulated.yaml");
+  rig.simulated->plant = UPRIGHT_SOURCE_DIR "/config/plants/" + plant + ".yaml";
+  return rig;
+}
+
+RunSetup setup_for(const RigFile& rig, double duration_s, double theta0_deg = 3.0) {
+  RunSetup setup;
+  setup.label = "test";
+  setup.command = "runtime_test";
+  setup.duration_s = duration_s;
+  setup.fast = true;
+  setup.seed = 1;
+  setup.theta0_rad = theta0_deg * std::numbers::pi / 180.0;
+  setup.control = read_gain_file(UPRIGHT_SOURCE_DIR "/config/gains/exponential.yaml");
+  setup.rig = rig;
+  setup.limits = {static_cast<std::uint64_t>(duration_s * setup.control.sample_rate_hz), rig.track_limit_m,
+                  rig.fall_angle_rad, rig.watchdog_s, default_periods_late(setup.control.period_s())};
+  return setup;
+}
+
+/// A rig around another that a test can make fail; remembers what was written last.
+class TamperedRig final : public Rig {
+ public:
+  explicit TamperedRig(Rig& rig) : rig_(rig) {}
+  void open() override { rig_.open(); }
+  RigReading read() noexcept override {
+    RigReading reading = rig_.read();
+    if (on_read) on_read(reads, reading);
+    ++reads;
+    return reading;
+  }
+  RigFault write(double voltage_v) noexcept override {
+    last_v = voltage_v;
+    ++writes;
+    const RigFault fault = rig_.write(voltage_v);
+    return on_write ? on_write(writes) : fault;
+  }
+  void stop() noexcept override {
+    last_v = 0.0;
+    stopped = true;
+    rig_.stop();
+  }
+
+  std::function<void(int, RigReading&)> on_read;
+  std::function<RigFault(int)> on_write;
+  int reads = 0, writes = 0;
+  double last_v = 0.0;
+  bool stopped = false;
+
+ private:
+  Rig& rig_;
+};
+
+struct TestRun {
+  SessionResult result;
+  RunRecord record;
+  double last_v = 0.0;
+  bool stopped = false;
+};
+
+TestRun run_tampered(const TemporaryFolder& folder, const RunSetup& setup,
+                     const std::function<void(TamperedRig&, Clock&)>& tamper = {}, int signal_number = 0) {
+  VirtualClock clock;
+  const auto plain = make_simulated_rig(setup.rig, clock, {setup.seed, setup.theta0_rad});
+  TamperedRig rig(*plain);
+  if (tamper) tamper(rig, clock);
+  rig.open();
+  SignalFlag signal{signal_number};
+  SessionOptions options;
+  options.out = folder.path();
+  SessionResult result = run_session(setup, rig, clock, signal, std::move(options));
+  RunRecord record = read_run(result.directory);
+  return {result, record, rig.last_v, rig.stopped};
+}
+
+TEST(Session, BalancesForAMinuteOnAllThreeFrictions) {
+  TemporaryFolder folder;
+  for (const char* plant : {"viscous", "exponential", "dynamic"}) {
+    const TestRun run = run_tampered(folder, setup_for(simulated_file(plant), 60.0));
+    EXPECT_EQ(run.result.outcome.reason, StopReason::duration) << plant;
+    ASSERT_EQ(run.record.samples.rows.size(), 60000u) << plant;
+    double low = 1.0, high = -1.0;
+    for (std::size_t i = 40000; i < 60000; ++i) {
+      low = std::min(low, run.record.samples.rows[i].theta_rad);
+      high = std::max(high, run.record.samples.rows[i].theta_rad);
+    }
+    constexpr double count_rad = 2.0 * std::numbers::pi / 4096.0;
+    // Stick-slip makes a limit cycle of several counts; viscous friction alone leaves no more than
+    // quantisation.
+    if (plant == std::string("viscous"))
+      EXPECT_LE(high - low, 3.0 * count_rad);
+    else
+      EXPECT_GT(high - low, count_rad) << plant;
+    EXPECT_LT(high - low, 0.02) << plant;
+  }
+}
+
+TEST(Session, SameSeedSameBytesAndAnotherSeedOthers) {
+  TemporaryFolder folder;
+  RigFile rig = simulated_file();
+  rig.simulated->cart_noise_m = 2e-5;
+  rig.simulated->theta_noise_rad = 1e-3;
+  rig.simulated->timing_jitter_s = 1e-4;
+  RunSetup setup = setup_for(rig, 3.0);
+  const auto bytes = [&] { return text_of(run_tampered(folder, setup).result.directory / "samples.csv"); };
+  const std::string first = bytes(), second = bytes();
+  EXPECT_EQ(first, second);
+  setup.seed = 2;
+  EXPECT_NE(first, bytes());
+}
+
+TEST(Session, RunsAreReplayedBitForBitAlsoWithDelayJitterNoiseAndGaps) {
+  TemporaryFolder folder;
+  RigFile rig = simulated_file();
+  rig.simulated->theta_noise_rad = 5e-4;
+  rig.simulated->timing_jitter_s = 5e-4;
+  RunSetup setup = setup_for(rig, 4.0);
+  setup.control.delay_s = 0.00337;
+  const TestRun run = run_tampered(folder, setup, [](TamperedRig& tampered, Clock& clock) {
+    tampered.on_read = [&clock](int i, RigReading& reading) {
+      if (i % 50 == 7) reading.status = RigStatus::stale;
+      if (i % 90 == 31) {
+        reading.status = RigStatus::fault;
+        reading.fault = RigFault::corrupt_reply;
+      }
+      if (i % 200 == 99) clock.sleep_until(clock.now_ns() + 4'300'000);
+    };
+  });
+  EXPECT_EQ(run.result.outcome.reason, StopReason::duration);
+  EXPECT_GT(run.result.outcome.counts.stale, 0u);
+  EXPECT_GT(run.result.outcome.counts.missed, 0u);
+  const ReplayResult result = replay(run.record);
+  EXPECT_FALSE(result.first_mismatch.has_value());
+  EXPECT_EQ(result.rows, run.record.samples.rows.size());
+
+  RunRecord changed = run.record;
+  changed.samples.rows[1234].pendulum_counts += 1;
+  ASSERT_TRUE(replay(changed).first_mismatch.has_value());
+  RunRecord other_gain = run.record;
+  other_gain.control.gains.cart_position_v_per_m = std::nextafter(70.7107, 71.0);
+  EXPECT_TRUE(replay(other_gain).first_mismatch.has_value());
+}
+
+TEST(Session, NamesTheWholeConfigurationAndTheOutcome) {
+  TemporaryFolder folder;
+  const RunSetup setup = setup_for(simulated_file(), 0.5);
+  const TestRun run = run_tampered(folder, setup);
+  EXPECT_TRUE(run.result.outcome_written);
+  EXPECT_EQ(run.record.control.gains.pendulum_angle_v_per_rad, setup.control.gains.pendulum_angle_v_per_rad);
+  EXPECT_EQ(run.record.rig.calibration.cart.per_count, setup.rig.calibration.cart.per_count);
+  ASSERT_TRUE(run.record.outcome.has_value());
+  EXPECT_EQ(run.record.outcome->text("reason"), "duration");
+  EXPECT_EQ(run.record.document.map("provenance").text("version").empty(), false);
+  std::set<std::string> files;
+  for (const auto& entry : fs::directory_iterator(run.result.directory))
+    files.insert(entry.path().filename());
+  EXPECT_EQ(files, (std::set<std::string>{"run.yaml", "samples.csv"}));
+}
+
+struct Trouble {
+  const char* what;
+  StopReason reason;
+  std::function<void(TamperedRig&, Clock&)> tamper;
+};
+
+TEST(Session, EveryTroubleEndsInZeroVoltsWithItsReasonAndItsCycle) {
+  constexpr int bad = 300;
+  const auto always = [](RigStatus status, RigFault fault) {
+    return [=](TamperedRig& rig, Clock&) {
+      rig.on_read = [=](int i, RigReading& reading) {
+        if (i < bad) return;
+        reading.status = status;
+        reading.fault = fault;
+      };
+    };
+  };
+  const std::vector<Trouble> troubles = {
+      {"stale", StopReason::stale_encoder, always(RigStatus::stale, RigFault::none)},
+      {"timeout", StopReason::link_lost, always(RigStatus::fault, RigFault::link_timeout)},
+      {"lost", StopReason::link_lost, always(RigStatus::fault, RigFault::link_lost)},
+      {"corrupt", StopReason::link_lost, always(RigStatus::fault, RigFault::corrupt_reply)},
+      {"restarted", StopReason::rig_fault, always(RigStatus::fault, RigFault::device_restarted)},
+      {"e-stop", StopReason::emergency_stop, always(RigStatus::fault, RigFault::emergency_stop)},
+      {"limit switch", StopReason::track_limit, always(RigStatus::fault, RigFault::limit_switch)},
+      {"track", StopReason::track_limit,
+       [](TamperedRig& rig, Clock&) {
+         rig.on_read = [](int i, RigReading& reading) {
+           if (i >= bad) reading.cart_counts += 20000;
+         };
+       }},
+      {"fall", StopReason::fell,
+       [](TamperedRig& rig, Clock&) {
+         rig.on_read = [](int i, RigReading& reading) {
+           if (i >= bad) reading.pendulum_counts -= 500;
+         };
+       }},
+      {"write", StopReason::link_lost,
+       [](TamperedRig& rig, Clock&) {
+         rig.on_write = [](int i) { return i > bad ? RigFault::link_timeout : RigFault::none; };
+       }},
+      {"overrun", StopReason::overrun,
+       [](TamperedRig& rig, Clock& clock) {
+         rig.on_read = [&clock](int i, RigReading&) {
+           if (i >= bad) clock.sleep_until(clock.now_ns() + 1'500'000);
+         };
+       }},
+  };
+  TemporaryFolder folder;
+  for (const Trouble& trouble : troubles) {
+    const TestRun run = run_tampered(folder, setup_for(simulated_file(), 5.0), trouble.tamper);
+    EXPECT_EQ(run.result.outcome.reason, trouble.reason) << trouble.what;
+    EXPECT_NEAR(static_cast<double>(run.result.outcome.first_bad_tick), bad, 1.0) << trouble.what;
+    EXPECT_LE(run.result.outcome.time_s, 0.001 * bad + 0.1 + 0.06) << trouble.what;
+    EXPECT_TRUE(run.stopped) << trouble.what;
+    EXPECT_EQ(run.last_v, 0.0) << trouble.what;
+    EXPECT_EQ(run.record.samples.rows.back().voltage_v, 0.0) << trouble.what;
+    EXPECT_TRUE(run.record.samples.rows.back().flags & row_flag::stopped) << trouble.what;
+    ASSERT_TRUE(run.record.outcome.has_value());
+    EXPECT_EQ(run.record.outcome->text("reason"), name_of(trouble.reason));
+    EXPECT_EQ(run.record.outcome->text("sentence").find('\n'), std::string::npos);
+    EXPECT_FALSE(replay(run.record).first_mismatch.has_value()) << trouble.what;
+  }
+}
+
+TEST(Session, GoesOnThroughTroubleThatPassesWithinTheWatchdogTime) {
+  TemporaryFolder folder;
+  const TestRun run = run_tampered(folder, setup_for(simulated_file(), 5.0), [](TamperedRig& rig, Clock&) {
+    rig.on_read = [](int i, RigReading& reading) {
+      if (i % 500 < 480 || i < 100) return;
+      reading.status = RigStatus::fault;
+      reading.fault = RigFault::link_timeout;
+      reading.pendulum_counts = 1'000'000;  // must never be looked at
+    };
+  });
+  EXPECT_EQ(run.result.outcome.reason, StopReason::duration);
+  EXPECT_EQ(run.result.outcome.counts.faults, 200u);
+}
+
+TEST(Session, AttributesAnOverrunToTheStepThatTookTheTime) {
+  TemporaryFolder folder;
+  const TestRun run =
+      run_tampered(folder, setup_for(simulated_file(), 1.0), [](TamperedRig& rig, Clock& clock) {
+        rig.on_read = [&clock](int i, RigReading&) {
+          if (i == 100) clock.sleep_until(clock.now_ns() + 1'200'000);
+        };
+        rig.on_write = [&clock](int i) {
+          if (i == 301) clock.sleep_until(clock.now_ns() + 3'200'000);
+          return RigFault::none;
+        };
+      });
+  const LoopCounts& counts = run.result.outcome.counts;
+  EXPECT_EQ(counts.overruns_read, 1u);
+  EXPECT_EQ(counts.overruns_write, 1u);
+  EXPECT_EQ(counts.overruns_compute, 0u);
+  EXPECT_EQ(counts.missed, 2u);
+  EXPECT_TRUE(run.record.samples.rows[100].flags & row_flag::overrun_read);
+  EXPECT_TRUE(run.record.samples.rows[300].flags & row_flag::overrun_write);
+}
+
+TEST(Session, ASignalStopsBeforeAnotherVoltageIsWritten) {
+  TemporaryFolder folder;
+  const TestRun run = run_tampered(folder, setup_for(simulated_file(), 5.0), {}, SIGTERM);
+  EXPECT_EQ(run.result.outcome.reason, StopReason::signal);
+  EXPECT_TRUE(run.stopped);
+  EXPECT_TRUE(run.record.samples.rows.empty());
+  EXPECT_NE(run.record.outcome->text("sentence").find("SIGTERM"), std::string::npos);
+}
+
+TEST(Session, AFullDiskStopsTheMotorAndKeepsTheRows) {
+  // A limit on file size fails a write as a full disk does.
+  rlimit before{};
+  ASSERT_EQ(getrlimit(RLIMIT_FSIZE, &before), 0);
+  const auto handler = std::signal(SIGXFSZ, SIG_IGN);
+  rlimit limited = before;
+  limited.rlim_cur = 300'000;
+  ASSERT_EQ(setrlimit(RLIMIT_FSIZE, &limited), 0);
+  TemporaryFolder folder;
+  const TestRun run = run_tampered(folder, setup_for(simulated_file(), 600.0));
+  setrlimit(RLIMIT_FSIZE, &before);
+  std::signal(SIGXFSZ, handler);
+  EXPECT_EQ(run.result.outcome.reason, StopReason::log_failed);
+  EXPECT_TRUE(run.stopped);
+  EXPECT_FALSE(run.record.samples.truncated);
+  EXPECT_EQ(run.record.samples.rows.size(), run.result.log.rows_written);
+  EXPECT_GT(run.record.samples.rows.size(), 1000u);
+  EXPECT_TRUE(run.record.outcome.has_value());
+  EXPECT_FALSE(replay(run.record).first_mismatch.has_value());
+}
+
+TEST(RunDirectory, NeverReusesAName) {
+  TemporaryFolder folder;
+  std::set<fs::path> names;
+  for (int i = 0; i < 5; ++i) names.insert(RunDirectory(folder.path(), "same").path());
+  EXPECT_EQ(names.size(), 5u);
+  EXPECT_THROW(RunDirectory(folder.path(), "../else"), ConfigError);
+  EXPECT_THROW(RunDirectory(folder.path(), ""), ConfigError);
+  EXPECT_THROW(RunDirectory("/proc/none/here", "x"), ConfigError);
+}
+
+}  // namespace
+}  // namespace upright
