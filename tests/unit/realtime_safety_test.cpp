@@ -1,0 +1,184 @@
+// Counts what the loop's thread allocates and locks between its first cycle and its last. The counters sit in
+// front of the C library's own functions, so that whatever calls them, in any library, is seen.
+#include <dlfcn.h>
+#include <gtest/gtest.h>
+#include <pthread.h>
+#include <stdlib.h>
+
+#include <atomic>
+#include <cstdlib>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <new>
+#include <numbers>
+#include <vector>
+
+#include "upright/hal/simulated_rig.hpp"
+#include "upright/runtime/control_loop.hpp"
+#include "upright/runtime/session.hpp"
+
+namespace {
+
+// Only the thread that arms them counts.
+thread_local bool armed = false;
+thread_local int allocations = 0;
+thread_local int locks = 0;
+
+}  // namespace
+
+extern "C" {
+
+void* __libc_malloc(size_t size);
+void* __libc_calloc(size_t count, size_t size);
+void* __libc_realloc(void* memory, size_t size);
+void* __libc_memalign(size_t alignment, size_t size);
+void __libc_free(void* memory);
+
+void* malloc(size_t size) {
+  if (armed) ++allocations;
+  return __libc_malloc(size);
+}
+void* calloc(size_t count, size_t size) {
+  if (armed) ++allocations;
+  return __libc_calloc(count, size);
+}
+void* realloc(void* memory, size_t size) {
+  if (armed) ++allocations;
+  return __libc_realloc(memory, size);
+}
+void* aligned_alloc(size_t alignment, size_t size) {
+  if (armed) ++allocations;
+  return __libc_memalign(alignment, size);
+}
+int posix_memalign(void** memory, size_t alignment, size_t size) {
+  if (armed) ++allocations;
+  *memory = __libc_memalign(alignment, size);
+  return *memory == nullptr ? 12 : 0;
+}
+void free(void* memory) {
+  if (armed) ++allocations;
+  __libc_free(memory);
+}
+
+int pthread_mutex_lock(pthread_mutex_t* mutex) {
+  using Function = int (*)(pthread_mutex_t*);
+  static const Function real = reinterpret_cast<Function>(dlsym(RTLD_NEXT, "pthread_mutex_lock"));
+  if (armed) ++locks;
+  return real(mutex);
+}
+int pthread_rwlock_wrlock(pthread_rwlock_t* lock) {
+  using Function = int (*)(pthread_rwlock_t*);
+  static const Function real = reinterpret_cast<Function>(dlsym(RTLD_NEXT, "pthread_rwlock_wrlock"));
+  if (armed) ++locks;
+  return real(lock);
+}
+int pthread_rwlock_rdlock(pthread_rwlock_t* lock) {
+  using Function = int (*)(pthread_rwlock_t*);
+  static const Function real = reinterpret_cast<Function>(dlsym(RTLD_NEXT, "pthread_rwlock_rdlock"));
+  if (armed) ++locks;
+  return real(lock);
+}
+}
+
+namespace upright {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Counted {
+  int allocations = 0;
+  int locks = 0;
+};
+
+/// Arms the counters from the first read on: what comes before is set-up.
+class CountingRig final : public Rig {
+ public:
+  CountingRig(Rig& rig, std::function<void()> in_each_cycle) : rig_(rig), extra_(std::move(in_each_cycle)) {}
+  void open() override { rig_.open(); }
+  RigReading read() noexcept override {
+    armed = true;
+    extra_();
+    return rig_.read();
+  }
+  RigFault write(double voltage_v) noexcept override { return rig_.write(voltage_v); }
+  void stop() noexcept override { rig_.stop(); }
+
+ private:
+  Rig& rig_;
+  std::function<void()> extra_;
+};
+
+Counted count_in_loop(Clock& clock, double duration_s, const std::function<void()>& in_each_cycle) {
+  std::string folder = (fs::temp_directory_path() / "upright-XXXXXX").string();
+  ::mkdtemp(folder.data());
+  RigFile file = read_rig_file(UPRIGHT_SOURCE_DIR "/config/rigs/simulated.yaml");
+  file.simulated->plant = UPRIGHT_SOURCE_DIR "/config/plants/dynamic.yaml";
+  file.simulated->theta_noise_rad = 1e-4;
+  file.simulated->timing_jitter_s = 1e-5;
+  ControlConfig control = read_gain_file(UPRIGHT_SOURCE_DIR "/config/gains/exponential.yaml");
+  control.delay_s = 0.0035;
+  const auto plain = make_simulated_rig(file, clock, {1, 3.0 * std::numbers::pi / 180.0});
+  CountingRig rig(*plain, in_each_cycle);
+  rig.open();
+  Counted counted;
+  {
+    Controller controller(control, file.amplifier.limit_v);
+    PoseScaler scaler(calibration_in_use(file));
+    RunLog::Options options;
+    options.queue_rows = 1024;
+    RunLog log(fs::path(folder) / "samples.csv", options);
+    const LoopLimits limits{static_cast<std::uint64_t>(duration_s * control.sample_rate_hz),
+                            file.track_limit_m, file.fall_angle_rad, file.watchdog_s, 1'000'000};
+    const SignalFlag signal{0};
+    LiveStatus live;
+    ControlLoop loop(rig, clock, controller, scaler, log, limits, signal, live);
+    LoopOutcome outcome;
+    allocations = locks = 0;
+    loop.run(outcome);
+    armed = false;
+    counted = {allocations, locks};
+    EXPECT_EQ(outcome.reason, StopReason::duration);
+    EXPECT_GT(outcome.counts.periods, 0u);
+  }
+  fs::remove_all(folder);
+  return counted;
+}
+
+TEST(RealtimeSafety, TheLoopNeitherAllocatesNorLocksInVirtualTime) {
+  VirtualClock clock;
+  const Counted counted = count_in_loop(clock, 20.0, [] {});
+  EXPECT_EQ(counted.allocations, 0);
+  EXPECT_EQ(counted.locks, 0);
+}
+
+TEST(RealtimeSafety, TheLoopNeitherAllocatesNorLocksInRealTime) {
+  MonotonicClock clock;
+  const Counted counted = count_in_loop(clock, 1.0, [] {});
+  EXPECT_EQ(counted.allocations, 0);
+  EXPECT_EQ(counted.locks, 0);
+}
+
+// The guard itself must be able to fail.
+TEST(RealtimeSafety, ASingleAllocationPerCycleIsSeen) {
+  VirtualClock clock;
+  const Counted counted = count_in_loop(clock, 0.1, [] {
+    std::unique_ptr<int> volatile_owner = std::make_unique<int>(1);
+    asm volatile("" : : "r"(volatile_owner.get()) : "memory");
+  });
+  EXPECT_GE(counted.allocations, 100);
+  EXPECT_EQ(counted.locks, 0);
+}
+
+TEST(RealtimeSafety, ASingleLockPerCycleIsSeen) {
+  VirtualClock clock;
+  std::mutex mutex;
+  const Counted counted =
+      count_in_loop(clock, 0.1, [&mutex] { const std::lock_guard<std::mutex> guard(mutex); });
+  EXPECT_GE(counted.locks, 100);
+  EXPECT_EQ(counted.allocations, 0);
+}
+
+}  // namespace
+}  // namespace upright
