@@ -52,9 +52,10 @@ class EventEngine {
       slaved_ = bristles_follow(value_of(state_.motor_v));
       const S step = next_step(remaining);
       FirstRate rate;
-      const PlantState<S> next = rk4(dynamics_, state_, step, held_motor(dynamics_, step), &rate);
+      PlantState<S> next = rk4(dynamics_, state_, drive_, step, &rate);
+      if (slaved_) let_bristles_follow(dynamics_, next, next.motor_v);
       const PlantState<double> plain_next = plain_state(next);
-      const auto along = [&](double t) { return rk4(plain_, plain_state(state_), t, held_motor(plain_, t)); };
+      const auto along = [&](double t) { return plain_step(t); };
       const auto found = first_event(plain_next, rate, value_of(step), held, along);
       if (!found) {
         state_ = next;
@@ -168,7 +169,7 @@ class EventEngine {
   /// Voltage at the motor under constant drive, as a Runge-Kutta step samples it (beginning, middle, end),
   /// and what it is after the step.
   template <class T>
-  struct HeldMotor {
+  struct LaggedMotor {
     T begin_v, middle_v, end_v, after_v;
   };
 
@@ -215,17 +216,25 @@ class EventEngine {
   }
 
   template <class T>
-  PlantState<T> motion(const Dynamics<T>& dynamics, const PlantState<T>& s, const T& motor_v) const {
-    if (!slaved_) return dynamics.derivative(s, motor_v, contacts_);
+  [[gnu::noinline]] PlantState<T> slaved_motion(const Dynamics<T>& dynamics, const PlantState<T>& s,
+                                                const T& motor_v) const {
     PlantState<T> rate = dynamics.slaved_bristle_derivative(s, motor_v, contacts_);
     rate.bristle_m = T(0.0);
     return rate;
   }
 
+  template <class T>
+  [[gnu::always_inline]] PlantState<T> motion(const Dynamics<T>& dynamics, const PlantState<T>& s,
+                                              const T& motor_v) const {
+    if (slaved_) [[unlikely]]
+      return slaved_motion(dynamics, s, motor_v);
+    return dynamics.derivative(s, motor_v, contacts_);
+  }
+
   /// Puts slaved bristles where they are at the end of a step.
   template <class T>
   void let_bristles_follow(const Dynamics<T>& dynamics, PlantState<T>& s, const T& motor_v) const {
-    if (slaved_) s.bristle_m = dynamics.slaved_bristle_derivative(s, motor_v, contacts_).bristle_m;
+    s.bristle_m = dynamics.slaved_bristle_derivative(s, motor_v, contacts_).bristle_m;
   }
 
   double rate_step(double rate) const { return std::min(options_.max_step_s, options_.step_fraction / rate); }
@@ -270,17 +279,10 @@ class EventEngine {
     return end;
   }
 
+  /// The motor's lag over a step of length h from `motor_v`.
   template <class T>
-  HeldMotor<T> held_motor(const Dynamics<T>& dynamics, const T& h) const {
-    T drive, motor_v;
-    if constexpr (std::is_same_v<T, S>) {
-      drive = drive_;
-      motor_v = state_.motor_v;
-    } else {
-      drive = value_of(drive_);
-      motor_v = value_of(state_.motor_v);
-    }
-    if (!dynamics.has_motor_lag()) return {motor_v, drive, drive, drive};
+  static LaggedMotor<T> lagged_motor(const Dynamics<T>& dynamics, const T& motor_v, const T& drive,
+                                     const T& h) {
     using std::exp;
     const T gap = motor_v - drive;
     const T r = h / dynamics.motor_time_constant_s();
@@ -300,19 +302,29 @@ class EventEngine {
             drive + gap * (T(3.0) * m0 - T(24.0) * m1 + T(30.0) * m2), drive + gap * e};
   }
 
+  /// One step under constant drive. Slaved bristles are left where they are.
   template <class T>
-  PlantState<T> rk4(const Dynamics<T>& dynamics, const PlantState<T>& s, const T& h,
-                    const HeldMotor<T>& motor, FirstRate* first = nullptr) const {
+  PlantState<T> rk4(const Dynamics<T>& dynamics, const PlantState<T>& s, const T& drive, const T& h,
+                    FirstRate* first = nullptr) const {
+    std::optional<LaggedMotor<T>> lagged;
+    if (dynamics.has_motor_lag()) lagged.emplace(lagged_motor(dynamics, s.motor_v, drive, h));
+    const T& begin_v = lagged ? lagged->begin_v : drive;
+    const T& middle_v = lagged ? lagged->middle_v : drive;
+    const T& end_v = lagged ? lagged->end_v : drive;
     const T half = T(0.5) * h;
-    const PlantState<T> k1 = motion(dynamics, s, motor.begin_v);
-    const PlantState<T> k2 = motion(dynamics, shifted(s, k1, half), motor.middle_v);
-    const PlantState<T> k3 = motion(dynamics, shifted(s, k2, half), motor.middle_v);
-    const PlantState<T> k4 = motion(dynamics, shifted(s, k3, h), motor.end_v);
+    const PlantState<T> k1 = motion(dynamics, s, begin_v);
+    const PlantState<T> k2 = motion(dynamics, shifted(s, k1, half), middle_v);
+    const PlantState<T> k3 = motion(dynamics, shifted(s, k2, half), middle_v);
+    const PlantState<T> k4 = motion(dynamics, shifted(s, k3, h), end_v);
     if (first != nullptr) *first = {value_of(k1.cart_mps), value_of(k1.theta_radps)};
     PlantState<T> end = combined(s, k1, k2, k3, k4, h);
-    end.motor_v = motor.after_v;
-    let_bristles_follow(dynamics, end, motor.after_v);
+    end.motor_v = lagged ? lagged->after_v : drive;
     return end;
+  }
+
+  /// The same with plain numbers, from the present state.
+  PlantState<double> plain_step(double h) const {
+    return rk4(plain_, plain_state(state_), value_of(drive_), h);
   }
 
   struct DrivenStep {
@@ -346,7 +358,7 @@ class EventEngine {
     DrivenStep step{k1, combined(s, k1, k2, k3, k4, h)};
     step.end.motor_v = lag ? s.motor_v + h / 6.0 * (k1.motor_v + 2.0 * (k2.motor_v + k3.motor_v) + k4.motor_v)
                            : plain_.actuate(command(time_s_ + h, step.end));
-    let_bristles_follow(plain_, step.end, step.end.motor_v);
+    if (slaved_) let_bristles_follow(plain_, step.end, step.end.motor_v);
     return step;
   }
 
@@ -414,7 +426,8 @@ class EventEngine {
   /// Moves to an event and through it. Returns the time it took, with its derivative.
   S pass(const Found& found, bool held) {
     S taken(found.after_s);
-    PlantState<S> at = rk4(dynamics_, state_, taken, held_motor(dynamics_, taken));
+    PlantState<S> at = rk4(dynamics_, state_, drive_, taken);
+    if (slaved_) let_bristles_follow(dynamics_, at, at.motor_v);
     if constexpr (!std::is_same_v<S, double>) {
       // The root moves with the parameters: dt = -dg / (dg/dt).
       const S g = event_indicator(dynamics_, at, contacts_, found.watch, options_);
@@ -447,8 +460,7 @@ class EventEngine {
   double indicator_slope(const Found& found) const {
     constexpr double aside_s = 1e-7;
     const auto g = [&](double t) {
-      const PlantState<double> s = rk4(plain_, plain_state(state_), t, held_motor(plain_, t));
-      return event_indicator(plain_, s, contacts_, found.watch, options_);
+      return event_indicator(plain_, plain_step(t), contacts_, found.watch, options_);
     };
     return (g(found.after_s + aside_s) - g(found.after_s)) / aside_s;
   }
