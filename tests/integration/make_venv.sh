@@ -5,5 +5,5 @@ folder=$1
 [ -x "$folder/bin/python" ] && "$folder/bin/python" -c 'import pymodbus' 2>/dev/null && exit 0
 rm -rf "$folder"
 python3 -m venv "$folder" || { echo "install python3-venv: no virtual environment can be made" >&2; exit 1; }
-"$folder/bin/pip" install --quiet --disable-pip-version-check 'pymodbus==3.6.9' 'pyserial==3.5' ||
+"$folder/bin/pip" install --quiet --disable-pip-version-check 'pymodbus==3.6.9' ||
   { echo "give this machine a way to PyPI: pymodbus cannot be installed" >&2; exit 1; }

@@ -1,14 +1,12 @@
 """An independent Modbus server: pymodbus with known counts, and the requests it saw.
 
-usage: pymodbus_server.py tcp|rtu PORT-OR-LINE. Prints 'ready' and then serves. Register 40 holds the last voltage
-register's value, so that the client's write can be read back through the same server.
+usage: pymodbus_server.py PORT. Prints 'ready', then serves and prints each write to the voltage register.
 """
 import asyncio
 import sys
 
 from pymodbus.datastore import ModbusSequentialDataBlock, ModbusServerContext, ModbusSlaveContext
-from pymodbus.framer import ModbusRtuFramer
-from pymodbus.server import StartAsyncSerialServer, StartAsyncTcpServer
+from pymodbus.server import StartAsyncTcpServer
 
 CART, PENDULUM = -123456, 70001  # as the test expects them
 
@@ -27,7 +25,7 @@ class Registers(ModbusSequentialDataBlock):
             print("voltage", values[0] if isinstance(values, list) else values, flush=True)
 
 
-async def main(link, where):
+async def main(port):
     holding = Registers(0, words(CART) + words(PENDULUM) + [7] + [0] * 60)
     inputs = ModbusSequentialDataBlock(0, words(CART) + words(PENDULUM) + [7] + [0] * 60)
     context = ModbusServerContext(ModbusSlaveContext(hr=holding, ir=inputs, zero_mode=True), single=True)
@@ -37,10 +35,7 @@ async def main(link, where):
         print("ready", flush=True)
 
     asyncio.get_running_loop().create_task(say_ready())
-    if link == "tcp":
-        await StartAsyncTcpServer(context, address=("127.0.0.1", int(where)))
-    else:
-        await StartAsyncSerialServer(context, framer=ModbusRtuFramer, port=where, baudrate=115200)
+    await StartAsyncTcpServer(context, address=("127.0.0.1", port))
 
 
-asyncio.run(main(sys.argv[1], sys.argv[2]))
+asyncio.run(main(int(sys.argv[1])))
