@@ -33,7 +33,8 @@ TEST_P(Pymodbus, GivesTheSameCountsBack) {
   ASSERT_TRUE(std::filesystem::exists(UPRIGHT_PYTHON))
       << "the virtual environment with pymodbus is missing: see the test pymodbus_environment";
   const int port = free_port();
-  Process server({UPRIGHT_PYTHON, UPRIGHT_SOURCE_DIR "/tests/integration/pymodbus_server.py", std::to_string(port)});
+  Process server(
+      {UPRIGHT_PYTHON, UPRIGHT_SOURCE_DIR "/tests/integration/pymodbus_server.py", std::to_string(port)});
   ASSERT_EQ(server.line(), "ready");
 
   Folder folder;

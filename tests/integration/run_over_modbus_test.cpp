@@ -58,6 +58,13 @@ Outcome run(const Case& c) {
   return outcome;
 }
 
+/// time_s of the last row of samples.
+double last_sample_s(const std::string& samples) {
+  const std::size_t end = samples.find_last_not_of('\n');
+  const std::string row = samples.substr(samples.rfind('\n', end) + 1);
+  return std::stod(row.substr(row.find(',') + 1));
+}
+
 class RunOverModbus : public testing::TestWithParam<Case> {};
 
 TEST_P(RunOverModbus, BalancesOrStopsAtZeroVolts) {
@@ -69,18 +76,23 @@ TEST_P(RunOverModbus, BalancesOrStopsAtZeroVolts) {
   if (!faulty) {
     EXPECT_EQ(outcome.exit_code, 0) << outcome.said << outcome.run_yaml;
   }
+  double let_go_s = 0.0, on_until_s = 0.0;
+  for (const TraceRow& row : outcome.trace) {
+    if (row.held && on_until_s == 0.0) let_go_s = row.time_s;
+    if (row.voltage_v != 0.0) on_until_s = row.time_s;
+  }
+  constexpr double watchdog_s = 0.1, margin_s = 0.05;
+  EXPECT_LT(on_until_s - let_go_s, last_sample_s(outcome.samples) + watchdog_s + margin_s);
   if (outcome.exit_code == 0) {
-    double last_held_s = 0.0, off_s = 0.0;
-    for (const TraceRow& row : outcome.trace) {
-      if (row.held) last_held_s = row.time_s;
-      if (row.voltage_v != 0.0) off_s = row.time_s;
-    }
-    EXPECT_GT(off_s - last_held_s, 0.9 * std::stod(duration()));
+    EXPECT_GT(on_until_s - let_go_s, 0.9 * std::stod(duration()));
     return;
   }
   // A stop: a whole report that names its cycle, with the samples kept.
   EXPECT_TRUE(outcome.exit_code == 3 || outcome.exit_code == 4) << outcome.said << outcome.run_yaml;
   EXPECT_NE(outcome.run_yaml.find("tick"), std::string::npos) << outcome.run_yaml;
+  if (std::string(GetParam().name).find("restart") != std::string::npos) {
+    EXPECT_NE(outcome.run_yaml.find("restarted"), std::string::npos) << outcome.run_yaml;
+  }
 }
 
 INSTANTIATE_TEST_SUITE_P(
