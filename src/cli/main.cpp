@@ -94,6 +94,7 @@ int run(int argc, char** argv) {
   upright::cli::add_sweep(app, exit_code);
   upright::cli::add_run(app, exit_code);
   upright::cli::add_replay(app, exit_code);
+  upright::cli::add_report(app, exit_code);
   upright::cli::add_design(app, exit_code);
   upright::cli::add_virtual_rig(app, exit_code);
   try {

@@ -303,7 +303,10 @@ std::string YamlMap::text(const std::string& key) const {
 }
 
 std::string YamlMap::text_or(const std::string& key, const std::string& fallback) const {
-  return has(key) ? text(key) : fallback;
+  const YAML::Node node = node_->find(key);
+  if (!node.IsDefined()) return fallback;
+  if (!node.IsScalar()) node_->fail(node, key, "is not a text", "give " + key + " a text");
+  return node.Scalar();
 }
 
 std::string YamlMap::choice(const std::string& key, const std::vector<std::string>& names) const {

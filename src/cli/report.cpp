@@ -1,0 +1,35 @@
+// `upright report`: one self-contained HTML file for what a path holds.
+#include <iostream>
+#include <memory>
+#include <string>
+
+#include "commands.hpp"
+#include "upright/model/error.hpp"
+#include "upright/report/run_report.hpp"
+
+namespace upright::cli {
+
+namespace {
+
+std::filesystem::path write_report(const std::filesystem::path& path) {
+  std::error_code ignored;
+  // A file of a run stands for its run.
+  const bool is_part = path.filename() == "run.yaml" || path.filename() == "samples.csv";
+  const std::filesystem::path directory = is_part ? path.parent_path() / "" : path;
+  if (std::filesystem::exists(directory / "run.yaml", ignored)) return write_run_report(directory);
+  if (!std::filesystem::exists(path, ignored))
+    throw ConfigError("check the path: there is no " + path.string());
+  throw ConfigError("name a folder that `upright run` made: " + path.string() + " holds no run.yaml");
+}
+
+}  // namespace
+
+void add_report(CLI::App& app, int&) {
+  CLI::App* command = app.add_subcommand("report", "One self-contained HTML file for a run");
+  command->footer("Example:  upright report runs/20260101T120000Z-run\nPrints the path of the report.");
+  const auto path = std::make_shared<std::string>();
+  command->add_option("path", *path, "A run directory")->required();
+  command->callback([path] { std::cout << write_report(*path).string() << "\n"; });
+}
+
+}  // namespace upright::cli

@@ -1,0 +1,116 @@
+// `upright report` on whole runs and on what is left of killed ones.
+#include <gtest/gtest.h>
+#include <signal.h>
+
+#include <algorithm>
+#include <chrono>
+#include <sstream>
+#include <thread>
+
+#include "command.hpp"
+
+namespace upright::testing {
+namespace {
+
+const std::string run_flags =
+    "--rig " UPRIGHT_SOURCE_DIR "/config/rigs/simulated.yaml --gains " UPRIGHT_SOURCE_DIR
+    "/config/gains/exponential.yaml --theta0-deg 3 ";
+
+/// Runs in virtual time and returns the run directory.
+std::filesystem::path fast_run(const TemporaryFolder& folder, const std::string& more) {
+  const CommandResult result =
+      run_upright("run --fast " + run_flags + more + " --out " + shell_quoted(folder.path().string()));
+  std::istringstream lines(result.out);
+  std::string last;
+  for (std::string line; std::getline(lines, line);) last = line;
+  return last;
+}
+
+std::string report_of(const std::filesystem::path& run) {
+  const CommandResult result = run_upright("report " + shell_quoted(run.string()));
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_EQ(result.out, (run / "report.html").string() + "\n");
+  return read_text(run / "report.html");
+}
+
+void expect_stands_alone(const std::string& html) {
+  for (const char* elsewhere : {"http:", "https:", "//", "src=", "@import", "<script", "<link", "<img"})
+    EXPECT_EQ(html.find(elsewhere), std::string::npos) << elsewhere << " in the page";
+  EXPECT_EQ(html.rfind("</html>\n"), html.size() - 8);
+}
+
+TEST(Report, OfAWholeRunAnswersFirstAndStandsAlone) {
+  const TemporaryFolder folder;
+  const std::string html = report_of(fast_run(folder, "--duration 10"));
+  const std::size_t answer = html.find("Stayed up for 10 s");
+  ASSERT_NE(answer, std::string::npos);
+  for (const char* part : {"pendulum angle", "cart position", "voltage", "Timing", "run.yaml", "sample rate"})
+    EXPECT_GT(html.find(part, answer), answer) << part;
+  expect_stands_alone(html);
+}
+
+TEST(Report, OfAFallSaysSo) {
+  const TemporaryFolder folder;
+  const std::string html = report_of(fast_run(folder, "--duration 10 --delay 0.4"));
+  EXPECT_EQ(html.find("Stayed up"), std::string::npos);
+  EXPECT_NE(html.find("class=\"answer bad\""), std::string::npos);
+}
+
+TEST(Report, OfATornLogShowsTheWholeRows) {
+  const TemporaryFolder folder;
+  const std::filesystem::path run = fast_run(folder, "--duration 3");
+  const std::string rows = read_text(run / "samples.csv");
+  std::filesystem::resize_file(run / "samples.csv", rows.size() / 2 + 7);
+  const std::string html = report_of(run);
+  EXPECT_NE(html.find("The last line of samples.csv was cut"), std::string::npos);
+  std::filesystem::resize_file(run / "samples.csv", rows.find('\n') + 1);
+  EXPECT_NE(report_of(run).find("The log holds no row"), std::string::npos);
+}
+
+TEST(Report, NeverTurnsWhatARunSaysIntoMarkup) {
+  const TemporaryFolder folder;
+  const std::filesystem::path run = fast_run(folder, "--duration 1");
+  std::string yaml = read_text(run / "run.yaml");
+  const std::size_t at = yaml.find("command: ");
+  yaml.replace(at, yaml.find('\n', at) - at, "command: '<script>alert(\"1\")</script>'");
+  folder.write(std::filesystem::relative(run / "run.yaml", folder.path()).string(), yaml);
+  const std::string html = report_of(run);
+  EXPECT_EQ(html.find("<script"), std::string::npos);
+  EXPECT_NE(html.find("&lt;script&gt;"), std::string::npos);
+}
+
+TEST(Report, OfAKilledRunStillWorks) {
+  const TemporaryFolder folder;
+  const CommandResult killed = run_shell(shell_quoted(UPRIGHT_BINARY) + " run " + run_flags +
+                                         "--duration 60 --out " + shell_quoted(folder.path().string()) +
+                                         " >/dev/null 2>&1 & child=$!; sleep 2; kill -9 $child; wait $child");
+  EXPECT_EQ(killed.exit_code, 128 + SIGKILL);
+  const std::filesystem::path run = std::filesystem::directory_iterator(folder.path())->path();
+  const std::string html = report_of(run);
+  EXPECT_NE(html.find("Cut short after"), std::string::npos);
+}
+
+TEST(Report, RefusesWhatIsNotARunWithOneSentence) {
+  const TemporaryFolder folder;
+  for (const std::string& path : {folder.path().string(), (folder.path() / "none").string(),
+                                  folder.write("broken/run.yaml", "a: [1").parent_path().string(),
+                                  folder.write("empty/run.yaml", "").parent_path().string()}) {
+    const CommandResult result = run_upright("report " + shell_quoted(path));
+    EXPECT_EQ(result.exit_code, 2) << path;
+    EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
+    EXPECT_NE(result.err.find(path), std::string::npos) << result.err;
+  }
+}
+
+TEST(Report, WithoutGnuplotNamesTheRemedy) {
+  const TemporaryFolder folder;
+  const std::filesystem::path run = fast_run(folder, "--duration 1");
+  const CommandResult result =
+      run_shell("PATH=" + shell_quoted(folder.path().string()) + "; " + shell_quoted(UPRIGHT_BINARY) +
+                " report " + shell_quoted(run.string()));
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_NE(result.err.find("install gnuplot"), std::string::npos) << result.err;
+}
+
+}  // namespace
+}  // namespace upright::testing
