@@ -25,12 +25,15 @@ table{border-collapse:collapse;margin:.8rem 0;font-size:.92rem}
 caption{text-align:left;color:#5a6775;padding-bottom:.3rem}
 th,td{text-align:left;padding:.25rem .9rem .25rem 0;border-bottom:1px solid #e6eaef;vertical-align:top;overflow-wrap:anywhere}
 th{color:#5a6775;font-weight:600}td.n,th.n{text-align:right;font-variant-numeric:tabular-nums;white-space:nowrap}
+dl{display:grid;grid-template-columns:repeat(auto-fit,minmax(26rem,1fr));column-gap:2rem;margin:.8rem 0;font-size:.92rem}
+dl div{display:flex;gap:1rem;padding:.25rem 0;border-bottom:1px solid #e6eaef}
+dt{flex:0 0 15rem;color:#5a6775;font-weight:600}dd{margin:0;overflow-wrap:anywhere;min-width:0}
 figure{margin:1rem 0}figure svg{display:block;width:100%;height:auto}
 .pair{display:grid;grid-template-columns:repeat(auto-fit,minmax(22rem,1fr));gap:.5rem}
 figcaption{color:#5a6775;font-size:.9rem}
 pre{background:#f5f7f9;border:1px solid #e1e6eb;border-radius:.3rem;padding:.8rem;overflow:auto;font-size:.85rem;line-height:1.35}
 summary{cursor:pointer;color:#24527a;margin:.5rem 0}
-@media print{body{max-width:none;margin:0}figure,table,.answer{break-inside:avoid}h2{break-after:avoid}}
+@media print{body{max-width:none;margin:0}figure,table,dl div,.answer{break-inside:avoid}h2{break-after:avoid}}
 )";
 
 const char* class_of(Tone tone) {
@@ -146,10 +149,10 @@ void HtmlPage::table(const HtmlTable& table) {
 }
 
 void HtmlPage::facts(const std::vector<std::pair<std::string, std::string>>& facts) {
-  body_ += "<table><tbody>\n";
+  body_ += "<dl>\n";
   for (const auto& [name, value] : facts)
-    body_ += "<tr>" + cell(name, "th", false) + cell(value, "td", false) + "</tr>\n";
-  body_ += "</tbody></table>\n";
+    body_ += "<div>" + cell(name, "dt", false) + cell(value, "dd", false) + "</div>\n";
+  body_ += "</dl>\n";
 }
 
 void HtmlPage::figure(const Plot& plot, const std::string& caption) {

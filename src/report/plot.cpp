@@ -204,7 +204,7 @@ struct Extent {
 /// A range for an axis. gnuplot complains of an empty one and rounds a given one; this leaves a small margin.
 std::string axis_settings(const std::string& name, const Axis& axis, const Extent& extent, double margin) {
   std::string text = "set " + name + "label " + quoted(axis.label) + "\n";
-  if (axis.logarithmic) text += "set logscale " + name + "\nset format " + name + " '%g'\n";
+  if (axis.logarithmic) text += "set logscale " + name + "\n";
   double low = axis.low.value_or(extent.low);
   double high = axis.high.value_or(extent.high);
   if (!(low <= high)) {
@@ -247,6 +247,15 @@ std::string axes(const Plot& plot) {
   return axis_settings("x", plot.x, x, room_beside ? 0.03 : 0.0) + axis_settings("y", y_axis, y, 0.06);
 }
 
+/// Bars as wide as the closest two are apart: left to itself, gnuplot fills empty places with wide ones.
+std::string bar_width(const Plot& plot) {
+  double width = std::numeric_limits<double>::infinity();
+  for (const Series& series : plot.series)
+    for (std::size_t i = 1; series.style == Series::Style::bars && i < series.x.size(); ++i)
+      width = std::min(width, std::abs(series.x[i] - series.x[i - 1]));
+  return std::isfinite(width) && width > 0.0 ? "set boxwidth " + exact_text(width) + " absolute\n" : "";
+}
+
 std::string marks(const Plot& plot) {
   std::string text;
   const std::string style = " nohead lc rgb '#888888' lw 1 dt 3 front\n";
@@ -269,15 +278,19 @@ std::string marks(const Plot& plot) {
 
 std::string script_for(const Plot& plot) {
   Curves curves;
-  std::string settings =
-      "set terminal svg size " + std::to_string(plot.width_px) + "," + std::to_string(plot.height_px) +
-      " noenhanced font 'sans-serif,12' background '#ffffff'\nset encoding utf8\nset border lc rgb "
-      "'#555555'\n"
-      "set grid lc rgb '#dddddd' lt 1\nset tics nomirror\nset key above right horizontal\nset samples 2\nset "
-      "tmargin 3\n";
+  std::string settings = "set terminal svg size " + std::to_string(plot.width_px) + "," +
+                         std::to_string(plot.height_px) +
+                         " noenhanced font 'sans-serif,12' background '#ffffff'\n"
+                         "set encoding utf8\n"
+                         "set border lc rgb '#555555'\n"
+                         "set grid lc rgb '#dddddd' lt 1\n"
+                         "set tics nomirror\n"
+                         "set format '%g'\n"
+                         "set key above right horizontal\n"
+                         "set tmargin 3\n";
   if (!plot.title.empty())
     settings += "set label " + quoted(plot.title) + " at graph 0, graph 1 left offset 0,0.9 font ',14'\n";
-  settings += axes(plot);
+  settings += axes(plot) + bar_width(plot);
   add_heat_map(plot, curves, settings);
   add_bands(plot, curves);
   add_series(plot, curves);

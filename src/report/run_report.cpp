@@ -138,8 +138,9 @@ void add_timing(HtmlPage& page, const RunData& run) {
   }
   page.table(table);
   if (run.period_s) plot.horizontal_marks.push_back({*run.period_s * 1e6, "period"});
-  page.figure(
-      plot, "An overrun is a period in which lateness, read, compute and write together exceed the period.");
+  page.figure(plot,
+              "An overrun is a cycle that ended after the next one was due; it is counted for the part that "
+              "took most.");
   page.figures(histograms, "How often each took how long; counts on a logarithmic scale.");
 }
 

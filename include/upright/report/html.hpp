@@ -36,7 +36,7 @@ class HtmlPage {
   void note(Tone tone, const std::string& text);
   /// Cells that read as numbers are aligned to the right.
   void table(const HtmlTable& table);
-  /// Names and values, two columns.
+  /// Names and their values, in two columns where there is room.
   void facts(const std::vector<std::pair<std::string, std::string>>& facts);
   void figure(const Plot& plot, const std::string& caption);
   /// Two figures beside each other where the window is wide enough.
