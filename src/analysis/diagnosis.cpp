@@ -25,6 +25,8 @@ constexpr double infinity = std::numeric_limits<double>::infinity();
 constexpr double least_evidence = 25.0;
 /// The same as a t value of the saving per segment, which stays honest where the noise is not white.
 constexpr double least_t = 3.0;
+/// And its size must be this many of its robust standard errors from nothing.
+constexpr double least_certainty = 4.0;
 /// What each parameter beyond the first must save on top: a simpler effect that does nearly as well is
 /// preferred.
 constexpr double parameter_price = 10.0;
@@ -134,6 +136,28 @@ class Diagnostician {
     return true;
   }
 
+  /// How many standard errors the size of an effect is from nothing.
+  static double certainty(const Hypothesis& h, std::size_t effect) {
+    for (std::size_t j = 0; j < h.free.size(); ++j) {
+      if (h.free[j].effect != effect || h.free[j].index != 0) continue;
+      const double neutral = effect_registry()[effect].parameters[0].neutral;
+      if (!std::isfinite(neutral)) return infinity;
+      const auto at = static_cast<Eigen::Index>(j);
+      return std::abs(h.train.point.plant.find(effect)->values[0] - neutral) /
+             std::sqrt(std::max(h.train.covariance(at, at), 1e-300));
+    }
+    return 0.0;
+  }
+
+  /// Gives the simpler hypothesis the richer one's noise to start from, so that a better estimate of the
+  /// noise is not taken for an effect. What `current_` becomes is at least as good as before.
+  void level_noise(const Hypothesis& richer) {
+    Hypothesis again = current_;
+    again.train.point.noise = richer.train.point.noise;
+    search_->refine(again, again);
+    if (again.train.objective < current_.train.objective) current_ = std::move(again);
+  }
+
   static double price_of(std::size_t effect) {
     return parameter_price * static_cast<double>(effect_registry()[effect].parameters.size() - 1);
   }
@@ -149,11 +173,12 @@ class Diagnostician {
     for (int round = 0; round < most_rounds; ++round) {
       const std::vector<std::size_t> candidates = open_candidates();
       std::vector<std::pair<double, Hypothesis>> screened;
+      const double sieved = search_->sieved(current_).train.objective;
       for (std::size_t c = 0; c < candidates.size(); ++c) {
         tell(0.05 + 0.2 * round + 0.12 * static_cast<double>(c) / static_cast<double>(candidates.size()),
              "trying " + kind_of(candidates[c]));
         Hypothesis h = search_->screened(current_, candidates[c]);
-        const double gain = search_->screened_gain(current_, h) - price_of(candidates[c]);
+        const double gain = sieved - h.train.objective - price_of(candidates[c]);
         if (round == 0) result_.candidates.push_back({candidates[c], 0.0, std::max(gain, 0.0)});
         screened.emplace_back(gain, std::move(h));
       }
@@ -172,10 +197,21 @@ class Diagnostician {
         Hypothesis h = screened[i].second;
         search_->refine(current_, h);
         if (round == 0) finalists_.emplace_back(candidates[i], h);
-        const Improvement improvement = compare(current_, h);
+        Improvement improvement = compare(current_, h);
         if (!is_plausible(h, candidates[i]) || !is_believed(improvement, candidates[i])) continue;
+        constexpr double overwhelming = 1000.0;
+        if (improvement.train < overwhelming) {
+          level_noise(h);
+          improvement = compare(current_, h);
+          if (!is_believed(improvement, candidates[i])) continue;
+        }
+        const bool correction = current_.train.point.plant.find(candidates[i]) != nullptr;
+        if (!correction && certainty(h, candidates[i]) < least_certainty) continue;
         const double score = improvement.train - price_of(candidates[i]);
-        if (!best || score > best_score) {
+        // Where two do equally well, the one that is registered first is the plainer one.
+        constexpr double equal = 4.0;
+        const bool plainer = best && candidates[i] < best_effect && score > best_score - equal;
+        if (!best || score > best_score + equal || plainer) {
           best = std::move(h);
           best_score = score;
           best_effect = candidates[i];
@@ -362,6 +398,10 @@ class Diagnostician {
       s.structured = true;
       text << "what is left comes in bursts: some stretches are " << s.dispersion
            << " times as far off as most";
+    } else if (s.force_tails > 5.5) {
+      s.structured = true;
+      text << "what is left comes in bursts: the residual force has a kurtosis of " << s.force_tails
+           << ", chance gives 3";
     } else if (s.force_explained > 0.15 || s.torque_explained > 0.15) {
       s.structured = true;
       const bool force = s.force_explained >= s.torque_explained;
@@ -418,6 +458,7 @@ class Diagnostician {
         if (std::find(found_.begin(), found_.end(), other) != found_.end()) continue;
         Hypothesis rival = search_->screened(without, other);
         if (!std::isfinite(rival.train.objective)) continue;
+        rival.train.point.noise = current_.train.point.noise;
         search_->refine(without, rival);
         const Improvement worse = compare(rival, current_);
         if (!is_plausible(rival, other)) continue;

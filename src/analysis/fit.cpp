@@ -37,7 +37,8 @@ EngineOptions fit_options() {
   return options;
 }
 
-/// How much of a record before a segment can still be acting at its start.
+/// Brings a simulator to the start of a segment with the commands that can still be acting there. Before the
+/// record the motor had no voltage.
 template <class S>
 void start_segment(Simulator<S>& simulator, const Measurement& run, const Segment& segment,
                    PlantState<S> state) {
@@ -50,7 +51,7 @@ void start_segment(Simulator<S>& simulator, const Measurement& run, const Segmen
   while (k > 0 && run.time_s[k] > start - history) --k;
   if (dynamics.has_motor_lag()) {
     // The lag is linear: follow it exactly over the part of the record that it still remembers.
-    S lagged = dynamics.actuate(S(run.voltage_v[k]));
+    S lagged = dynamics.actuate(S(k == 0 ? 0.0 : run.voltage_v[k]));
     S acting = lagged;
     S now = S(run.time_s[k]);
     const auto relax = [&](const S& until) {
@@ -67,7 +68,7 @@ void start_segment(Simulator<S>& simulator, const Measurement& run, const Segmen
     relax(S(start));
     state.motor_v = lagged;
   }
-  double acting_v = run.voltage_v[k];
+  double acting_v = k == 0 ? 0.0 : run.voltage_v[k];
   std::size_t next = k;
   while (next < segment.first && run.time_s[next] + delay <= start) acting_v = run.voltage_v[next++];
   simulator.start(state, start, acting_v);
@@ -382,6 +383,24 @@ NormalMatrix inverse_of(const NormalMatrix& h) {
          solver.eigenvectors().transpose() * scale.asDiagonal();
 }
 
+/// The scatter of the scores over segments, but in no direction less than the likelihood itself says: noise
+/// that is whiter than it looks must not shrink an interval.
+NormalMatrix robust_spread(const NormalMatrix& information, const NormalMatrix& spread) {
+  const Eigen::VectorXd scale = information.diagonal().cwiseMax(1e-300).cwiseSqrt();
+  const Eigen::VectorXd unscale = scale.cwiseInverse();
+  NormalMatrix unit = unscale.asDiagonal() * information * unscale.asDiagonal();
+  unit.diagonal().array() += 1e-12;
+  const Eigen::LLT<NormalMatrix> root(unit);
+  if (root.info() != Eigen::Success) return information;
+  NormalMatrix relative =
+      root.matrixL().solve(NormalMatrix(unscale.asDiagonal() * spread * unscale.asDiagonal()));
+  relative = root.matrixL().solve(NormalMatrix(relative.transpose()));
+  const Eigen::SelfAdjointEigenSolver<NormalMatrix> solver(0.5 * (relative + relative.transpose()));
+  const Eigen::VectorXd raised = solver.eigenvalues().cwiseMax(1.0);
+  const NormalMatrix half = scale.asDiagonal() * NormalMatrix(root.matrixL()) * solver.eigenvectors();
+  return half * raised.asDiagonal() * half.transpose();
+}
+
 class Fitter {
  public:
   Fitter(const FitData& data, const FitPoint& start, const std::vector<FreeParameter>& free,
@@ -397,13 +416,18 @@ class Fitter {
   FitResult run() {
     FitResult result;
     double objective = evaluate();
-    for (int round = 0;; ++round) {
-      if (round < options_.noise_rounds && std::isfinite(objective)) {
-        estimate_noise();
-        objective = evaluate();
-      }
+    if (options_.noise_rounds == 0) descend(objective);
+    if (options_.noise_last && std::isfinite(objective)) {
+      estimate_noise({4.0, 1.5, 1.15});
+      objective = evaluate();
+    }
+    for (int round = 0; round < options_.noise_rounds && std::isfinite(objective); ++round) {
+      const double before = objective;
+      estimate_noise({10.0, 2.0, 1.2, 1.04});
+      objective = evaluate();
       descend(objective);
-      if (round >= options_.noise_rounds || !std::isfinite(objective)) break;
+      constexpr double settled = 2.0;
+      if (round > 0 && before - objective < settled) break;
     }
     result.converged = converged_;
     finish(result);
@@ -580,7 +604,7 @@ class Fitter {
   }
 
   /// Maximum likelihood of the noise by a pattern search over decades, finer and finer.
-  void estimate_noise() {
+  void estimate_noise(const std::vector<double>& factors) {
     Noise best = point_.noise;
     double least = noise_objective(best);
     bool cart = false, pendulum = false;
@@ -596,7 +620,7 @@ class Fitter {
     const std::array<Knob, 3> knobs = {Knob{&Noise::force, 1e-5, 10.0, cart},
                                        Knob{&Noise::torque, 1e-7, 1.0, pendulum},
                                        Knob{&Noise::jitter_s, 1e-6, 1e-2, true}};
-    for (const double factor : {10.0, 3.0, 1.5, 1.15}) {
+    for (const double factor : factors) {
       bool better = true;
       for (int sweep = 0; sweep < 3 && better; ++sweep) {
         better = false;
@@ -651,15 +675,12 @@ class Fitter {
     const NormalMatrix inverse = inverse_of(h);
     const auto segments = static_cast<double>(normals_.size());
     const double small_sample = segments > np + 1.0 ? segments / (segments - 1.0) : 2.0;
-    const NormalMatrix sandwich = inverse * spread * inverse * small_sample;
-    // Noise that is whiter than it looks must not shrink the interval below what the likelihood itself says.
-    result.covariance = sandwich;
-    for (Eigen::Index j = 0; j < np; ++j)
-      if (sandwich(j, j) < inverse(j, j)) {
-        const double stretch = std::sqrt(inverse(j, j) / std::max(sandwich(j, j), 1e-300));
-        result.covariance.row(j) *= stretch;
-        result.covariance.col(j) *= stretch;
-      }
+    NormalMatrix prior = NormalMatrix::Zero(np, np);
+    for (Eigen::Index j = 0; j < np; ++j) {
+      const FreeParameter& p = free_[static_cast<std::size_t>(j)];
+      if (p.prior_sigma > 0.0) prior(j, j) = 1.0 / (p.prior_sigma * p.prior_sigma);
+    }
+    result.covariance = inverse * (robust_spread(h - prior, spread * small_sample) + prior) * inverse;
   }
 
   const FitData& data_;

@@ -92,17 +92,8 @@ void Search::judge(Hypothesis& h, const Noise* noise) {
   h.held = fit(held_, point, {}, options);
 }
 
-Hypothesis Search::as_given() {
-  FitOptions options;
-  options.starts_only = true;
-  options.noise_rounds = 2;
-  options.most_iterations = 6;
-  return fitted({}, {plant_, train_starts_, {0.05, 0.005, 0.0}}, options, {});
-}
-
 Hypothesis Search::baseline() {
   FitOptions options;
-  options.noise_rounds = 3;
   Hypothesis h = fitted({}, {plant_, train_starts_, {0.1, 0.01, 0.0}}, options, free_of({}));
   judge(h);
   return h;
@@ -114,6 +105,7 @@ Hypothesis Search::screened(const Hypothesis& base, std::size_t effect) {
   const std::vector<FreeParameter> free = free_of(added);
   FitOptions options;
   options.noise_rounds = 0;
+  options.noise_last = true;
   options.most_iterations = 4;
   FitPoint from = base.train.point;
   from.starts.clear();
@@ -134,18 +126,24 @@ Hypothesis Search::screened(const Hypothesis& base, std::size_t effect) {
   return best;
 }
 
-double Search::screened_gain(const Hypothesis& base, const Hypothesis& screened) const {
-  if (!std::isfinite(screened.train.objective)) return -infinity;
-  double before = 0.0, after = 0.0;
-  for (const std::size_t place : sieve_places_) before += base.train.segment_objective[place];
-  for (const double part : screened.train.segment_objective) after += part;
-  return before - after;
+Hypothesis Search::sieved(const Hypothesis& base) const {
+  FitOptions options;
+  options.noise_rounds = 0;
+  options.noise_last = true;
+  options.most_iterations = 2;
+  FitPoint point = base.train.point;
+  point.starts.clear();
+  for (const std::size_t place : sieve_places_) point.starts.push_back(base.train.point.starts[place]);
+  Hypothesis h;
+  h.added = base.added;
+  h.free = base.free;
+  h.train = fit(sieve_, point, base.free, options);
+  return h;
 }
 
 void Search::refine(const Hypothesis& base, Hypothesis& h) {
   if (!std::isfinite(h.train.objective)) return;
   FitOptions options;
-  options.noise_rounds = 2;
   FitPoint point{h.train.point.plant, base.train.point.starts, h.train.point.noise};
   h = fitted(h.added, point, options, h.free);
   judge(h);
@@ -164,7 +162,6 @@ Hypothesis Search::without(const Hypothesis& base, std::size_t effect) {
   h.train.objective = infinity;
   if (!fault_of(point.plant).empty()) return h;
   FitOptions options;
-  options.noise_rounds = 2;
   h = fitted(added, point, options, free_of(added));
   judge(h);
   return h;
@@ -190,7 +187,7 @@ Hypothesis Search::only(const std::vector<std::size_t>& effects, const Hypothesi
     free.insert(free.end(), parameters.begin(), parameters.end());
   }
   FitOptions options;
-  options.noise_rounds = fixed_noise != nullptr ? 0 : 2;
+  if (fixed_noise != nullptr) options.noise_rounds = 0;
   if (fixed_noise != nullptr) point.noise = *fixed_noise;
   Hypothesis h = fitted({effects.begin(), effects.end()}, point, options, free);
   judge(h);

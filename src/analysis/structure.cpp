@@ -146,6 +146,19 @@ std::pair<double, std::size_t> explained_share(const Rows& rows, const std::vect
   return {total > 0.0 ? 1.0 - left / total : 0.0, best};
 }
 
+/// Fourth moment over the square of the second: 3 for a Gaussian, more where a residual comes in bursts.
+/// Blocks at rest do not count, since friction hides the force there.
+double kurtosis_of(const std::vector<double>& y, const Rows& rows, std::size_t speed_feature) {
+  double second = 0.0, fourth = 0.0, count = 0.0;
+  for (std::size_t k = 0; k < y.size(); ++k) {
+    if (std::abs(rows.features[k][speed_feature]) < 2e-3) continue;
+    second += y[k] * y[k];
+    fourth += y[k] * y[k] * y[k] * y[k];
+    count += 1.0;
+  }
+  return count > 50.0 && second > 0.0 ? fourth * count / (second * second) : 3.0;
+}
+
 }  // namespace
 
 ResidualStructure examine_residuals(const FitData& data, const FitPoint& point) {
@@ -180,6 +193,7 @@ ResidualStructure examine_residuals(const FitData& data, const FitPoint& point) 
   const Rows rows = collect(data, smooth_residuals(data, point));
   const auto [force_share, force_feature] = explained_share(rows, rows.force);
   const auto [torque_share, torque_feature] = explained_share(rows, rows.torque);
+  result.force_tails = kurtosis_of(rows.force, rows, 1);
   result.force_explained = force_share;
   result.torque_explained = torque_share;
   result.force_feature = feature_names[force_feature];

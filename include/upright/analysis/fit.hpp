@@ -93,6 +93,7 @@ struct FitResult {
 struct FitOptions {
   int most_iterations = 12;
   int noise_rounds = 2;      ///< how often the noise is estimated anew; 0: as given
+  bool noise_last = false;   ///< with no rounds: estimate the noise once, roughly, after the descent
   bool starts_only = false;  ///< the plant is held: only initial states follow (held-out data)
   double tolerance = 1e-4;   ///< relative fall of the objective per sample at which to stop
 };

@@ -39,15 +39,13 @@ class Search {
   const FitData& train_data() const { return train_; }
   const FitData& held_data() const { return held_; }
 
-  /// The plant file as it is: nothing moves.
-  Hypothesis as_given();
   /// Base corrections and the plant's own effects within what is believed of them.
   Hypothesis baseline();
   /// Adds an effect to a hypothesis: a few steps from every start with the noise as it is, on a part of the
   /// training data.
   Hypothesis screened(const Hypothesis& base, std::size_t effect);
-  /// How much a screened hypothesis gains on that part.
-  double screened_gain(const Hypothesis& base, const Hypothesis& screened) const;
+  /// A hypothesis on that part alone, with which to compare.
+  Hypothesis sieved(const Hypothesis& base) const;
   /// Brings a screened hypothesis to convergence on the whole training data, noise included, and judges it.
   void refine(const Hypothesis& base, Hypothesis& hypothesis);
   /// The same hypothesis without one effect.
