@@ -7,6 +7,8 @@
 #include <vector>
 
 #include "commands.hpp"
+#include "upright/analysis/measurement.hpp"
+#include "upright/analysis/sweep.hpp"
 #include "upright/control/gain_file.hpp"
 #include "upright/hal/rig_file.hpp"
 #include "upright/model/error.hpp"
@@ -38,6 +40,9 @@ constexpr std::array file_kinds = {
     FileKind{"plant", "plant", [](const std::filesystem::path& file) { read_plant_file(file); }},
     FileKind{"gain", "gains", check_gains},
     FileKind{"rig", "backend", check_rig},
+    FileKind{"sweep", "sweep", [](const std::filesystem::path& file) { read_sweep_file(file); }},
+    FileKind{"dataset", "dataset",
+             [](const std::filesystem::path& file) { read_measurement(file.string()); }},
 };
 
 struct Finding {
