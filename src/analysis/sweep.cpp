@@ -41,7 +41,7 @@ bool earlier(const LoopCase& a, const LoopCase& b) {
 /// the same way every time.
 class Stages {
  public:
-  Stages(const SweepConfig& config, const SweepOptions& options, SweepTeam& team, SweepJournal& journal)
+  Stages(const SweepConfig& config, const SweepOptions& options, SweepTeam& team, SweepJournal* journal)
       : config_(config), options_(options), team_(team), journal_(journal) {}
 
   /// The runs of these cases, in their order; empty when stopped.
@@ -55,7 +55,7 @@ class Stages {
     for (std::size_t g = 0; g < groups; ++g) {
       const auto first = cases.begin() + static_cast<std::ptrdiff_t>(g * size);
       const std::size_t count = std::min(size, cases.size() - g * size);
-      const std::vector<SweepRun>* kept = journal_.find(stage_, g);
+      const std::vector<SweepRun>* kept = journal_ != nullptr ? journal_->find(stage_, g) : nullptr;
       if (kept != nullptr && kept->size() == count) {
         std::copy(kept->begin(), kept->end(), runs.begin() + static_cast<std::ptrdiff_t>(g * size));
         done_ += count;
@@ -69,7 +69,7 @@ class Stages {
         open,
         [&](std::size_t group, const std::vector<SweepRun>& made) {
           const std::size_t g = open_number[group];
-          journal_.keep(stage_, g, made);
+          if (journal_ != nullptr) journal_->keep(stage_, g, made);
           std::copy(made.begin(), made.end(), runs.begin() + static_cast<std::ptrdiff_t>(g * size));
           ++finished;
           done_ += made.size();
@@ -89,7 +89,7 @@ class Stages {
   const SweepConfig& config_;
   const SweepOptions& options_;
   SweepTeam& team_;
-  SweepJournal& journal_;
+  SweepJournal* journal_;
   std::size_t stage_ = 0, done_ = 0, known_ = 0, made_ = 0;
   bool interrupted_ = false;
 };
@@ -289,12 +289,22 @@ void prepare_folder(const std::filesystem::path& folder, bool overwrite) {
 
 }  // namespace
 
+std::vector<Transition> find_transitions(const SweepConfig& config, SweepTeam& team) {
+  const SweepOptions options;
+  Stages stages(config, options, team, nullptr);
+  TransitionSearch search(config, stages);
+  std::vector<SweepRun> runs;
+  search.bracket_by_halving(runs);
+  search.refine(runs);
+  return search.transitions();
+}
+
 SweepResult run_sweep(const SweepConfig& config, const std::filesystem::path& folder,
                       const SweepOptions& options, SweepTeam& team) {
   prepare_folder(folder, options.overwrite);
   const std::string mode = options.transitions_only ? "# transitions only\n" : "";
   SweepJournal journal(folder / "sweep.partial", mode + config.resolved_text);
-  Stages stages(config, options, team, journal);
+  Stages stages(config, options, team, &journal);
   TransitionSearch search(config, stages);
   SweepResult result;
   std::vector<SweepRun> refining;

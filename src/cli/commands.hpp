@@ -11,6 +11,7 @@ void add_check(CLI::App& app, int& exit_code);
 void add_design(CLI::App& app, int& exit_code);
 void add_diagnose(CLI::App& app, int& exit_code);
 void add_effects(CLI::App& app, int& exit_code);
+void add_paper(CLI::App& app, int& exit_code);
 void add_replay(CLI::App& app, int& exit_code);
 void add_report(CLI::App& app, int& exit_code);
 void add_run(CLI::App& app, int& exit_code);

@@ -91,6 +91,7 @@ int run(int argc, char** argv) {
   int exit_code = 0;
   upright::cli::add_effects(app, exit_code);
   upright::cli::add_check(app, exit_code);
+  upright::cli::add_paper(app, exit_code);
   upright::cli::add_sweep(app, exit_code);
   upright::cli::add_run(app, exit_code);
   upright::cli::add_replay(app, exit_code);

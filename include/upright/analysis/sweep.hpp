@@ -85,6 +85,9 @@ std::unique_ptr<SweepTeam> make_thread_team(const SweepConfig& config, unsigned 
 std::vector<SweepRun> run_sweep_group(const SweepConfig& config, const SweepTeam::Group& group);
 std::size_t sweep_group_size(const SweepConfig& config);
 
+/// The transitions alone, by bisection over the list of delays, nothing written.
+std::vector<Transition> find_transitions(const SweepConfig& config, SweepTeam& team);
+
 /// Runs the sweep and writes `sweep.csv`, `transitions.csv` and `sweep.yaml` into `folder`. While it goes on,
 /// `sweep.partial` there keeps what is done; a later call with the same sweep goes on from it. Throws
 /// ConfigError where the folder holds results already (unless `overwrite`) or those of another sweep.

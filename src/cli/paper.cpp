@@ -1,0 +1,37 @@
+// `upright paper`: the paper's figures and numbers recomputed, as a document with plots.
+#include "upright/report/paper.hpp"
+
+#include <cstdio>
+#include <memory>
+#include <string>
+
+#include "commands.hpp"
+#include "upright/model/error.hpp"
+
+namespace upright::cli {
+
+void add_paper(CLI::App& app, int&) {
+  CLI::App* command = app.add_subcommand("paper", "Recompute the paper's figures and tables");
+  command->footer("Example:  upright paper --out docs   (scripts/reproduce-paper.sh does this)");
+  const auto options = std::make_shared<PaperOptions>();
+  const auto out = std::make_shared<std::string>("runs/paper");
+  const auto config = std::make_shared<std::string>("config");
+  const auto overwrite = std::make_shared<bool>(false);
+  command->add_option("--out", *out, "Folder for paper.md and its plots; runs/paper when not given");
+  command->add_option("--config", *config, "The folder with gains, plants and rigs");
+  command->add_option("--threads", options->threads, "Threads; one per processor when not given")
+      ->check(CLI::Range(1u, 1024u));
+  command->add_flag("--overwrite", *overwrite, "Replace the document that is in the folder");
+  command->callback([=] {
+    const std::filesystem::path file = std::filesystem::path(*out) / "paper.md";
+    if (std::filesystem::exists(file) && !*overwrite)
+      throw ConfigError("give another --out, or --overwrite to replace it: " + file.string() + " exists");
+    options->config = *config;
+    options->progress = [](const std::string& part) { std::fprintf(stderr, "%s\n", part.c_str()); };
+    write_paper(*out, *options);
+    std::printf("%s\n", file.c_str());
+    std::fflush(stdout);
+  });
+}
+
+}  // namespace upright::cli
