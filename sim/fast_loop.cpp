@@ -151,9 +151,10 @@ class SmoothPeriod {
       : physics_(model, present) {
     const double smoothing = setup.model.smoothing;
     if (smoothing > 0.0) {
-      // tanh(smoothing v) turns within about 3 / smoothing; a step may sweep a third of 1 / smoothing.
+      // tanh(smoothing v) turns within about 3 / smoothing; a step may sweep 0.7 / smoothing of it (errors of
+      // 1e-8).
       turning_mps_ = 3.0 / smoothing;
-      sweep_mps_ = 0.35 / smoothing;
+      sweep_mps_ = 0.7 / smoothing;
     } else if (physics_.cart_has_kink()) {
       turning_mps_ = 0.0;
       sweep_mps_ = kink_sweep_mps;

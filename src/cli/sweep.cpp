@@ -1,6 +1,4 @@
 // `upright sweep`: outcomes over starting angle and delay, and the delays at which they change.
-#include "upright/analysis/sweep.hpp"
-
 #include <unistd.h>
 
 #include <array>
@@ -14,6 +12,7 @@
 #include <string>
 
 #include "commands.hpp"
+#include "upright/analysis/sweep_ranks.hpp"
 #include "upright/model/error.hpp"
 
 namespace upright::cli {
@@ -117,7 +116,7 @@ void print(const SweepResult& result, const std::string& folder) {
   std::fflush(stdout);
 }
 
-int run(const SweepArguments& arguments) {
+int run_here(const SweepArguments& arguments, const SweepRanks& ranks) {
   const SweepConfig config = read_sweep_file(arguments.file);
   const std::string folder = !arguments.out.empty()
                                  ? arguments.out
@@ -127,7 +126,7 @@ int run(const SweepArguments& arguments) {
   options.overwrite = arguments.overwrite;
   options.transitions_only = arguments.transitions_only;
   options.stop = &stop_asked;
-  const std::unique_ptr<SweepTeam> team = make_thread_team(config, arguments.threads);
+  const std::unique_ptr<SweepTeam> team = ranks.make_team(config, arguments.threads);
   SweepResult result;
   {
     const StopOnSignal on_signal;
@@ -143,6 +142,22 @@ int run(const SweepArguments& arguments) {
   throw Error(ExitCode::stopped,
               "give the same command again, it goes on from there: the sweep was stopped after " +
                   std::to_string(result.runs_made) + " runs, kept in " + folder);
+}
+
+/// On the ranks other than the first: it is the first that speaks, of errors too.
+int run_elsewhere(const SweepArguments& arguments, const SweepRanks& ranks) {
+  const StopOnSignal until_the_first_lets_go;
+  try {
+    ranks.serve(read_sweep_file(arguments.file), arguments.threads);
+  } catch (const Error& error) {
+    return static_cast<int>(error.code());
+  }
+  return static_cast<int>(ExitCode::done);
+}
+
+int run(const SweepArguments& arguments) {
+  const SweepRanks ranks;
+  return ranks.first() ? run_here(arguments, ranks) : run_elsewhere(arguments, ranks);
 }
 
 }  // namespace

@@ -1,0 +1,197 @@
+// The sampled loop on SIMD lanes beside the event engine and Boost odeint: errors against a tight reference
+// and milliseconds of CPU per run, in one go. tests/bench/sweep_bench.sh adds numba and scipy.
+//
+// 240 runs over starting angle and delay, 10 s each at 1 kHz, gain (7), velocity filter, no encoders (their
+// steps make the loop chaotic, so that trajectories cannot be compared).
+#include <algorithm>
+#include <boost/numeric/odeint.hpp>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <ctime>
+#include <vector>
+
+#include "upright/analysis/sweep.hpp"
+#include "upright/model/plant_file.hpp"
+#include "upright/sim/closed_loop.hpp"
+#include "upright/sim/fast_loop.hpp"
+
+namespace {
+
+using namespace upright;
+
+double cpu_s() {
+  timespec now{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+}
+
+LoopSetup setup_for(const std::string& plant, double smoothing) {
+  LoopSetup setup;
+  setup.model = make_model<double>(
+      read_plant_file(std::string(UPRIGHT_SOURCE_DIR) + "/config/plants/" + plant + ".yaml"));
+  setup.model.smoothing = smoothing;
+  setup.control.gains = {70.7107, 304.9273, 143.3152, 61.0833};
+  setup.sampled = true;
+  setup.duration_s = 10.0;
+  return setup;
+}
+
+/// Delays up to 14 ms, under which no start falls.
+std::vector<LoopCase> cases_240() {
+  std::vector<LoopCase> cases;
+  for (int delay_ms = 0; delay_ms < 15; ++delay_ms)
+    for (int i = 0; i < 16; ++i) cases.push_back({0.005 + 0.003 * i, 1e-3 * delay_ms});
+  return cases;
+}
+
+struct Rhs {
+  const Dynamics<double>* dynamics;
+  double motor_v;
+  void operator()(const std::array<double, 4>& y, std::array<double, 4>& rate, double) const {
+    const PlantState<double> d = dynamics->derivative({y[0], y[1], y[2], y[3]}, motor_v, {});
+    rate = {d.cart_m, d.theta_rad, d.cart_mps, d.theta_radps};
+  }
+};
+
+/// The loop around any way of crossing one period; `cross(rhs, state, period)`. Snapshots at `marks`.
+template <class Cross>
+std::vector<double> run_loop(const LoopSetup& setup, const LoopCase& start, const std::vector<double>& marks,
+                             Cross&& cross) {
+  const Dynamics<double> dynamics(setup.model);
+  ControlConfig control = setup.control;
+  control.delay_s = start.delay_s;
+  Controller controller(control, setup.amplifier_limit_v);
+  std::array<double, 4> state{0.0, start.theta0_rad, 0.0, 0.0};
+  std::vector<double> shown;
+  const double period_s = control.period_s();
+  const auto ticks = static_cast<std::uint64_t>(std::llround(setup.duration_s / period_s));
+  std::size_t mark = 0;
+  for (std::uint64_t tick = 0; tick < ticks; ++tick) {
+    ControlInput input;
+    input.tick = tick;
+    input.cart_m = state[0];
+    input.theta_rad = state[1];
+    cross(Rhs{&dynamics, dynamics.actuate(controller.step(input).voltage_v)}, state, period_s);
+    if (mark < marks.size() && static_cast<double>(tick + 1) * period_s >= marks[mark] - 1e-9) {
+      shown.push_back(state[1]);
+      ++mark;
+    }
+  }
+  return shown;
+}
+
+void tight(const Rhs& rhs, std::array<double, 4>& state, double period_s) {
+  boost::numeric::odeint::runge_kutta4<std::array<double, 4>> stepper;
+  constexpr int pieces = 64;
+  for (int i = 0; i < pieces; ++i) stepper.do_step(rhs, state, 0.0, period_s / pieces);
+}
+
+void dopri5(const Rhs& rhs, std::array<double, 4>& state, double period_s) {
+  namespace odeint = boost::numeric::odeint;
+  static thread_local auto stepper =
+      odeint::make_controlled(1e-8, 1e-8, odeint::runge_kutta_dopri5<std::array<double, 4>>());
+  odeint::integrate_adaptive(stepper, rhs, state, 0.0, period_s, period_s);
+}
+
+const std::vector<double> marks = {0.1, 0.25, 0.5, 1.0, 2.0, 5.0, 10.0};
+
+/// Largest error of the lanes at the marks: the run is made anew for each of them.
+double lane_error(LoopSetup setup, const std::vector<LoopCase>& cases,
+                  const std::vector<std::vector<double>>& truth) {
+  double worst = 0.0;
+  std::vector<LoopResult> results(lane_count);
+  for (std::size_t m = 0; m < marks.size(); ++m) {
+    setup.duration_s = marks[m];
+    for (std::size_t first = 0; first < cases.size(); first += lane_count) {
+      run_on_lanes(setup, std::span(cases).subspan(first, lane_count), results);
+      for (std::size_t i = 0; i < lane_count; ++i)
+        worst = std::max(worst, std::abs(results[i].end.theta_rad - truth[first + i][m]));
+    }
+  }
+  return worst;
+}
+
+double lanes_ms(const LoopSetup& setup, const std::vector<LoopCase>& cases) {
+  std::vector<LoopResult> results(lane_count);
+  double best = 1e300;
+  for (int repeat = 0; repeat < 5; ++repeat) {
+    const double begin = cpu_s();
+    for (std::size_t first = 0; first < cases.size(); first += lane_count)
+      run_on_lanes(setup, std::span(cases).subspan(first, lane_count), results);
+    best = std::min(best, cpu_s() - begin);
+  }
+  return 1e3 * best / static_cast<double>(cases.size());
+}
+
+double events_ms(const LoopSetup& setup, const std::vector<LoopCase>& cases) {
+  const double begin = cpu_s();
+  for (std::size_t i = 0; i < cases.size(); i += 4) run_with_events(setup, cases[i]);
+  return 1e3 * (cpu_s() - begin) / static_cast<double>(cases.size() / 4);
+}
+
+void smooth() {
+  const LoopSetup setup = setup_for("exponential", 100.0);
+  const std::vector<LoopCase> cases = cases_240();
+  std::vector<std::vector<double>> truth;
+  for (const LoopCase& start : cases) truth.push_back(run_loop(setup, start, marks, tight));
+  double odeint_error = 0.0;
+  double odeint_s = 0.0;
+  for (std::size_t i = 0; i < cases.size(); i += 4) {
+    const double begin = cpu_s();
+    const std::vector<double> shown = run_loop(setup, cases[i], marks, dopri5);
+    odeint_s += cpu_s() - begin;
+    for (std::size_t m = 0; m < shown.size(); ++m)
+      odeint_error = std::max(odeint_error, std::abs(shown[m] - truth[i][m]));
+  }
+  const double odeint_ms = 1e3 * odeint_s / static_cast<double>(cases.size() / 4);
+  const double lanes = lanes_ms(setup, cases), events = events_ms(setup, cases);
+  std::printf("smooth exponential friction, 240 runs of 10 s, sampled at 1 kHz, one core\n");
+  std::printf("  lanes          %8.3f ms per run, error %.1e rad, %.0f runs per second\n", lanes,
+              lane_error(setup, cases, truth), 1e3 / lanes);
+  std::printf("  event engine   %8.3f ms per run (%.1f times the lanes)\n", events, events / lanes);
+  std::printf("  Boost odeint   %8.3f ms per run (%.1f times the lanes), error %.1e rad\n", odeint_ms,
+              odeint_ms / lanes, odeint_error);
+  std::printf("LANES_MS %.6f\n", lanes);
+}
+
+void stick_slip() {
+  const LoopSetup setup = setup_for("exponential", 0.0);
+  const std::vector<LoopCase> cases = cases_240();
+  const double lanes = lanes_ms(setup, cases), events = events_ms(setup, cases);
+  std::printf("true stick-slip, the same runs\n  lanes          %8.3f ms per run\n", lanes);
+  std::printf("  event engine   %8.3f ms per run (%.1f times the lanes)\n", events, events / lanes);
+  const LoopSetup bristles = setup_for("dynamic", 0.0);
+  std::printf("bristles, the same runs\n  lanes          %8.3f ms per run\n", lanes_ms(bristles, cases));
+}
+
+/// One core against two, by the clock on the wall; disturbed by whatever else runs.
+void cores() {
+  SweepConfig config;
+  config.setup = setup_for("exponential", 100.0);
+  std::vector<SweepTeam::Group> groups;
+  const std::vector<LoopCase> cases = cases_240();
+  for (std::size_t first = 0; first < cases.size(); first += lane_count)
+    for (int repeat = 0; repeat < 12; ++repeat)
+      groups.emplace_back(cases.begin() + static_cast<std::ptrdiff_t>(first),
+                          cases.begin() + static_cast<std::ptrdiff_t>(first + lane_count));
+  double wall_s[2] = {1e300, 1e300};
+  for (int repeat = 0; repeat < 5; ++repeat)
+    for (const unsigned threads : {1u, 2u}) {
+      const auto begin = std::chrono::steady_clock::now();
+      make_thread_team(config, threads)
+          ->run(
+              groups, [](std::size_t, const std::vector<SweepRun>&) {}, nullptr);
+      const double spent = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+      wall_s[threads - 1] = std::min(wall_s[threads - 1], spent);
+    }
+  std::printf("two threads    %8.2f times one\n", wall_s[0] / wall_s[1]);
+}
+
+}  // namespace
+
+int main() {
+  smooth();
+  stick_slip();
+  cores();
+}
