@@ -202,10 +202,10 @@ class Paper {
     std::vector<Series> all;
     add_transitions(c, "sign, no limit", 0, false, all);
     c.limit_v = 9.0;
-    add_transitions(c, "sign, 9 V", 1, false, all);
+    add_transitions(c, "sign, 9 V", 1, true, all);
     c.limit_v = 0.0;
     c.smoothing = paper_smoothing;
-    add_transitions(c, "tanh(100 v), no limit", 2, true, all);
+    add_transitions(c, "tanh(100 v), no limit", 2, false, all);
     basin("figure-7", "Figure 7: where the outcome changes, exponential friction", all, 0.1069);
     say("The dotted line is the critical delay of the linear analysis, 0.1069 s. Left of the dashed line of "
         "a colour the pendulum comes to rest (below 0.0016 rad), right of the full line it "
@@ -387,7 +387,7 @@ class Paper {
       rests_line.x.push_back(t.oscillates_from_s);
       rests_line.y.push_back(t.theta0_rad / degree);
     }
-    if (rests || c.smoothing == 0.0) all.push_back(rests_line);
+    if (rests) all.push_back(rests_line);
     all.push_back(falls_line);
   }
 

@@ -1,0 +1,166 @@
+#include "upright/report/sweep_report.hpp"
+
+#include <array>
+#include <cmath>
+#include <cstdlib>
+#include <fstream>
+#include <limits>
+#include <map>
+#include <numbers>
+#include <set>
+#include <sstream>
+#include <vector>
+
+#include "upright/model/error.hpp"
+#include "upright/report/html.hpp"
+#include "upright/report/plot.hpp"
+
+namespace upright {
+
+namespace {
+
+constexpr double per_degree = 180.0 / std::numbers::pi;
+const std::array<std::string, 3> outcomes = {"stable", "oscillating", "fell"};
+
+using Row = std::vector<std::string>;
+
+std::vector<Row> read_rows(const std::filesystem::path& file, const std::string& header,
+                           std::size_t columns) {
+  std::ifstream in(file);
+  std::string line;
+  if (!std::getline(in, line) || line != header)
+    throw ConfigError("name a folder that `upright sweep` finished: " + file.string() + " has no header " +
+                      header);
+  std::vector<Row> rows;
+  while (std::getline(in, line)) {
+    Row row;
+    std::istringstream cells(line);
+    for (std::string cell; std::getline(cells, cell, ',');) row.push_back(cell);
+    if (row.size() != columns)
+      throw ConfigError("make the sweep anew: " + file.string() + ":" + std::to_string(rows.size() + 2) +
+                        ": has not " + std::to_string(columns) + " columns");
+    rows.push_back(row);
+  }
+  return rows;
+}
+
+double number(const std::string& cell) {
+  return std::strtod(cell.c_str(), nullptr);
+}
+
+std::string milliseconds(double value_s) {
+  return std::isnan(value_s) ? "-" : number_text(1e3 * value_s, 4);
+}
+
+std::string file_text(const std::filesystem::path& file) {
+  std::ostringstream text;
+  text << std::ifstream(file).rdbuf();
+  return text.str();
+}
+
+struct Map {
+  std::vector<double> delays_s, angles_deg;
+  std::map<std::pair<double, double>, int> outcome;  // by angle, delay
+  std::array<std::size_t, 3> counts{};
+};
+
+Map read_map(const std::filesystem::path& folder) {
+  Map map;
+  std::set<double> delays, angles;
+  for (const Row& row :
+       read_rows(folder / "sweep.csv",
+                 "theta0_rad,delay_s,outcome,theta_amplitude_rad,cart_amplitude_m,fall_time_s", 6)) {
+    const double angle = number(row[0]) * per_degree, delay = number(row[1]);
+    std::size_t k = 0;
+    while (k < outcomes.size() && outcomes[k] != row[2]) ++k;
+    if (k == outcomes.size())
+      throw ConfigError("make the sweep anew: " + (folder / "sweep.csv").string() + " has the outcome " +
+                        row[2]);
+    ++map.counts[k];
+    map.outcome[{angle, delay}] = static_cast<int>(k);
+    delays.insert(delay);
+    angles.insert(angle);
+  }
+  map.delays_s.assign(delays.begin(), delays.end());
+  map.angles_deg.assign(angles.begin(), angles.end());
+  return map;
+}
+
+/// The map over logarithmic axes where all values are positive; a delay of zero has no place on one and is
+/// left to the table and the file.
+Plot map_plot(const Map& map, const std::vector<Row>& transitions, bool log_delay) {
+  Plot plot;
+  plot.height_px = 460;
+  plot.x.label = "delay [s]";
+  plot.x.logarithmic = log_delay;
+  plot.y.label = "initial angle [degree]";
+  plot.y.logarithmic = map.angles_deg.front() > 0.0 && map.angles_deg.size() > 2;
+  HeatMap heat;
+  for (const double delay : map.delays_s)
+    if (delay > 0.0 || !log_delay) heat.x.push_back(delay);
+  heat.y = map.angles_deg;
+  for (const double angle : heat.y)
+    for (const double delay : heat.x) {
+      const auto it = map.outcome.find({angle, delay});
+      heat.values.push_back(it == map.outcome.end() ? std::numeric_limits<double>::quiet_NaN() : it->second);
+    }
+  heat.classes.assign(outcomes.begin(), outcomes.end());
+  plot.heat_map = heat;
+  Series falls;
+  falls.name = "falls from (0.1 ms)";
+  for (const Row& row : transitions) {
+    falls.x.push_back(number(row[2]));
+    falls.y.push_back(number(row[0]) * per_degree);
+  }
+  plot.series = {falls};
+  return plot;
+}
+
+}  // namespace
+
+bool is_sweep_folder(const std::filesystem::path& folder) {
+  std::error_code ignored;
+  return std::filesystem::exists(folder / "sweep.csv", ignored) ||
+         std::filesystem::exists(folder / "sweep.partial", ignored);
+}
+
+std::filesystem::path write_sweep_report(const std::filesystem::path& folder) {
+  std::error_code ignored;
+  if (!std::filesystem::exists(folder / "sweep.csv", ignored))
+    throw ConfigError("give the sweep command again, it goes on from there: " + folder.string() +
+                      " holds an unfinished sweep");
+  const Map map = read_map(folder);
+  const std::vector<Row> transitions =
+      read_rows(folder / "transitions.csv", "theta0_rad,oscillates_from_s,falls_from_s", 3);
+  if (map.outcome.empty()) throw ConfigError("make the sweep anew: " + folder.string() + " holds no runs");
+
+  HtmlPage page("Delay sweep", folder.string());
+  double first_fall = std::numeric_limits<double>::infinity();
+  for (const Row& row : transitions)
+    if (number(row[2]) < first_fall) first_fall = number(row[2]);
+  const std::string counts = std::to_string(map.counts[0]) + " runs are stable, " +
+                             std::to_string(map.counts[1]) + " oscillate, " + std::to_string(map.counts[2]) +
+                             " fell.";
+  if (std::isfinite(first_fall))
+    page.answer(Tone::warning, "Falls from " + milliseconds(first_fall) + " ms", counts);
+  else
+    page.answer(Tone::good, "No start falls within these delays", counts);
+  page.section("Outcome over delay and initial angle");
+  page.figure(map_plot(map, transitions, false), "The map, delay linear.");
+  if (map.delays_s.size() > 3)
+    page.figure(map_plot(map, transitions, true), "The same, both axes logarithmic where they can be.");
+  page.section("Where the outcome changes");
+  HtmlTable table;
+  table.header = {"initial angle [degree]", "oscillates from [ms]", "falls from [ms]"};
+  for (const Row& row : transitions)
+    table.rows.push_back({number_text(number(row[0]) * per_degree, 4), milliseconds(number(row[1])),
+                          milliseconds(number(row[2]))});
+  table.caption = "Found by bisection to 0.1 ms; a dash: not within the delays of the sweep.";
+  page.table(table);
+  page.folded("The sweep with its plant and gains", file_text(folder / "sweep.yaml"));
+  const std::filesystem::path file = folder / "report.html";
+  page.write(file);
+  return file;
+}
+
+}  // namespace upright
