@@ -68,6 +68,16 @@ TEST_F(SweepCommand, WritesItsResultsAndOneJsonDocument) {
             "theta0_rad,delay_s,outcome,theta_amplitude_rad,cart_amplitude_m,fall_time_s\n0.008");
 }
 
+TEST_F(SweepCommand, ReportDrawsTheMap) {
+  EXPECT_EQ(run_upright("sweep " + file() + " --out " + out("a")).exit_code, 0);
+  const CommandResult report = run_upright("report " + out("a"));
+  EXPECT_EQ(report.exit_code, 0) << report.err;
+  const std::string page = content(folder_ / "a" / "report.html");
+  EXPECT_NE(page.find("Falls from"), std::string::npos);
+  EXPECT_NE(page.find("oscillating"), std::string::npos);
+  EXPECT_NE(page.find("<svg"), std::string::npos);
+}
+
 TEST_F(SweepCommand, RefusesToOverwriteAndSaysHow) {
   EXPECT_EQ(run_upright("sweep " + file() + " --out " + out("a")).exit_code, 0);
   const CommandResult again = run_upright("sweep " + file() + " --out " + out("a"));
