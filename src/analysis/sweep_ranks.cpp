@@ -1,11 +1,14 @@
 #include "upright/analysis/sweep_ranks.hpp"
 
+#include <cstdlib>
+
+#include "upright/model/error.hpp"
+
 #ifdef UPRIGHT_WITH_MPI
 #include <mpi.h>
 
 #include <algorithm>
 #include <chrono>
-#include <cstdlib>
 #include <exception>
 #include <mutex>
 #include <thread>
@@ -13,18 +16,22 @@
 
 namespace upright {
 
-#ifdef UPRIGHT_WITH_MPI
-
 namespace {
-
-enum Tag : int { work_tag = 1, result_tag = 2, end_tag = 3 };
-constexpr auto patience = std::chrono::microseconds(200);  // between looks for a message; a wait would spin
 
 bool started_by_mpirun() {
   for (const char* name : {"OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "PMIX_RANK"})
     if (std::getenv(name) != nullptr) return true;  // NOLINT(concurrency-mt-unsafe): before any thread
   return false;
 }
+
+}  // namespace
+
+#ifdef UPRIGHT_WITH_MPI
+
+namespace {
+
+enum Tag : int { work_tag = 1, result_tag = 2, end_tag = 3 };
+constexpr auto patience = std::chrono::microseconds(200);  // between looks for a message; a wait would spin
 
 void send(int rank, Tag tag, const std::vector<double>& numbers) {
   MPI_Send(numbers.data(), static_cast<int>(numbers.size()), MPI_DOUBLE, rank, tag, MPI_COMM_WORLD);
@@ -210,7 +217,10 @@ void SweepRanks::serve(const SweepConfig& config, unsigned threads) const {
 
 #else
 
-SweepRanks::SweepRanks() = default;
+SweepRanks::SweepRanks() {
+  if (started_by_mpirun())
+    throw ConfigError("install libopenmpi-dev and build again, or go without mpirun: built without MPI");
+}
 SweepRanks::~SweepRanks() = default;
 
 std::unique_ptr<SweepTeam> SweepRanks::make_team(const SweepConfig& config, unsigned threads) const {
