@@ -177,7 +177,7 @@ std::filesystem::path write_run_report(const std::filesystem::path& run_director
   page.section("Configuration and provenance");
   page.facts(run.provenance);
   page.folded("run.yaml: everything this run was made of", run.run_yaml);
-  const std::filesystem::path file = run_directory / "report.html";
+  std::filesystem::path file = run_directory / "report.html";
   page.write(file);
   return file;
 }
