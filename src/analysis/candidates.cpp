@@ -30,6 +30,11 @@ FreeParameter free_parameter(std::size_t effect, std::size_t index) {
   return p;
 }
 
+/// A force along the track counts as one that repeats when the run passes three of its crests.
+double longest_pitch_m(const DataRange& range) {
+  return std::max(0.002, (range.cart_high_m - range.cart_low_m) / 3.0);
+}
+
 }  // namespace
 
 DataRange range_of(const std::vector<Measurement>& runs) {
@@ -77,6 +82,9 @@ std::vector<FreeParameter> free_parameters(std::size_t effect, const DataRange& 
     } else if (is_named(effect, "stribeck_friction") && name == "velocity_mps") {
       p.low = 1e-3;
       p.high = std::max(0.02, 0.5 * range.largest_speed_mps);
+    } else if (name == "pitch_m") {
+      p.low = 5e-4;
+      p.high = longest_pitch_m(range);
     } else if (name == "center_m") {
       p.prior_mean = range.cart_mean_m;
       p.prior_sigma = 0.5;
@@ -169,7 +177,7 @@ std::vector<std::vector<double>> cogging_starts(const std::vector<std::pair<doub
   std::vector<std::pair<double, std::vector<double>>> found;
   const double travel = range.cart_high_m - range.cart_low_m;
   if (force_residual.size() < 50 || travel <= 0.0) return {{0.3, 0.02, 0.0}};
-  const double smallest = 0.001, largest = std::min(0.2, travel);
+  const double smallest = 0.001, largest = longest_pitch_m(range);
   // Frequencies over the track one half-cycle apart, so that no crest is missed.
   const double spacing = 0.25 / travel;
   for (double f = 1.0 / largest; f <= 1.0 / smallest; f += spacing) {

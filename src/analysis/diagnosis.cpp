@@ -25,6 +25,8 @@ constexpr double infinity = std::numeric_limits<double>::infinity();
 constexpr double least_evidence = 25.0;
 /// The same as a t value of the saving per segment, which stays honest where the noise is not white.
 constexpr double least_t = 3.0;
+/// Evidence so large that coloured noise cannot have made it, however few the segments are that hold it.
+constexpr double overwhelming_evidence = 1000.0;
 /// And its size must be this many of its robust standard errors from nothing.
 constexpr double least_certainty = 4.0;
 /// What each parameter beyond the first must save on top: a simpler effect that does nearly as well is
@@ -105,6 +107,7 @@ class Diagnostician {
       throw ConfigError("check the plant file: the model cannot be simulated with these runs");
     current_ = given_;
     grow();
+    try_pairs();
     prune();
     settle_corrections();
     conclude();
@@ -162,9 +165,36 @@ class Diagnostician {
     return parameter_price * static_cast<double>(effect_registry()[effect].parameters.size() - 1);
   }
 
-  bool is_believed(const Improvement& improvement, std::size_t effect) const {
-    return improvement.train - price_of(effect) > least_evidence && improvement.held > 0.0 &&
-           improvement.t_value > least_t;
+  static bool is_believed(const Improvement& improvement, std::size_t effect) {
+    const double evidence = improvement.train - price_of(effect);
+    if (evidence < least_evidence || !(improvement.held > 0.0)) return false;
+    return improvement.t_value > least_t || evidence > overwhelming_evidence;
+  }
+
+  /// Where a hypothesis and the data disagree most: in which equation, with what it goes, and when.
+  std::string locate(const Hypothesis& h) const {
+    const ResidualStructure structure = examine_residuals(train_, h.train.point);
+    const bool force = structure.force_explained >= structure.torque_explained;
+    std::size_t worst = 0;
+    double largest = 0.0;
+    for (std::size_t s = 0; s < h.train.segment_chi_square.size(); ++s) {
+      const double mean = h.train.segment_chi_square[s] /
+                          static_cast<double>(std::max<std::size_t>(h.train.segment_samples[s], 1));
+      if (mean <= largest) continue;
+      largest = mean;
+      worst = s;
+    }
+    const Segment& segment = train_.segments[worst];
+    const Measurement& run = runs_[segment.run];
+    std::ostringstream text;
+    text.precision(3);
+    text << "in the " << (force ? "cart" : "pendulum") << " equation: the residual "
+         << (force ? "force" : "torque") << " goes with "
+         << (force ? structure.force_feature : structure.torque_feature) << " ("
+         << std::lround(100.0 * std::max(0.0, force ? structure.force_explained : structure.torque_explained))
+         << " percent of it can be predicted); the worst stretch is " << run.name << " from "
+         << run.time_s[segment.first] << " to " << run.time_s[segment.last] << " s";
+    return text.str();
   }
 
   void grow() {
@@ -199,8 +229,7 @@ class Diagnostician {
         if (round == 0) finalists_.emplace_back(candidates[i], h);
         Improvement improvement = compare(current_, h);
         if (!is_plausible(h, candidates[i]) || !is_believed(improvement, candidates[i])) continue;
-        constexpr double overwhelming = 1000.0;
-        if (improvement.train < overwhelming) {
+        if (improvement.train < overwhelming_evidence) {
           level_noise(h);
           improvement = compare(current_, h);
           if (!is_believed(improvement, candidates[i])) continue;
@@ -218,6 +247,7 @@ class Diagnostician {
         }
       }
       if (!best) return;
+      where_[best_effect] = locate(current_);
       current_ = std::move(*best);
       found_.push_back(best_effect);
       // What gained a fair share of the same may be the same thing by another name.
@@ -227,6 +257,36 @@ class Diagnostician {
       for (std::size_t i = 0; i < candidates.size(); ++i)
         if (candidates[i] != best_effect && screened[i].first > 0.3 * winning) near.push_back(candidates[i]);
     }
+  }
+
+  /// Two effects can hide each other, so that a third, which resembles both, is found instead. Every pair of
+  /// the first round's best candidates is tried in the place of what was found of them.
+  void try_pairs() {
+    if (found_.empty() || finalists_.size() < 2) return;
+    std::optional<Hypothesis> best;
+    std::vector<std::size_t> best_found;
+    for (std::size_t a = 0; a < finalists_.size(); ++a)
+      for (std::size_t b = a + 1; b < finalists_.size(); ++b) {
+        const std::size_t first = finalists_[a].first, second = finalists_[b].first;
+        const auto has = [&](std::size_t e) {
+          return std::find(found_.begin(), found_.end(), e) != found_.end();
+        };
+        if (found_.size() > 2 || (found_.size() == 2 && has(first) && has(second))) continue;
+        tell(0.83, "trying " + kind_of(first) + " with " + kind_of(second));
+        Hypothesis h = search_->with_pair(given_, finalists_[a].second, finalists_[b].second);
+        const Improvement improvement = compare(best ? *best : current_, h);
+        const double price = parameter_price * static_cast<double>(h.free.size() - current_.free.size());
+        if (improvement.train - price < least_evidence || improvement.held < 0.0) continue;
+        if (!is_plausible(h, first) || !is_plausible(h, second)) continue;
+        if (certainty(h, first) < least_certainty || certainty(h, second) < least_certainty) continue;
+        best = std::move(h);
+        best_found = {first, second};
+      }
+    if (!best) return;
+    for (const std::size_t effect : best_found)
+      if (!where_.contains(effect)) where_[effect] = where_.begin()->second;
+    current_ = std::move(*best);
+    found_ = best_found;
   }
 
   /// Backward deletion: what is no longer needed once others are there goes.
@@ -305,7 +365,7 @@ class Diagnostician {
     tell(0.88, "fitting what is left");
     std::vector<std::size_t> all = found_;
     all.insert(all.end(), corrections.begin(), corrections.end());
-    final_ = search_->only(all, current_, nullptr);
+    final_ = search_->only(all, current_, nullptr, true);
     order_corrections(corrections);
   }
 
@@ -334,18 +394,23 @@ class Diagnostician {
     result_.noise = final_.train.point.noise;
     std::vector<std::size_t> all = found_;
     all.insert(all.end(), corrections_.begin(), corrections_.end());
-    Hypothesis step = search_->only({}, final_, &noise);
-    result_.gap_before = gap_of(step);
-    double gap = result_.gap_before;
+    const Noise& fitted_noise = final_.train.point.noise;
+    const auto gap_with = [&](const std::vector<std::size_t>& effects, const Hypothesis& from, bool settled) {
+      Hypothesis h = search_->only(effects, from, &fitted_noise, settled);
+      if (held_.segments.empty()) return whitened_rms(h.train);
+      search_->judge(h, &noise);
+      return whitened_rms(h.held);
+    };
+    double gap = result_.gap_before = gap_with({}, final_, false);
     for (std::size_t i = 0; i < all.size(); ++i) {
       const std::vector<std::size_t> first(all.begin(), all.begin() + static_cast<std::ptrdiff_t>(i) + 1);
       FoundEffect found;
       found.effect = all[i];
       found.gap_before = gap;
-      step = i + 1 == all.size() && !structure.structured ? final_ : search_->only(first, final_, &noise);
-      gap = gap_of(step);
+      gap = gap_with(first, final_, i + 1 == all.size());
       found.gap_after = gap;
       found.parameters = estimates_of(all[i], final_);
+      if (where_.contains(all[i])) found.where = where_.at(all[i]);
       result_.effects.push_back(found);
     }
     result_.gap_after = gap;
@@ -356,7 +421,7 @@ class Diagnostician {
       for (const auto& [effect, h] : finalists_) {
         if (effect != candidate.effect) continue;
         candidate.evidence = compare(given_, h).train;
-        candidate.gap_after = gap_of(search_->only({effect}, h, &noise));
+        candidate.gap_after = gap_with({effect}, h, false);
       }
     }
     std::stable_sort(result_.candidates.begin(), result_.candidates.end(),
@@ -368,6 +433,7 @@ class Diagnostician {
   Noise sensor_noise() const {
     Noise noise = final_.train.point.noise;
     noise.force = noise.torque = 0.0;
+    noise.sensors = 1.0;
     return noise;
   }
 
@@ -378,7 +444,9 @@ class Diagnostician {
     point.starts.insert(point.starts.end(), final_.held.point.starts.begin(), final_.held.point.starts.end());
     ResidualStructure structure = examine_residuals(all, point);
     const Noise quiet = sensor_noise();
-    structure.noise_ratio = gap_of(search_->only(all_found(), final_, &quiet));
+    Hypothesis plain = final_;
+    search_->judge(plain, &quiet);
+    structure.noise_ratio = gap_of(plain);
     judge_structure(structure);
     return structure;
   }
@@ -392,7 +460,7 @@ class Diagnostician {
   static void judge_structure(ResidualStructure& s) {
     std::ostringstream text;
     text.precision(3);
-    if (s.noise_ratio < 1.1) {
+    if (s.noise_ratio < 1.15) {
       text << "what is left is the sensors' own noise";
     } else if (s.dispersion > 1.6) {
       s.structured = true;
@@ -415,11 +483,37 @@ class Diagnostician {
     s.sentence = text.str();
   }
 
-  Plant final_model() const {
+  /// The plant file with the effects added. What moved within what is believed of it goes into the numbers
+  /// that were there.
+  Plant final_model() {
     Plant model = plant_;
-    for (const std::size_t effect : all_found())
-      model.set(effect, final_.train.point.plant.find(effect)->values);
+    const std::vector<std::size_t> all = all_found();
+    if (all.empty()) return model;
+    const Plant& fitted = final_.train.point.plant;
+    for (const std::size_t effect : search_->nuisances()) {
+      if (std::find(all.begin(), all.end(), effect) != all.end()) continue;
+      if (plant_.find(effect) != nullptr) {
+        model.set(effect, fitted.find(effect)->values);
+      } else if (effect_registry()[effect].enters == Enters::parameter) {
+        fold(model, effect, fitted.find(effect)->values[0]);
+      }
+    }
+    for (const std::size_t effect : all) model.set(effect, fitted.find(effect)->values);
     return model;
+  }
+
+  /// Puts the scale of a base parameter into the plant's own numbers.
+  static void fold(Plant& plant, std::size_t effect, double scale) {
+    Plant scaled = plant;
+    scaled.set(effect, std::vector<double>{scale});
+    const BaseParameters<double> base = make_model<double>(scaled).corrected();
+    plant.cart_mass_kg = base.cart_mass_kg;
+    plant.motor.back_emf_n_per_mps = base.back_emf_n_per_mps;
+    if (!plant.pendulum) return;
+    const bool rod = !plant.pendulum->given_inertia_kgm2;
+    plant.pendulum->mass_kg = base.pendulum_mass_kg;
+    plant.pendulum->length_to_com_m = base.length_to_com_m;
+    if (!rod) plant.pendulum->given_inertia_kgm2 = base.inertia_about_pivot_kgm2;
   }
 
   void decide(const ResidualStructure& structure) {
@@ -462,7 +556,8 @@ class Diagnostician {
         search_->refine(without, rival);
         const Improvement worse = compare(rival, current_);
         if (!is_plausible(rival, other)) continue;
-        const bool same = worse.train < confusable_evidence || worse.t_value < 2.0;
+        const bool same = worse.train < confusable_evidence ||
+                          (worse.train < 10.0 * confusable_evidence && worse.t_value < 2.0);
         if (!same) continue;
         result_.effects[i].confusable_with.push_back(other);
         rivals.emplace_back(other, rival.train.point.plant);
@@ -479,6 +574,7 @@ class Diagnostician {
   Hypothesis given_, current_, final_;
   std::vector<std::size_t> found_, corrections_;
   std::map<std::size_t, std::vector<std::size_t>> near_;
+  std::map<std::size_t, std::string> where_;
   std::vector<std::pair<std::size_t, Hypothesis>> finalists_;
   Diagnosis result_;
   inline static double theta_resolution_ = 0.0;

@@ -121,7 +121,8 @@ class Whitener {
   /// Prepares the update with one channel: gain and innovation variance.
   void prepare(const LinearStep& step, int channel) {
     const double c = step.gain[channel];
-    variance_ = sensor_variance_[channel] + square(noise_.jitter_s * step.rate[channel]);
+    variance_ =
+        square(noise_.sensors) * sensor_variance_[channel] + square(noise_.jitter_s * step.rate[channel]);
     if (!active_) return;
     variance_ += c * c * p_[channel][channel];
     for (int i = 0; i < states; ++i) gain_[i] = c * p_[i][channel] / variance_;
@@ -617,9 +618,10 @@ class Fitter {
       double smallest, largest;
       bool used;
     };
-    const std::array<Knob, 3> knobs = {Knob{&Noise::force, 1e-5, 10.0, cart},
+    const std::array<Knob, 4> knobs = {Knob{&Noise::force, 1e-5, 10.0, cart},
                                        Knob{&Noise::torque, 1e-7, 1.0, pendulum},
-                                       Knob{&Noise::jitter_s, 1e-6, 1e-2, true}};
+                                       Knob{&Noise::jitter_s, 1e-6, 1e-2, true},
+                                       Knob{&Noise::sensors, 1.0, 1e3, true}};
     for (const double factor : factors) {
       bool better = true;
       for (int sweep = 0; sweep < 3 && better; ++sweep) {
@@ -631,7 +633,8 @@ class Fitter {
               Noise next = best;
               const double now = best.*knob.value;
               const double moved = now == 0.0 ? (move > 1.0 ? knob.smallest * 10.0 : 0.0) : now * move;
-              next.*knob.value = moved < knob.smallest ? 0.0 : std::min(moved, knob.largest);
+              const double least_value = knob.value == &Noise::sensors ? knob.smallest : 0.0;
+              next.*knob.value = moved < knob.smallest ? least_value : std::min(moved, knob.largest);
               if (next.*knob.value == now) break;
               const double objective = noise_objective(next);
               if (!(objective < least - 1e-3)) break;

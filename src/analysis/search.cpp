@@ -94,7 +94,7 @@ void Search::judge(Hypothesis& h, const Noise* noise) {
 
 Hypothesis Search::baseline() {
   FitOptions options;
-  Hypothesis h = fitted({}, {plant_, train_starts_, {0.1, 0.01, 0.0}}, options, free_of({}));
+  Hypothesis h = fitted({}, {plant_, train_starts_, {.force = 0.1, .torque = 0.01}}, options, free_of({}));
   judge(h);
   return h;
 }
@@ -168,28 +168,41 @@ Hypothesis Search::without(const Hypothesis& base, std::size_t effect) {
 }
 
 Hypothesis Search::only(const std::vector<std::size_t>& effects, const Hypothesis& from,
-                        const Noise* fixed_noise) {
+                        const Noise* fixed_noise, bool settled) {
   FitPoint point = from.train.point;
   point.plant = plant_;
   std::vector<FreeParameter> free;
-  for (const std::size_t effect : effects) {
+  const auto include = [&](std::size_t effect, const std::vector<FreeParameter>& parameters) {
     if (const PlantEffect* reached = from.train.point.plant.find(effect))
       point.plant.set(effect, reached->values);
-    const auto parameters = free_parameters(effect, range_);
     free.insert(free.end(), parameters.begin(), parameters.end());
-  }
-  // The zero of the angle is known to a count only, whatever else is.
-  const std::size_t zero = effect_number("angle_offset");
-  if (std::find(nuisances_.begin(), nuisances_.end(), zero) != nuisances_.end() &&
-      given_.find(zero) == nullptr && std::find(effects.begin(), effects.end(), zero) == effects.end()) {
-    point.plant.set(zero, from.train.point.plant.find(zero)->values);
-    const auto parameters = believed_parameters(given_, zero, range_);
-    free.insert(free.end(), parameters.begin(), parameters.end());
+  };
+  for (const std::size_t effect : effects) include(effect, free_parameters(effect, range_));
+  for (const std::size_t effect : nuisances_) {
+    if (std::find(effects.begin(), effects.end(), effect) != effects.end()) continue;
+    // The zero of the angle is known to a count only, whatever else is.
+    const bool zero = effect == effect_number("angle_offset") && given_.find(effect) == nullptr;
+    if (settled || zero) include(effect, believed_parameters(given_, effect, range_));
   }
   FitOptions options;
   if (fixed_noise != nullptr) options.noise_rounds = 0;
   if (fixed_noise != nullptr) point.noise = *fixed_noise;
   Hypothesis h = fitted({effects.begin(), effects.end()}, point, options, free);
+  judge(h);
+  return h;
+}
+
+Hypothesis Search::with_pair(const Hypothesis& base, const Hypothesis& first, const Hypothesis& second) {
+  std::set<std::size_t> added = first.added;
+  added.insert(second.added.begin(), second.added.end());
+  FitPoint point = base.train.point;
+  for (const Hypothesis* h : {&first, &second}) {
+    point.noise.force = std::min(point.noise.force, h->train.point.noise.force);
+    point.noise.torque = std::min(point.noise.torque, h->train.point.noise.torque);
+    for (const std::size_t effect : h->added)
+      point.plant.set(effect, h->train.point.plant.find(effect)->values);
+  }
+  Hypothesis h = fitted(added, point, FitOptions{}, free_of(added));
   judge(h);
   return h;
 }

@@ -35,6 +35,7 @@ struct FreeParameter {
 struct Noise {
   double force = 0.0;     ///< white force on the cart [N sqrt(s)]
   double torque = 0.0;    ///< white torque on the pendulum [N m sqrt(s)]
+  double sensors = 1.0;   ///< sensor noise over what the steps and fourth differences of the data show
   double jitter_s = 0.0;  ///< standard deviation of the time at which encoders are read
 };
 

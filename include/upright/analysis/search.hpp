@@ -50,8 +50,12 @@ class Search {
   void refine(const Hypothesis& base, Hypothesis& hypothesis);
   /// The same hypothesis without one effect.
   Hypothesis without(const Hypothesis& base, std::size_t effect);
-  /// Exactly these effects free with nothing believed of them, everything else as in the plant file.
-  Hypothesis only(const std::vector<std::size_t>& effects, const Hypothesis& from, const Noise* fixed_noise);
+  /// These effects free with nothing believed of them beforehand. Everything else as in the plant file, or
+  /// `settled`: within what is believed of it.
+  Hypothesis only(const std::vector<std::size_t>& effects, const Hypothesis& from, const Noise* fixed_noise,
+                  bool settled = false);
+  /// Adds two effects at once to a hypothesis and fits to convergence.
+  Hypothesis with_pair(const Hypothesis& base, const Hypothesis& first, const Hypothesis& second);
   void judge(Hypothesis& hypothesis, const Noise* noise = nullptr);
 
  private:
