@@ -1,11 +1,13 @@
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
+#include <memory>
 #include <numbers>
 
 #include "upright/analysis/sweep.hpp"
 #include "upright/control/delay_line.hpp"
 #include "upright/control/gain_file.hpp"
+#include "upright/control/predictor.hpp"
 #include "upright/hal/rig_file.hpp"
 #include "upright/model/error.hpp"
 #include "upright/model/plant_file.hpp"
@@ -101,13 +103,17 @@ void read_outcome(const YamlMap& map, SweepConfig& config) {
                  "give it more than " + exact_text(config.stable_below_rad));
 }
 
-void take_compensation(const YamlMap& map, LoopSetup& setup) {
-  if (setup.control.compensation.kind == CompensationKind::none) return;
+/// Gives sampled loops the predictor that the gain file asks for; returns its plant file's text, or nothing.
+std::string take_compensation(const YamlMap& map, LoopSetup& setup) {
+  if (setup.control.compensation.kind == CompensationKind::none) return "";
   if (!setup.sampled)
     map.fail("loop", "is continuous, and the gain file's delay_compensation predicts from period to period",
              "use loop: sampled");
-  map.fail("gains", "has a delay_compensation that sweeps do not have",
-           "use delay_compensation: {kind: none}");
+  const Plant model = read_plant_file(setup.control.compensation.plant);
+  setup.make_compensator = [model](const ControlConfig& control, double) {
+    return std::make_unique<Predictor>(control, model);
+  };
+  return "# The predictor's plant file:\n" + plant_text(model);
 }
 
 }  // namespace
@@ -125,7 +131,7 @@ SweepConfig read_sweep_file(const std::filesystem::path& file) {
   if (!setup.sampled && map.has("rig"))
     map.fail("rig", "is only for sampled loops", "remove it, or use loop: sampled");
   const std::string rig = setup.sampled ? take_rig(map, setup) : std::string();
-  take_compensation(map, setup);
+  const std::string compensation = take_compensation(map, setup);
   read_outcome(map, config);
   config.theta0_rad = read_angles(map, setup.fell_above_rad);
   config.delay_s = read_delays(map);
@@ -146,7 +152,7 @@ SweepConfig read_sweep_file(const std::filesystem::path& file) {
                          "\n  outcome: {stable_below_rad: " + exact_text(config.stable_below_rad) +
                          ", fell_above_rad: " + exact_text(setup.fell_above_rad) + "}\n  engine: " + engine +
                          "\n  smoothing: " + exact_text(setup.model.smoothing) + "\n# The plant file:\n" +
-                         plant_text(plant) + "# The gain file:\n" + gain_text(setup.control);
+                         plant_text(plant) + "# The gain file:\n" + gain_text(setup.control) + compensation;
   return config;
 }
 

@@ -12,6 +12,7 @@ void add_design(CLI::App& app, int& exit_code);
 void add_diagnose(CLI::App& app, int& exit_code);
 void add_effects(CLI::App& app, int& exit_code);
 void add_paper(CLI::App& app, int& exit_code);
+void add_margin(CLI::App& app, int& exit_code);
 void add_replay(CLI::App& app, int& exit_code);
 void add_report(CLI::App& app, int& exit_code);
 void add_run(CLI::App& app, int& exit_code);

@@ -2,7 +2,6 @@
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
-#include <fstream>
 #include <iostream>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -12,6 +11,7 @@
 #include "commands.hpp"
 #include "options.hpp"
 #include "upright/analysis/gain_design.hpp"
+#include "upright/control/gain_file.hpp"
 #include "upright/model/error.hpp"
 #include "upright/model/plant_file.hpp"
 
@@ -83,28 +83,18 @@ std::string path_from(const std::filesystem::path& file, const std::filesystem::
   return error || relative.empty() ? std::filesystem::absolute(plant).string() : relative.string();
 }
 
-std::string gain_text(const DesignOptions& options, const GainDesign& design) {
-  std::string text = "# Designed by `upright design` on " + options.plant + "\n";
-  text += "gains: {cart_position_v_per_m: " + exact_text(design.gains[0]) +
-          ", pendulum_angle_v_per_rad: " + exact_text(design.gains[1]) +
-          ",\n        cart_velocity_v_per_mps: " + exact_text(design.gains[2]) +
-          ", pendulum_rate_v_per_radps: " + exact_text(design.gains[3]) + "}\n";
-  text += "delay_s: " + exact_text(options.delay_s.value_or(0.0)) + "\n";
-  text += "sample_rate_hz: " + exact_text(options.rate_hz) + "\n";
-  text += "velocity_estimator: {kind: second_order_filter, cutoff_hz: " + exact_text(options.cutoff_hz) +
-          ", damping: " + exact_text(options.damping) + "}\n";
-  if (options.delay_s)
-    text +=
-        "delay_compensation: {kind: predictor, plant: \"" + path_from(options.out, options.plant) + "\"}\n";
-  return text;
-}
-
 void write_gains(const DesignOptions& options, const GainDesign& design) {
   if (std::filesystem::exists(options.out) && !options.force)
     throw ConfigError("give another --out or add --force: " + options.out + " exists already");
-  std::ofstream file(options.out);
-  file << gain_text(options, design) << std::flush;
-  if (!file) throw ConfigError("give --out a file that can be written: " + options.out + " cannot");
+  ControlConfig config;
+  config.gains = {design.gains[0], design.gains[1], design.gains[2], design.gains[3]};
+  config.delay_s = options.delay_s.value_or(0.0);
+  config.sample_rate_hz = options.rate_hz;
+  config.estimator.cutoff_hz = options.cutoff_hz;
+  config.estimator.damping = options.damping;
+  if (options.delay_s)
+    config.compensation = {CompensationKind::predictor, path_from(options.out, options.plant)};
+  write_gain_file(config, options.out, {"Designed by `upright design` on " + options.plant});
 }
 
 void design(const DesignOptions& options) {
@@ -151,7 +141,7 @@ void add_design(CLI::App& app, int&) {
                    "Loop delay to design for [s]: sampled design, for the predictor")
       ->check(number_in(Range::within(0.0, 10.0)));
   command->add_option("--rate", options->rate_hz, "Sample rate [Hz]; with --delay, and for the gain file")
-      ->check(number_in(Range::within(1.0, 100000.0)));
+      ->check(number_in(Range::within(lowest_sample_rate_hz, highest_sample_rate_hz)));
   command->add_option("--cutoff", options->cutoff_hz, "Velocity filter in the gain file: cutoff [Hz]")
       ->check(number_in(Range::positive()));
   command->add_option("--damping", options->damping, "Velocity filter in the gain file: damping")

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "commands.hpp"
+#include "upright/control/predictor.hpp"
 #include "upright/model/error.hpp"
 #include "upright/model/yaml_reader.hpp"
 
@@ -50,7 +51,7 @@ void print(const RunRecord& run, const ReplayResult& result) {
 
 ExitCode replay_run(const std::string& directory, bool as_json) {
   const RunRecord run = read_run(directory);
-  const ReplayResult result = replay(run);
+  const ReplayResult result = replay(run, make_compensator(run.control));
   if (as_json)
     std::cout << json_of(run, result).dump(2, ' ', false, Json::error_handler_t::replace) << "\n";
   else

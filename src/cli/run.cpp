@@ -15,6 +15,8 @@
 
 #include "commands.hpp"
 #include "options.hpp"
+#include "upright/analysis/delay_margin.hpp"
+#include "upright/control/predictor.hpp"
 #include "upright/hal/rig_factory.hpp"
 #include "upright/hal/simulated_rig.hpp"
 #include "upright/model/error.hpp"
@@ -28,7 +30,7 @@ namespace {
 constexpr double degrees_per_rad = 180.0 / std::numbers::pi;
 
 struct Arguments {
-  std::string rig, gains, out = "runs", label = "run";
+  std::string rig, gains, plant, out = "runs", label = "run";
   std::optional<double> delay_s, theta0_deg;
   double duration_s = 10.0;
   std::optional<std::uint64_t> seed;
@@ -96,6 +98,39 @@ RunSetup make_setup(const Arguments& arguments) {
   return setup;
 }
 
+/// The model to judge the gains by: the one named, the simulated rig's, or the predictor's.
+std::optional<Plant> model_of(const Arguments& arguments, const RunSetup& setup) {
+  if (!arguments.plant.empty()) return read_plant_file(arguments.plant);
+  if (setup.plant) return setup.plant;
+  if (setup.control.compensation.kind == CompensationKind::predictor)
+    return read_plant_file(setup.control.compensation.plant);
+  return std::nullopt;
+}
+
+/// What the gains tolerate, where there is a model with a pendulum to tell.
+std::optional<OverrunTolerance> tolerance_of(const Arguments& arguments, const RunSetup& setup) {
+  const std::optional<Plant> model = model_of(arguments, setup);
+  if (!model || !model->pendulum) return std::nullopt;
+  return overrun_tolerance(*model, setup.control);
+}
+
+/// The overrun limit that follows: what the gains tolerate, but not less than a kernel's ordinary hiccup
+/// makes and not more than leaves time before a fall.
+std::uint64_t periods_late(const OverrunTolerance& tolerance, double period_s) {
+  constexpr int fewest = 3;
+  const int tolerated = std::max(fewest, tolerance.missed_periods);
+  return std::min(static_cast<std::uint64_t>(tolerated), default_periods_late(period_s));
+}
+
+std::string tolerance_line(const std::optional<OverrunTolerance>& tolerance, const LoopLimits& limits) {
+  const std::string limit = std::to_string(limits.most_periods_late);
+  if (!tolerance)
+    return "Delay margin: unknown without a model of the rig (--plant); the run stops when more than " +
+           limit + " periods in a row are late.";
+  return "Delay margin: " + tolerance->sentence + "; the run stops when more than " + limit +
+         " periods in a row are late.";
+}
+
 std::unique_ptr<Rig> make(const RunSetup& setup, Clock& clock) {
   if (is_simulated(setup.rig)) return make_simulated_rig(setup.rig, clock, {setup.seed, setup.theta0_rad});
   return make_rig(setup.rig, {setup.control.period_s()});
@@ -116,7 +151,16 @@ Json json_of(const DurationHistogram& h) {
           {"max_us", h.max_us()}};
 }
 
-Json json_of(const SessionResult& result, const LoopLimits& limits) {
+Json json_of(const std::optional<OverrunTolerance>& tolerance) {
+  if (!tolerance) return nullptr;
+  const bool any = !std::isfinite(tolerance->extra_delay_s);
+  return {{"extra_delay_s", any ? Json(nullptr) : Json(tolerance->extra_delay_s)},
+          {"missed_periods", tolerance->missed_periods},
+          {"sentence", tolerance->sentence}};
+}
+
+Json json_of(const SessionResult& result, const LoopLimits& limits,
+             const std::optional<OverrunTolerance>& tolerance) {
   const LoopOutcome& o = result.outcome;
   const LoopCounts& c = o.counts;
   return {{"run_directory", result.directory.string()},
@@ -148,6 +192,8 @@ Json json_of(const SessionResult& result, const LoopLimits& limits) {
             {"compute", json_of(o.compute)},
             {"write", json_of(o.write)},
             {"cycle", json_of(o.cycle)}}},
+          {"delay_margin", json_of(tolerance)},
+          {"most_periods_late", limits.most_periods_late},
           {"scheduling", result.scheduling.note},
           {"elapsed_s", result.elapsed_s}};
 }
@@ -189,6 +235,9 @@ void print_summary(const SessionResult& result, const LoopLimits& limits, bool f
 
 ExitCode run(const Arguments& arguments) {
   RunSetup setup = make_setup(arguments);
+  const std::optional<OverrunTolerance> tolerance = tolerance_of(arguments, setup);
+  if (tolerance) setup.limits.most_periods_late = periods_late(*tolerance, setup.control.period_s());
+  if (!arguments.as_json) std::cout << tolerance_line(tolerance, setup.limits) << std::endl;
   catch_signals();
   MonotonicClock real_clock;
   VirtualClock virtual_clock;
@@ -201,6 +250,7 @@ ExitCode run(const Arguments& arguments) {
   SessionOptions options;
   options.out = arguments.out;
   options.realtime = {arguments.priority, arguments.cpu};
+  options.compensator = make_compensator(setup.control);
   const bool on_terminal = ::isatty(STDERR_FILENO) != 0;
   if (on_terminal && !arguments.fast) options.show = show_live;
   const LoopLimits limits = setup.limits;
@@ -208,7 +258,8 @@ ExitCode run(const Arguments& arguments) {
   if (on_terminal && !arguments.fast) std::fputs("\n", stderr);
 
   if (arguments.as_json)
-    std::cout << json_of(result, limits).dump(2, ' ', false, Json::error_handler_t::replace) << "\n";
+    std::cout << json_of(result, limits, tolerance).dump(2, ' ', false, Json::error_handler_t::replace)
+              << "\n";
   else
     print_summary(result, limits, arguments.fast);
   if (!result.log.failure.empty()) std::cerr << "upright: " << result.log.failure << "\n";
@@ -230,6 +281,8 @@ void add_run(CLI::App& app, int& exit_code) {
   const auto a = std::make_shared<Arguments>();
   command->add_option("--rig", a->rig, "Rig file")->required();
   command->add_option("--gains", a->gains, "Gain file")->required();
+  command->add_option("--plant", a->plant,
+                      "Model of the rig, whose delay margin limits overruns (a simulated rig's own)");
   command->add_option("--delay", a->delay_s, "Delay of the feedback [s], in place of the gain file's")
       ->check(number_in(Range::within(0.0, DelayLine::longest_delay_s)));
   constexpr double longest_run_s = 1e6;

@@ -7,6 +7,7 @@
 #include <thread>
 
 #include "upright/model/error.hpp"
+#include "upright/model/plant_file.hpp"
 
 namespace upright {
 
@@ -25,6 +26,14 @@ class StopAtEnd {
  private:
   Rig& rig_;
 };
+
+/// Puts the predictor's plant file beside the log, so that the run replays wherever it is taken.
+void keep_prediction_plant(const RunDirectory& directory, ControlConfig& control) {
+  if (control.compensation.kind != CompensationKind::predictor) return;
+  const std::filesystem::path name = "prediction_plant.yaml";
+  write_plant_file(read_plant_file(control.compensation.plant), directory.path() / name);
+  control.compensation.plant = name;
+}
 
 }  // namespace
 
@@ -64,6 +73,7 @@ SessionResult run_session(RunSetup setup, Rig& rig, Clock& clock, const SignalFl
   Controller controller(setup.control, setup.rig.amplifier.limit_v, std::move(options.compensator));
   PoseScaler scaler(calibration_in_use(setup.rig));
   RunDirectory directory(options.out, setup.label);
+  keep_prediction_plant(directory, setup.control);
   RunLog::Options log_options;
   log_options.sync_while_running = !clock.is_virtual();
   RunLog log(directory.samples(), log_options);

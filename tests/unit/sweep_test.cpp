@@ -205,6 +205,20 @@ TEST_F(SweepFolder, FindsTheCriticalDelayOfALinearPlant) {
   }
 }
 
+TEST_F(SweepFolder, TakesAPredictorAlong) {
+  const std::string compensated = source + "/config/gains/compensated.yaml";
+  EXPECT_THROW(read_sweep_file(write(text_with("gains", compensated))), ConfigError);  // a continuous loop
+  std::string text = text_with("gains", compensated);
+  text.replace(text.find("continuous"), 10, "sampled\n  rig: " + source + "/config/rigs/simulated.yaml");
+  const SweepConfig config = read_sweep_file(write(text));
+  ASSERT_TRUE(config.setup.make_compensator);
+  const auto team = make_thread_team(config, 1);
+  for (const SweepRun& run : run_sweep(config, folder_ / "out", {}, *team).runs) {
+    EXPECT_TRUE(std::isnan(run.fall_time_s)) << run.start.delay_s;
+    EXPECT_LT(run.theta_amplitude_rad, 0.02) << run.start.delay_s;
+  }
+}
+
 TEST_F(SweepFolder, GivesTheSameBytesForAnyNumberOfThreadsAndAfterAStop) {
   const SweepConfig config = read_sweep_file(write(text_with("", "")));
   const auto one = make_thread_team(config, 1), three = make_thread_team(config, 3);

@@ -1,0 +1,137 @@
+// `upright design` and `upright margin` as a user meets them.
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+#include "command.hpp"
+
+namespace upright::testing {
+namespace {
+
+using Json = nlohmann::json;
+
+const std::string config_folder = std::string(UPRIGHT_SOURCE_DIR) + "/config/";
+
+std::string plant(const std::string& name) {
+  return shell_quoted(config_folder + "plants/" + name + ".yaml");
+}
+
+std::string gains(const std::string& name) {
+  return shell_quoted(config_folder + "gains/" + name + ".yaml");
+}
+
+Json json_from(const std::string& arguments) {
+  const CommandResult result = run_upright(arguments);
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  return Json::parse(result.out);
+}
+
+TEST(Design, GivesThePapersGainsAndExplainsWhatItEliminated) {
+  const Json exponential = json_from("design " + plant("exponential") + " --q 5000,3000,20,20 --r 1 --json");
+  const std::array<double, 4> paper = {70.7107, 304.9270, 143.3150, 61.0832};
+  for (std::size_t i = 0; i < 4; ++i)
+    EXPECT_NEAR(exponential["gains"][i].get<double>(), paper[i], 1e-5 * paper[i]);
+  EXPECT_TRUE(exponential["eliminated_states"].empty());
+  EXPECT_EQ(exponential["closed_loop_poles"].size(), 4u);
+  for (const Json& pole : exponential["closed_loop_poles"]) EXPECT_LT(pole[0].get<double>(), 0.0);
+
+  const Json dynamic = json_from("design " + plant("dynamic") + " --q 5000,3000,20,20 --r 1 --json");
+  const std::array<double, 4> whole = {170.170, 290.499, 136.020, 58.101};
+  for (std::size_t i = 0; i < 4; ++i)
+    EXPECT_NEAR(dynamic["gains"][i].get<double>(), whole[i], 1e-5 * whole[i]);
+  EXPECT_NE(dynamic["eliminated_states"].dump().find("85.08"), std::string::npos);
+}
+
+TEST(Design, WritesAGainFileThatReadsBack) {
+  const TemporaryFolder folder;
+  const std::string out = (folder.path() / "compensated.yaml").string();
+  const std::string line =
+      "design " + plant("viscous") + " --delay 0.1 --rate 500 --out " + shell_quoted(out);
+  const CommandResult first = run_upright(line);
+  EXPECT_EQ(first.exit_code, 0) << first.err;
+  EXPECT_NE(read_text(out).find("kind: predictor"), std::string::npos);
+  EXPECT_EQ(run_upright("check " + shell_quoted(out)).exit_code, 0);
+  EXPECT_EQ(run_upright("margin " + plant("viscous") + " " + shell_quoted(out)).exit_code, 0);
+
+  const CommandResult again = run_upright(line);
+  EXPECT_EQ(again.exit_code, 2);
+  EXPECT_NE(again.err.find("--force"), std::string::npos);
+  EXPECT_EQ(run_upright(line + " --force").exit_code, 0);
+}
+
+TEST(Design, BadInputNamesTheMatrixOrTheFlag) {
+  const CommandResult weights = run_upright("design " + plant("viscous") + " --q 0,0,0,0");
+  EXPECT_EQ(weights.exit_code, 2);
+  EXPECT_NE(weights.err.find("Q = ["), std::string::npos) << weights.err;
+  for (const std::string flags : {"--q 1,2,3", "--q 1,2,3,-4", "--q 1,2,3,nan", "--r 0", "--r x",
+                                  "--smoothing 0", "--delay -1", "--rate 0", "--out /nowhere/gains.yaml"}) {
+    const CommandResult result = run_upright("design " + plant("viscous") + " " + flags);
+    EXPECT_EQ(result.exit_code, 2) << flags;
+    EXPECT_EQ(result.out, "") << flags;
+    EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
+  }
+}
+
+TEST(Margin, GivesThePapersCriticalDelays) {
+  const Json exponential =
+      json_from("margin " + plant("exponential") + " " + gains("exponential") + " --json");
+  EXPECT_NEAR(exponential["critical_delay_s"].get<double>(), 0.10690, 5e-6);
+  EXPECT_NEAR(exponential["crossing_radps"].get<double>(), 10.230, 5e-4);
+  EXPECT_TRUE(exponential["roots"]["confirmed"].get<bool>());
+  EXPECT_TRUE(exponential["sampled"]["roots"]["confirmed"].get<bool>());
+  EXPECT_GE(exponential["sampled"]["crossings"].size(), 1u);
+  const Json viscous = json_from("margin " + plant("viscous") + " " + gains("exponential") + " --json");
+  EXPECT_NEAR(viscous["critical_delay_s"].get<double>(), 0.01536, 5e-6);
+  const Json dynamic = json_from("margin " + plant("dynamic") + " " + gains("dynamic") + " --json");
+  EXPECT_NEAR(dynamic["critical_delay_s"].get<double>(), 0.1072, 5e-5);
+}
+
+std::string run_line(const std::string& gain_file, const TemporaryFolder& folder, const std::string& flags) {
+  return "run --rig " + shell_quoted(config_folder + "rigs/simulated.yaml") + " --gains " + gains(gain_file) +
+         " --fast --theta0-deg 3 --out " + shell_quoted(folder.path().string()) + " " + flags;
+}
+
+TEST(Run, StaysUpLateWithThePredictorAndReplaysBitForBitAnywhere) {
+  const TemporaryFolder folder;
+  const CommandResult late =
+      run_upright(run_line("compensated", folder, "--duration 20 --delay 0.15 --json"));
+  ASSERT_EQ(late.exit_code, 0) << late.err;
+  const Json document = Json::parse(late.out);
+  EXPECT_TRUE(document["stayed_up"].get<bool>());
+  EXPECT_GT(document["delay_margin"]["extra_delay_s"].get<double>(), 0.0);
+  const std::filesystem::path run(document["run_directory"].get<std::string>());
+  const std::filesystem::path moved = folder.path() / "elsewhere" / "run";
+  std::filesystem::create_directories(moved.parent_path());
+  std::filesystem::rename(run, moved);
+  const CommandResult replayed = run_upright("replay " + shell_quoted(moved.string()));
+  EXPECT_EQ(replayed.exit_code, 0) << replayed.out << replayed.err;
+  EXPECT_NE(replayed.out.find("bit for bit"), std::string::npos);
+  EXPECT_EQ(run_upright(run_line("exponential", folder, "--duration 20 --delay 0.15")).exit_code, 3);
+}
+
+TEST(Run, SaysAtItsStartWhatTheGainsTolerate) {
+  const TemporaryFolder folder;
+  const CommandResult run = run_upright(run_line("exponential", folder, "--duration 1"));
+  EXPECT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_EQ(run.out.find("Delay margin: "), 0u) << run.out;
+  EXPECT_NE(run.out.find("14 consecutive missed periods"), std::string::npos) << run.out;
+  EXPECT_NE(run.out.find("more than 14 periods in a row"), std::string::npos) << run.out;
+}
+
+TEST(Margin, MissingFilesAndPlantsWithoutPendulumAreRefused) {
+  EXPECT_EQ(run_upright("margin /nowhere.yaml " + gains("viscous")).exit_code, 2);
+  EXPECT_EQ(run_upright("margin " + plant("viscous") + " /nowhere.yaml").exit_code, 2);
+  const TemporaryFolder folder;
+  const std::string cart =
+      folder
+          .write("cart.yaml",
+                 "plant:\n  cart_mass_kg: 0.8\n  gravity_mps2: 9.8\n"
+                 "  motor: {force_per_volt_n: 1.7, back_emf_n_per_mps: 7.7}\n  effects: []\n")
+          .string();
+  const CommandResult result = run_upright("margin " + shell_quoted(cart) + " " + gains("viscous"));
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_NE(result.err.find("pendulum"), std::string::npos) << result.err;
+}
+
+}  // namespace
+}  // namespace upright::testing
