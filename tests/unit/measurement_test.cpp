@@ -1,0 +1,105 @@
+#include "upright/analysis/measurement.hpp"
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <random>
+
+#include "upright/model/error.hpp"
+
+namespace upright {
+namespace {
+
+class MeasurementFile : public testing::Test {
+ protected:
+  void SetUp() override {
+    folder_ = std::filesystem::temp_directory_path() /
+              ("upright_measurement_" + std::to_string(::getpid()) + "_" +
+               testing::UnitTest::GetInstance()->current_test_info()->name());
+    std::filesystem::create_directories(folder_);
+  }
+  void TearDown() override { std::filesystem::remove_all(folder_); }
+
+  std::filesystem::path file(const std::string& name, const std::string& text) const {
+    std::ofstream(folder_ / name) << text;
+    return folder_ / name;
+  }
+
+  static std::string rows(const std::string& header, const std::string& bad_row = "") {
+    std::string text = header + "\n";
+    for (int k = 0; k < 40; ++k)
+      text += std::to_string(0.01 * k) + "," + std::to_string(0.001 * (k % 7)) + ",1.0\n";
+    return text + bad_row;
+  }
+
+  std::string refusal(const std::filesystem::path& path) const {
+    try {
+      read_measurement(path);
+    } catch (const ConfigError& error) {
+      return error.what();
+    }
+    return "";
+  }
+
+  std::filesystem::path folder_;
+};
+
+TEST_F(MeasurementFile, ReadsAPlainCsv) {
+  const Measurement m = read_measurement(file("a.csv", rows("time_s,cart_m,voltage_v")));
+  EXPECT_EQ(m.size(), 40u);
+  EXPECT_TRUE(m.has_cart());
+  EXPECT_FALSE(m.has_theta());
+  EXPECT_NEAR(m.cart_resolution_m, 0.001, 1e-9);
+  EXPECT_NEAR(m.median_period_s(), 0.01, 1e-9);
+}
+
+TEST_F(MeasurementFile, MapsScalesAndNumbersForeignColumns) {
+  file("foreign.csv", rows("t,qm,vir"));
+  const Measurement m =
+      read_measurement(file("d.yaml",
+                            "dataset:\n  file: foreign.csv\n  columns: {time_s: t, cart_m: {column: qm, "
+                            "scale: 2.0, offset: 1.0}, voltage_v: vir}\n"));
+  EXPECT_NEAR(m.cart_m[1], 1.002, 1e-12);
+  std::string bare = rows("");
+  bare.erase(0, 1);
+  file("bare.csv", bare);
+  const Measurement n = read_measurement(
+      file("e.yaml",
+           "dataset:\n  file: bare.csv\n  header: false\n  columns: {time_s: 1, cart_m: 2, voltage_v: 3}\n"));
+  EXPECT_EQ(n.size(), 40u);
+}
+
+TEST_F(MeasurementFile, RefusesWhatCannotBeUsedAndSaysWhere) {
+  EXPECT_NE(refusal(file("a.csv", rows("t,q,u"))).find("time_s"), std::string::npos);
+  EXPECT_NE(refusal(file("b.csv", "time_s,cart_m,voltage_v\n0,0,0\n")).find("fewer than 10"),
+            std::string::npos);
+  EXPECT_NE(refusal(file("c.csv", rows("time_s,cart_m,voltage_v", "0.4,nan,1\n"))).find(":42:"),
+            std::string::npos);
+  EXPECT_NE(refusal(file("d.csv", rows("time_s,cart_m,voltage_v", "0.1,0.002,1\n"))).find("does not grow"),
+            std::string::npos);
+  std::string still = "time_s,cart_m,voltage_v\n";
+  for (int k = 0; k < 40; ++k) still += std::to_string(0.01 * k) + ",0.5,1\n";
+  EXPECT_NE(refusal(file("e.csv", still)).find("constant"), std::string::npos);
+  EXPECT_NE(refusal(folder_ / "missing.csv").find("cannot read"), std::string::npos);
+  EXPECT_NE(refusal(file("f.csv", rows("time_s,cart_m,none"))).find("voltage_v"), std::string::npos);
+}
+
+TEST(Resolution, IsFoundWhereThereAreStepsAndNowhereElse) {
+  std::mt19937_64 random(1);
+  std::normal_distribution<double> noise(0.0, 1.0);
+  std::vector<double> steps, smooth;
+  for (int k = 0; k < 2000; ++k) {
+    const double value = 0.1 * std::sin(0.01 * k);
+    steps.push_back(2.3e-5 * std::floor(value / 2.3e-5));
+    smooth.push_back(value + 1e-4 * noise(random));
+  }
+  EXPECT_NEAR(find_resolution(steps), 2.3e-5, 1e-9);
+  EXPECT_EQ(find_resolution(smooth), 0.0);
+  EXPECT_NEAR(find_noise(smooth), 1e-4, 1e-5);
+}
+
+}  // namespace
+}  // namespace upright
