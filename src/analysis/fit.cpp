@@ -618,10 +618,9 @@ class Fitter {
       double smallest, largest;
       bool used;
     };
-    const std::array<Knob, 4> knobs = {Knob{&Noise::force, 1e-5, 10.0, cart},
-                                       Knob{&Noise::torque, 1e-7, 1.0, pendulum},
-                                       Knob{&Noise::jitter_s, 1e-6, 1e-2, true},
-                                       Knob{&Noise::sensors, 1.0, 1e3, true}};
+    const std::array<Knob, 4> knobs = {
+        Knob{&Noise::force, 1e-5, 10.0, cart}, Knob{&Noise::torque, 1e-7, 1.0, pendulum},
+        Knob{&Noise::jitter_s, 1e-6, 1e-2, true}, Knob{&Noise::sensors, 1.0, 1e3, true}};
     for (const double factor : factors) {
       bool better = true;
       for (int sweep = 0; sweep < 3 && better; ++sweep) {

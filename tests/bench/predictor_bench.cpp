@@ -41,4 +41,3 @@ BENCHMARK(control_step)->Arg(0)->Arg(100)->Arg(300);
 
 }  // namespace
 }  // namespace upright
-
