@@ -177,7 +177,15 @@ Hypothesis Search::only(const std::vector<std::size_t>& effects, const Hypothesi
       point.plant.set(effect, reached->values);
     free.insert(free.end(), parameters.begin(), parameters.end());
   };
-  for (const std::size_t effect : effects) include(effect, free_parameters(effect, range_));
+  for (const std::size_t effect : effects) {
+    // What stands in the plant file is believed, if less firmly, even where the data correct it.
+    const bool correction = std::find(nuisances_.begin(), nuisances_.end(), effect) != nuisances_.end();
+    constexpr double less_firmly = 4.0;
+    std::vector<FreeParameter> parameters =
+        correction ? believed_parameters(given_, effect, range_) : free_parameters(effect, range_);
+    for (FreeParameter& p : parameters) p.prior_sigma *= correction ? less_firmly : 1.0;
+    include(effect, parameters);
+  }
   for (const std::size_t effect : nuisances_) {
     if (std::find(effects.begin(), effects.end(), effect) != effects.end()) continue;
     // The zero of the angle is known to a count only, whatever else is.
