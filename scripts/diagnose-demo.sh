@@ -28,3 +28,4 @@ viscous 5 0.02
 RUNS
 
 "$upright" diagnose --model config/plants/viscous.yaml --data "$folder"/runs/*/ --out "$folder/diagnosis"
+"$upright" report "$folder/diagnosis"

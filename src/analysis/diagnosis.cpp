@@ -427,7 +427,15 @@ class Diagnostician {
     std::stable_sort(result_.candidates.begin(), result_.candidates.end(),
                      [](const auto& a, const auto& b) { return a.evidence > b.evidence; });
     decide(structure);
+    trace_residuals();
     find_confusable();
+  }
+
+  void trace_residuals() {
+    if (held_.segments.empty()) return;
+    const Noise noise = final_.train.point.noise;
+    result_.residual_after = smooth_residuals(held_, final_.held.point);
+    result_.residual_before = smooth_residuals(held_, search_->only({}, final_, &noise).held.point);
   }
 
   Noise sensor_noise() const {

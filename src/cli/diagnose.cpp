@@ -99,6 +99,33 @@ std::vector<std::string> provenance(const Diagnosis& d, const DiagnoseFlags& fla
   return lines;
 }
 
+/// The residual force and torque on held-out data, before and after, thinned to what a plot can show.
+void write_residuals(const Diagnosis& d, const fs::path& file) {
+  constexpr std::size_t most_rows = 6000;
+  std::size_t count = 0;
+  for (const ResidualTrace& trace : d.residual_before) count += trace.time_s.size();
+  const std::size_t stride = 1 + count / most_rows;
+  std::ofstream out(file);
+  out << "segment,run,time_s,cart_m,cart_velocity_mps,voltage_v,force_before_n,force_after_n,torque_before_"
+         "nm,"
+         "torque_after_nm\n";
+  for (std::size_t s = 0; s < d.residual_before.size(); ++s) {
+    const ResidualTrace& before = d.residual_before[s];
+    const ResidualTrace& after = d.residual_after[s];
+    for (std::size_t k = 0; k < before.time_s.size(); k += stride) {
+      out << s << ',' << before.run;
+      for (const double value :
+           {before.time_s[k], before.cart_m[k], before.cart_mps[k], before.voltage_v[k], before.force_n[k],
+            after.force_n[k], before.torque_nm[k], after.torque_nm[k]})
+        out << ',' << exact_text(value);
+      out << '\n';
+    }
+  }
+  out.close();
+  if (!out)
+    throw ConfigError("free some space or choose another folder with --out: cannot write " + file.string());
+}
+
 void write_results(const Diagnosis& d, const DiagnoseFlags& flags) {
   std::error_code problem;
   fs::create_directories(flags.out, problem);
@@ -106,6 +133,7 @@ void write_results(const Diagnosis& d, const DiagnoseFlags& flags) {
     throw ConfigError("choose another folder with --out: cannot make " + flags.out + " (" +
                       problem.message() + ")");
   write_plant_file(d.model, fs::path(flags.out) / "model.yaml", provenance(d, flags));
+  write_residuals(d, fs::path(flags.out) / "residuals.csv");
   const fs::path file = fs::path(flags.out) / "diagnosis.json";
   std::ofstream json(file);
   json << diagnosis_json(d).dump(2) << "\n";

@@ -53,13 +53,6 @@ struct NextExperiment {
   double distance = 0.0;  ///< smallest separation of the surviving explanations [noise standard deviations]
 };
 
-/// One simulated held-out segment beside its measurement, for the report.
-struct Comparison {
-  std::size_t run = 0;
-  std::vector<double> time_s, measured_cart_m, before_cart_m, after_cart_m, measured_theta_rad,
-      before_theta_rad, after_theta_rad;
-};
-
 struct Diagnosis {
   Verdict verdict = Verdict::no_discrepancy;
   double gap_before = 0.0, gap_after = 0.0;
@@ -71,8 +64,8 @@ struct Diagnosis {
   std::vector<std::string> notes;  ///< how the data were read and split
   std::string residual;            ///< what the remaining residual looks like
   std::vector<std::size_t> held_out_runs;
+  /// On held-out segments, with the plant file as given and with the model that was found.
   std::vector<ResidualTrace> residual_before, residual_after;
-  std::vector<Comparison> comparisons;
 };
 
 struct DiagnosisOptions {
