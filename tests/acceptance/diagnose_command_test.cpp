@@ -1,0 +1,85 @@
+// The README's demonstration and what bad data are answered with, through the command line.
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <set>
+
+#include "command.hpp"
+
+namespace upright::testing {
+namespace {
+
+using Json = nlohmann::json;
+namespace fs = std::filesystem;
+
+const std::string source = UPRIGHT_SOURCE_DIR;
+
+class Diagnose : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    folder_ = fs::temp_directory_path() / ("upright_diagnose_" + std::to_string(getpid()));
+    fs::create_directories(folder_);
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+  std::string in_folder(const std::string& name) const { return (folder_ / name).string(); }
+  fs::path folder_;
+};
+
+TEST_F(Diagnose, NamesCoulombAndStribeckInThePapersOwnCase) {
+  struct Run {
+    const char *gains, *theta0_deg, *delay_s;
+  };
+  const Run runs[] = {{"viscous", "6", "0"}, {"exponential", "5", "0.018"}, {"exponential", "6", "0.021"}};
+  for (const Run& run : runs) {
+    const CommandResult result =
+        run_upright("run --rig " + source + "/config/rigs/simulated.yaml --gains " + source +
+                    "/config/gains/" + run.gains + ".yaml --fast --theta0-deg " + run.theta0_deg +
+                    " --delay " + run.delay_s + " --duration 6 --out " + in_folder("runs"));
+    ASSERT_EQ(result.exit_code, 0) << result.err;
+  }
+  std::string data;
+  for (const auto& entry : fs::directory_iterator(folder_ / "runs"))
+    data.append(" ").append(entry.path().string());
+  const CommandResult result =
+      run_upright("diagnose --model " + source + "/config/plants/viscous.yaml --data" + data + " --out " +
+                  in_folder("out") + " --json");
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const Json d = Json::parse(result.out);
+  EXPECT_EQ(d, Json::parse(std::ifstream(folder_ / "out" / "diagnosis.json")));
+  std::set<std::string> kinds;
+  for (const Json& effect : d.at("effects")) kinds.insert(effect.at("kind"));
+  EXPECT_TRUE(kinds.contains("coulomb_friction")) << result.out;
+  EXPECT_TRUE(kinds.contains("stribeck_friction")) << result.out;
+  EXPECT_EQ(d.at("verdict"), "explained");
+  EXPECT_GT(d.at("gap").at("before"), 5.0);
+  EXPECT_LT(d.at("gap").at("after"), 1.1);
+  EXPECT_EQ(run_upright("check " + in_folder("out/model.yaml")).exit_code, 0);
+  EXPECT_EQ(run_upright("report " + in_folder("out")).exit_code, 0);
+  EXPECT_TRUE(fs::exists(folder_ / "out" / "report.html"));
+  EXPECT_EQ(run_upright("diagnose --model " + source + "/config/plants/viscous.yaml --data" + data +
+                        " --out " + in_folder("out"))
+                .exit_code,
+            2);
+}
+
+TEST_F(Diagnose, RefusesDataThatSayNothing) {
+  const std::string model = "diagnose --model " + source + "/config/plants/viscous.yaml --data ";
+  std::ofstream(folder_ / "columns.csv") << "t,x\n0,1\n";
+  std::ofstream(folder_ / "short.csv") << "time_s,cart_m,voltage_v\n0,0,0\n";
+  std::ofstream still(folder_ / "still.csv");
+  still << "time_s,cart_m,voltage_v\n";
+  for (int k = 0; k < 50; ++k) still << 0.01 * k << ",0.1,0\n";
+  still.close();
+  for (const char* name : {"columns.csv", "short.csv", "still.csv", "missing.csv"}) {
+    const CommandResult result = run_upright(model + in_folder(name));
+    EXPECT_EQ(result.exit_code, 2) << name;
+    EXPECT_NE(result.err.find(name), std::string::npos) << result.err;
+  }
+}
+
+}  // namespace
+}  // namespace upright::testing
