@@ -128,12 +128,13 @@ class Diagnostician {
 
   /// A hypothesis in which the new effect does nothing, or is of a size that makes it another effect, has
   /// lost.
-  static bool is_plausible(const Hypothesis& h, std::size_t effect) {
+  bool is_plausible(const Hypothesis& h, std::size_t effect) const {
     for (const FreeParameter& p : h.free) {
       if (p.effect != effect) continue;
       const double value = h.train.point.plant.find(effect)->values[p.index];
       if (p.index == 0 && value == effect_registry()[effect].parameters[0].neutral) return false;
-      if (kind_of(effect).starts_with("angle_offset") && std::abs(value) < 1.5 * theta_resolution_)
+      if (kind_of(effect).starts_with("angle_offset") &&
+          std::abs(value) < 1.5 * search_->range().theta_resolution_rad)
         return false;
     }
     return true;
@@ -198,8 +199,6 @@ class Diagnostician {
   }
 
   void grow() {
-    for (const Measurement& run : runs_)
-      theta_resolution_ = std::max(theta_resolution_, run.theta_resolution_rad);
     for (int round = 0; round < most_rounds; ++round) {
       const std::vector<std::size_t> candidates = open_candidates();
       std::vector<std::pair<double, Hypothesis>> screened;
@@ -585,7 +584,6 @@ class Diagnostician {
   std::map<std::size_t, std::string> where_;
   std::vector<std::pair<std::size_t, Hypothesis>> finalists_;
   Diagnosis result_;
-  inline static double theta_resolution_ = 0.0;
 };
 
 }  // namespace
