@@ -19,4 +19,15 @@ void EventLane::advance(PlantState<double>& state, double voltage_v, double dura
   state = work_->engine.state();
 }
 
+double fastest_rate_radps(const PlantModel<double>& model) {
+  const Dynamics<double> physics(model);
+  double fastest = 0.0;
+  for (const double speed : {0.0, 0.01, 0.1, 1.0}) {
+    PlantState<double> state;
+    state.cart_mps = speed;
+    fastest = std::max(fastest, physics.fastest_rate_radps(state));
+  }
+  return fastest;
+}
+
 }  // namespace upright

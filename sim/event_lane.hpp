@@ -23,4 +23,7 @@ class EventLane {
   std::unique_ptr<Work> work_;
 };
 
+/// The fastest rate of a plant's motion at any speed it is likely to have [1/s].
+double fastest_rate_radps(const PlantModel<double>& model);
+
 }  // namespace upright

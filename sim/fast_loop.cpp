@@ -4,70 +4,18 @@
 #include <optional>
 #include <vector>
 
+#include "continuous_lanes.hpp"
 #include "event_lane.hpp"
+#include "lane_model.hpp"
 #include "lane_results.hpp"
 #include "upright/control/delay_line.hpp"
 #include "upright/control/velocity_estimator.hpp"
 #include "upright/model/dynamics.hpp"
+#include "upright/sim/runge_kutta.hpp"
 
 namespace upright {
 
 namespace {
-
-PlantModel<Lanes> on_lanes(const PlantModel<double>& model) {
-  PlantModel<Lanes> lanes;
-  lanes.base = {model.base.cart_mass_kg,      model.base.pendulum_mass_kg,
-                model.base.length_to_com_m,   model.base.inertia_about_pivot_kgm2,
-                model.base.gravity_mps2,      model.base.force_per_volt_n,
-                model.base.back_emf_n_per_mps};
-  lanes.has_pendulum = model.has_pendulum;
-  lanes.cart_locked = model.cart_locked;
-  lanes.present = model.present;
-  lanes.smoothing = model.smoothing;
-  for (std::size_t i = 0; i < all_parameter_count; ++i) lanes.parameters[i] = model.parameters[i];
-  return lanes;
-}
-
-/// The effects that the derivative knows of: not those of the actuator, the sensors and the base parameters,
-/// which act once per period or at the beginning.
-std::uint64_t moving_effects(const EffectSet& present) {
-  std::uint64_t mask = 0;
-  for (std::size_t i = 0; i < effect_count; ++i)
-    if (present.has(i) &&
-        (effect_registry()[i].enters == Enters::cart || effect_registry()[i].enters == Enters::pendulum))
-      mask |= std::uint64_t{1} << i;
-  return mask;
-}
-
-template <class E>
-constexpr std::uint64_t bit_of = std::uint64_t{1} << effect_index<E>();
-constexpr std::uint64_t viscous_set = bit_of<effects::ViscousFriction>;
-constexpr std::uint64_t coulomb_set = viscous_set | bit_of<effects::CoulombFriction>;
-constexpr std::uint64_t exponential_set = coulomb_set | bit_of<effects::StribeckFriction>;
-constexpr std::uint64_t dynamic_set = exponential_set | bit_of<effects::BristleFriction>;
-
-PlantState<Lanes> moved(const PlantState<Lanes>& s, const PlantState<Lanes>& rate, const Lanes& h) {
-  return {s.cart_m + h * rate.cart_m,
-          s.theta_rad + h * rate.theta_rad,
-          s.cart_mps + h * rate.cart_mps,
-          s.theta_radps + h * rate.theta_radps,
-          s.motor_v,
-          s.bristle_m + h * rate.bristle_m};
-}
-
-/// One Runge-Kutta step; `first` is the rate at its beginning.
-template <class Rate>
-PlantState<Lanes> rk4(const Rate& rate, const PlantState<Lanes>& s, const PlantState<Lanes>& first,
-                      const Lanes& h) {
-  const Lanes half = h * Lanes(0.5), third = h * Lanes(1.0 / 3.0), sixth = h * Lanes(1.0 / 6.0);
-  PlantState<Lanes> sum = moved(s, first, sixth);
-  PlantState<Lanes> k = rate(moved(s, first, half));
-  sum = moved(sum, k, third);
-  k = rate(moved(s, k, half));
-  sum = moved(sum, k, third);
-  k = rate(moved(s, k, h));
-  return moved(sum, k, sixth);
-}
 
 /// Feedback voltages on their way, one ring for all lanes. The feedback is linear, so that delaying the
 /// voltage is delaying the state.
@@ -161,13 +109,14 @@ class SmoothPeriod {
     }
   }
 
-  void advance(PlantState<Lanes>& state, const Lanes& /*command_v*/, const Lanes& motor_v, double period_s) {
-    const auto rate = [&](const PlantState<Lanes>& s) { return physics_.derivative(s, motor_v, {}); };
-    const PlantState<Lanes> first = rate(state);
+  [[gnu::flatten]] void advance(PlantState<Lanes>& state, const Lanes& /*command_v*/, const Lanes& motor_v,
+                                double period_s) {
+    const auto rate = [&](const PlantState<Lanes>& s, Stage) { return physics_.derivative(s, motor_v, {}); };
+    const PlantState<Lanes> first = rate(state, Stage::end);
     const int pieces = pieces_for(state, first, period_s);
     const Lanes h(period_s / pieces);
-    state = rk4(rate, state, first, h);
-    for (int i = 1; i < pieces; ++i) state = rk4(rate, state, rate(state), h);
+    state = runge_kutta_4(rate, state, first, h);
+    for (int i = 1; i < pieces; ++i) state = runge_kutta_4(rate, state, rate(state, Stage::end), h);
   }
 
  private:
@@ -197,14 +146,15 @@ class StickSlipPeriod {
   StickSlipPeriod(const LoopSetup& setup, const PlantModel<Lanes>& model, const Present& present)
       : physics_(model, present), event_lane_(setup.model) {}
 
-  void advance(PlantState<Lanes>& state, const Lanes& command_v, const Lanes& motor_v, double period_s) {
+  [[gnu::flatten]] void advance(PlantState<Lanes>& state, const Lanes& command_v, const Lanes& motor_v,
+                                double period_s) {
     const Lanes zero(0.0), one(1.0);
     const Lanes direction = select(state.cart_mps > zero, one,
                                    select(state.cart_mps < zero, Lanes(-1.0), broken_away(state, motor_v)));
-    const auto rate = [&](const PlantState<Lanes>& s) {
+    const auto rate = [&](const PlantState<Lanes>& s, Stage) {
       return physics_.derivative_by_direction(s, motor_v, direction);
     };
-    PlantState<Lanes> next = rk4(rate, state, rate(state), Lanes(period_s));
+    PlantState<Lanes> next = runge_kutta_4(rate, state, rate(state, Stage::end), Lanes(period_s));
     const LaneMask rests = direction == zero;
     LaneMask eventful = direction * next.cart_mps < zero;
     if (any(rests)) eventful = eventful | (rests & !(broken_away(next, motor_v) == zero));
@@ -213,16 +163,12 @@ class StickSlipPeriod {
   }
 
  private:
-  /// Which way the load moves a resting cart; 0: friction holds it.
   Lanes broken_away(const PlantState<Lanes>& state, const Lanes& motor_v) const {
-    const Lanes load = physics_.cart_load(state, motor_v, Contact::slip_forward);
-    const Lanes forward = physics_.cart_dry_level(state.cart_m, Lanes(0.0), Lanes(1.0));
-    const Lanes backward = physics_.cart_dry_level(state.cart_m, Lanes(0.0), Lanes(-1.0));
-    return select(load > forward, Lanes(1.0), select(-load > backward, Lanes(-1.0), Lanes(0.0)));
+    return direction_of(excess_load(physics_, state, motor_v));
   }
 
-  void hand_over(std::uint32_t lanes, const PlantState<Lanes>& before, const Lanes& command_v,
-                 double period_s, PlantState<Lanes>& after) {
+  [[gnu::noinline]] void hand_over(std::uint32_t lanes, const PlantState<Lanes>& before,
+                                   const Lanes& command_v, double period_s, PlantState<Lanes>& after) {
     const auto x0 = before.cart_m.values(), th0 = before.theta_rad.values(), v0 = before.cart_mps.values(),
                w0 = before.theta_radps.values(), volts = command_v.values();
     auto x = after.cart_m.values(), th = after.theta_rad.values(), v = after.cart_mps.values(),
@@ -302,25 +248,18 @@ void run_with(const LoopSetup& setup, const Present& present, std::span<const Lo
 }  // namespace
 
 bool lanes_can_run(const LoopSetup& setup) {
-  if (!setup.sampled || setup.make_compensator || setup.model.cart_locked || !setup.model.has_pendulum)
-    return false;
+  if (setup.make_compensator || setup.model.cart_locked || !setup.model.has_pendulum) return false;
   const Dynamics<Lanes> physics(on_lanes(setup.model));
-  return !physics.has_motor_lag() && !physics.pivot_has_kink() && !any(physics.input_delay_s() > Lanes(0.0));
+  if (physics.has_motor_lag() || physics.pivot_has_kink()) return false;
+  if (setup.sampled && any(physics.input_delay_s() > Lanes(0.0))) return false;
+  // Faster plants than that need steps that the lanes do not take.
+  constexpr double fastest_radps = 1e3;
+  return fastest_rate_radps(setup.model) < fastest_radps;
 }
 
 void run_on_lanes(const LoopSetup& setup, std::span<const LoopCase> cases, std::span<LoopResult> results) {
-  switch (moving_effects(setup.model.present)) {
-    case viscous_set:
-      return run_with(setup, StaticEffectSet<viscous_set>{}, cases, results);
-    case coulomb_set:
-      return run_with(setup, StaticEffectSet<coulomb_set>{}, cases, results);
-    case exponential_set:
-      return run_with(setup, StaticEffectSet<exponential_set>{}, cases, results);
-    case dynamic_set:
-      return run_with(setup, StaticEffectSet<dynamic_set>{}, cases, results);
-    default:
-      return run_with(setup, setup.model.present, cases, results);
-  }
+  if (!setup.sampled) return run_continuous_on_lanes(setup, cases, results);
+  with_effects(setup.model.present, [&](const auto& present) { run_with(setup, present, cases, results); });
 }
 
 }  // namespace upright

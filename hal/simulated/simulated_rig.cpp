@@ -20,7 +20,7 @@ PlantState<double> initial_state(const SimulatedRig& rig, const std::optional<do
   return state;
 }
 
-class SimulatedPlantRig final : public Rig {
+class SimulatedPlantRig final : public SimulatedRigWithHand {
  public:
   SimulatedPlantRig(const RigFile& rig, const Plant& plant, Clock& clock, const SimulatedRigOptions& options)
       : calibration_(calibration_in_use(rig)),
@@ -29,14 +29,29 @@ class SimulatedPlantRig final : public Rig {
         clock_(clock),
         seed_(options.seed),
         initial_(initial_state(config_, options.theta0_rad)),
-        simulator_(make_model<double>(plant)) {}
+        plant_(plant),
+        simulator_(std::make_unique<Simulator<double>>(make_model<double>(plant))) {}
 
   void open() override {
     random_.seed(seed_);
     normal_.reset();
     sequence_ = 0;
+    hand_ = {};
     held_ = true;
-    simulator_.start(initial_);
+    simulator_->start(initial_);
+  }
+
+  void handle(const Hand& hand) override {
+    hand_ = hand;
+    held_ = true;
+    touched_ = false;
+    simulator_ =
+        std::make_unique<Simulator<double>>(make_model<double>(handled(plant_, hand), hand.cart_held));
+    PlantState<double> state;
+    state.cart_m = hand.pose.cart_m;
+    state.theta_rad = hand.pose.theta_rad;
+    state.cart_mps = hand.push_mps;
+    simulator_->start(state);
   }
 
   RigReading read() noexcept override {
@@ -47,7 +62,7 @@ class SimulatedPlantRig final : public Rig {
       now = clock_.now_ns();
     }
     advance_to(now);
-    const Outputs<double> seen = simulator_.engine().outputs();
+    const Outputs<double> seen = simulator_->engine().outputs();
     Pose pose{seen.cart_m, seen.theta_rad};
     if (config_.cart_noise_m > 0.0) pose.cart_m += config_.cart_noise_m * normal_(random_);
     if (config_.theta_noise_rad > 0.0) pose.theta_rad += config_.theta_noise_rad * normal_(random_);
@@ -63,12 +78,18 @@ class SimulatedPlantRig final : public Rig {
 
   RigFault write(double voltage_v) noexcept override {
     const std::int64_t now = clock_.now_ns();
+    const double voltage = hand_.amplifier_off ? 0.0 : safe_voltage(voltage_v, limit_v_);
+    if (held_ && hand_.holds_s > 0.0 && voltage == 0.0) {
+      if (!touched_) hold_until_ns_ = now + static_cast<std::int64_t>(hand_.holds_s * 1e9);
+      touched_ = true;
+      if (now < hold_until_ns_) return std::isfinite(voltage_v) ? RigFault::none : RigFault::not_finite;
+    }
     if (held_) {
       held_ = false;
       start_ns_ = now;
     }
     advance_to(now);
-    simulator_.command(seconds_at(now), safe_voltage(voltage_v, limit_v_));
+    simulator_->command(seconds_at(now), voltage);
     return std::isfinite(voltage_v) ? RigFault::none : RigFault::not_finite;
   }
 
@@ -81,7 +102,7 @@ class SimulatedPlantRig final : public Rig {
     return static_cast<double>(now_ns - start_ns_) / 1e9;
   }
   void advance_to(std::int64_t now_ns) noexcept {
-    if (!held_) simulator_.advance_to(seconds_at(now_ns));
+    if (!held_) simulator_->advance_to(seconds_at(now_ns));
   }
 
   Calibration calibration_;
@@ -90,20 +111,39 @@ class SimulatedPlantRig final : public Rig {
   Clock& clock_;
   std::uint64_t seed_;
   PlantState<double> initial_;
-  Simulator<double> simulator_;
+  Plant plant_;
+  std::unique_ptr<Simulator<double>> simulator_;
+  Hand hand_;
   std::mt19937_64 random_;
   std::normal_distribution<double> normal_;
   std::uint64_t sequence_ = 0;
-  std::int64_t start_ns_ = 0;
-  bool held_ = true;
+  std::int64_t start_ns_ = 0, hold_until_ns_ = 0;
+  bool held_ = true, touched_ = false;
 };
 
 }  // namespace
 
-std::unique_ptr<Rig> make_simulated_rig(const RigFile& rig, Clock& clock,
-                                        const SimulatedRigOptions& options) {
+Plant handled(Plant plant, const Hand& hand) {
+  if (hand.amplifier_off) plant.remove(effect_number("voltage_offset"));
+  if (hand.turned) {
+    // Gravity on a tilted track turns round with the room; friction and amplifier do not.
+    const std::size_t tilt = effect_number("constant_force");
+    if (const PlantEffect* effect = plant.find(tilt))
+      plant.set(tilt, std::vector<double>{-effect->values[0]});
+  }
+  return plant;
+}
+
+std::unique_ptr<SimulatedRigWithHand> make_simulated_rig(const RigFile& rig, const Plant& plant, Clock& clock,
+                                                         const SimulatedRigOptions& options) {
   if (!rig.simulated) throw ConfigError("add the section simulated: " + rig.file.string() + " has none");
-  return std::make_unique<SimulatedPlantRig>(rig, read_plant_file(rig.simulated->plant), clock, options);
+  return std::make_unique<SimulatedPlantRig>(rig, plant, clock, options);
+}
+
+std::unique_ptr<SimulatedRigWithHand> make_simulated_rig(const RigFile& rig, Clock& clock,
+                                                         const SimulatedRigOptions& options) {
+  if (!rig.simulated) throw ConfigError("add the section simulated: " + rig.file.string() + " has none");
+  return make_simulated_rig(rig, read_plant_file(rig.simulated->plant), clock, options);
 }
 
 }  // namespace upright

@@ -1,5 +1,8 @@
 #include "virtual_plant.hpp"
 
+#include <algorithm>
+#include <numbers>
+
 #include "upright/model/error.hpp"
 #include "upright/model/plant_model.hpp"
 
@@ -25,6 +28,10 @@ VirtualPlant::VirtualPlant(const RigFile& rig, const Plant& plant, const Virtual
       initial_(resting_at({options.cart0_m, options.theta0_rad})),
       simulator_(make_model<double>(plant)) {
   simulator_.start(initial_);
+  if (options.hang_s > 0.0) {
+    hang_ns_ = static_cast<std::int64_t>(options.hang_s * 1e9);
+    hold_at(std::numbers::pi);
+  }
   if (options.trace.empty()) return;
   trace_.open(options.trace);
   if (!trace_)
@@ -37,7 +44,25 @@ void VirtualPlant::move_to(std::int64_t time_ns) {
   now_ns_ = time_ns;
 }
 
+void VirtualPlant::hold_at(double theta_rad) {
+  PlantState<double> held = initial_;
+  held.theta_rad = theta_rad;
+  simulator_.start(held);
+}
+
+/// The operator lifts the pendulum in about a second.
+void VirtualPlant::lift() {
+  if (hang_ns_ == 0 || fed_ns_ == 0) return;
+  if (hanging_since_ns_ == 0) hanging_since_ns_ = now_ns_;
+  constexpr double lift_s = 1.0;
+  const double lifted = static_cast<double>(now_ns_ - hanging_since_ns_ - hang_ns_) * 1e-9 / lift_s;
+  if (lifted >= 1.0) hang_ns_ = 0;
+  const double part = std::clamp(lifted, 0.0, 1.0);
+  hold_at(part * initial_.theta_rad + (1.0 - part) * std::numbers::pi);
+}
+
 void VirtualPlant::advance_to(std::int64_t time_ns) {
+  if (held_) lift();
   if (voltage_v_ != 0.0 && expires_ns_ <= time_ns) {
     move_to(std::max(expires_ns_, now_ns_));
     command(0.0);
@@ -68,7 +93,7 @@ void VirtualPlant::let_go() {
   if (!held_) return;
   held_ = false;
   let_go_ns_ = now_ns_;
-  simulator_.start(initial_, 0.0, 0.0);
+  simulator_.start(PlantState<double>(simulator_.engine().state()), 0.0, 0.0);
   simulator_.command(0.0, voltage_v_);
 }
 

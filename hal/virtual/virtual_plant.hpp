@@ -32,6 +32,8 @@ class VirtualPlant {
  private:
   double seconds(std::int64_t time_ns) const { return static_cast<double>(time_ns - let_go_ns_) * 1e-9; }
   void move_to(std::int64_t time_ns);
+  void hold_at(double theta_rad);
+  void lift();
 
   Calibration calibration_;
   double limit_v_;
@@ -40,6 +42,7 @@ class VirtualPlant {
   bool held_ = true;
   double voltage_v_ = 0.0;
   std::int64_t now_ns_ = 0, let_go_ns_ = 0, fed_ns_ = 0, expires_ns_ = 0, traced_ns_ = 0, flushed_ns_ = 0;
+  std::int64_t hang_ns_ = 0, hanging_since_ns_ = 0;  ///< hang_ns_ is 0 once the pendulum has been lifted
   std::ofstream trace_;
 };
 

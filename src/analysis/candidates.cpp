@@ -1,6 +1,7 @@
 #include "upright/analysis/candidates.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 
@@ -12,19 +13,32 @@ namespace {
 /// scales are a few percent off; friction measured on another day is more.
 constexpr double base_belief = 0.05;
 constexpr double friction_belief = 0.10;
+/// A scale may be wrong, but not by any amount.
+constexpr double scale_belief = 0.25;
+/// How well a pendulum at rest shows where down is.
+constexpr double rest_belief_rad = 1e-3;
 
 bool is_named(std::size_t effect, std::string_view kind) {
   return effect_registry()[effect].kind == kind;
 }
 
-FreeParameter free_parameter(std::size_t effect, std::size_t index) {
+/// Of the forces at work in these runs, whatever the size of the rig: a few percent of the motor's.
+double order_of_magnitude(const ParameterInfo& info, const DataRange& range) {
+  const double force = 0.03 * range.largest_force_n;
+  if (info.unit == "N") return std::max(info.typical, force);
+  if (info.unit == "N/(m/s)" && range.largest_speed_mps > 0.0)
+    return std::max(info.typical, force / range.largest_speed_mps);
+  return info.typical;
+}
+
+FreeParameter free_parameter(std::size_t effect, std::size_t index, const DataRange& range) {
   const ParameterInfo& info = effect_registry()[effect].parameters[index];
   FreeParameter p;
   p.effect = effect;
   p.index = index;
   p.low = info.range.low;
   p.high = info.range.high;
-  p.scale = info.typical;
+  p.scale = order_of_magnitude(info, range);
   if (p.scale == 0.0) p.scale = 0.1;
   if (info.range.low_open && info.range.low == 0.0) p.low = 1e-3 * p.scale;
   return p;
@@ -37,7 +51,7 @@ double longest_pitch_m(const DataRange& range) {
 
 }  // namespace
 
-DataRange range_of(const std::vector<Measurement>& runs) {
+DataRange range_of(const std::vector<Measurement>& runs, const Plant& plant) {
   DataRange range;
   bool first = true;
   double sum = 0.0, count = 0.0;
@@ -65,6 +79,7 @@ DataRange range_of(const std::vector<Measurement>& runs) {
                                                 (run.time_s[k] - run.time_s[k - stride]));
   }
   range.cart_mean_m = count > 0.0 ? sum / count : 0.0;
+  range.largest_force_n = plant.motor.force_per_volt_n * range.largest_voltage_v;
   return range;
 }
 
@@ -72,7 +87,7 @@ std::vector<FreeParameter> free_parameters(std::size_t effect, const DataRange& 
   const EffectInfo& info = effect_registry()[effect];
   std::vector<FreeParameter> free;
   for (std::size_t i = 0; i < info.parameters.size(); ++i) {
-    FreeParameter p = free_parameter(effect, i);
+    FreeParameter p = free_parameter(effect, i, range);
     const std::string_view name = info.parameters[i].name;
     if (name == "shape") {
       p.prior_mean = 2.0;
@@ -100,10 +115,24 @@ std::vector<FreeParameter> free_parameters(std::size_t effect, const DataRange& 
       p.low = 0.3;
       p.high = 3.0;
       p.scale = 0.1;
+      p.prior_mean = 1.0;
+      p.prior_sigma = scale_belief;
     }
     free.push_back(p);
   }
   return free;
+}
+
+bool is_plainer(std::size_t a, std::size_t b) {
+  const auto one_force = [](std::size_t effect) {
+    const std::array<std::string_view, 3> names = {"constant_force", "friction_asymmetry", "voltage_offset"};
+    return std::find(names.begin(), names.end(), effect_registry()[effect].kind) - names.begin();
+  };
+  const std::size_t parameters_a = effect_registry()[a].parameters.size();
+  const std::size_t parameters_b = effect_registry()[b].parameters.size();
+  if (parameters_a != parameters_b) return parameters_a < parameters_b;
+  if (one_force(a) < 3 && one_force(b) < 3) return one_force(a) < one_force(b);
+  return a < b;
 }
 
 std::vector<FreeParameter> believed_parameters(const Plant& plant, std::size_t effect,
@@ -112,14 +141,14 @@ std::vector<FreeParameter> believed_parameters(const Plant& plant, std::size_t e
   const PlantEffect* have = plant.find(effect);
   std::vector<FreeParameter> free;
   for (std::size_t i = 0; i < info.parameters.size(); ++i) {
-    FreeParameter p = free_parameter(effect, i);
+    FreeParameter p = free_parameter(effect, i, range);
     p.prior_mean = have != nullptr ? have->values[i] : info.parameters[i].neutral;
     const double belief = info.enters == Enters::parameter ? base_belief : friction_belief;
     p.prior_sigma = belief * std::max(std::abs(p.prior_mean), 0.2 * info.parameters[i].typical);
     p.scale = std::max(std::abs(p.prior_mean), 0.2 * info.parameters[i].typical);
     if (is_named(effect, "angle_offset") && have == nullptr) {
-      // An incremental encoder knows its zero to a count.
-      p.prior_sigma = std::max(range.theta_resolution_rad, 1e-6);
+      // An incremental encoder knows its zero to a count, and friction lets a pendulum rest a little off.
+      p.prior_sigma = std::max(range.theta_resolution_rad, rest_belief_rad);
       p.scale = p.prior_sigma;
     }
     if (info.enters == Enters::parameter) {
@@ -140,8 +169,9 @@ std::vector<std::size_t> base_corrections(const Plant& plant, const DataRange& r
     const bool of_pendulum = info.kind.starts_with("pendulum_");
     if (of_pendulum && !plant.pendulum) continue;
     if (of_pendulum && !range.theta_measured && !range.cart_moves) continue;
-    // With the cart held, the mass of the pendulum divides out of its motion but for friction in the pivot.
-    const bool needs_cart = info.kind != "pendulum_length";
+    // With the cart held, the mass of the pendulum divides out of its motion but for friction in the pivot,
+    // which is known no better than the mass.
+    const bool needs_cart = !of_pendulum;
     if (needs_cart && !range.cart_moves) continue;
     effects.push_back(i);
   }
@@ -206,7 +236,8 @@ std::vector<std::vector<double>> cogging_starts(const std::vector<std::pair<doub
   }
   std::sort(found.begin(), found.end(), [](const auto& l, const auto& r) { return l.first > r.first; });
   std::vector<std::vector<double>> starts;
-  for (const auto& [power, start] : found) {
+  for (const auto& candidate : found) {
+    const std::vector<double>& start = candidate.second;
     const bool near = std::any_of(starts.begin(), starts.end(), [&](const auto& s) {
       return std::abs(1.0 / s[1] - 1.0 / start[1]) < 4.0 * spacing;
     });
@@ -218,7 +249,7 @@ std::vector<std::vector<double>> cogging_starts(const std::vector<std::pair<doub
 
 }  // namespace
 
-std::vector<std::vector<double>> search_starts(std::size_t effect, const Plant& plant, const DataRange& range,
+std::vector<std::vector<double>> search_starts(std::size_t effect, const DataRange& range,
                                                const std::vector<std::pair<double, double>>& force_residual) {
   const EffectInfo& info = effect_registry()[effect];
   const double speed = range.largest_speed_mps, volts = range.largest_voltage_v;
@@ -236,11 +267,10 @@ std::vector<std::vector<double>> search_starts(std::size_t effect, const Plant& 
   std::vector<double> start;
   for (const ParameterInfo& parameter : info.parameters)
     start.push_back(std::isfinite(parameter.neutral)
-                        ? (parameter.neutral == 1.0 ? 1.0 : 0.1 * parameter.typical)
+                        ? (parameter.neutral == 1.0 ? 1.0 : 0.1 * order_of_magnitude(parameter, range))
                         : parameter.typical);
   // Effects of either sign start at nothing, so that the sign is the data's.
   if (info.parameters.size() == 1 && info.parameters[0].range.low < 0.0) start[0] = 0.0;
-  static_cast<void>(plant);
   return {start};
 }
 

@@ -7,7 +7,9 @@
 #include <numbers>
 #include <sstream>
 
+#include "upright/analysis/confusable.hpp"
 #include "upright/analysis/next_experiment.hpp"
+#include "upright/analysis/noise_floor.hpp"
 #include "upright/analysis/residual.hpp"
 #include "upright/analysis/search.hpp"
 #include "upright/analysis/structure.hpp"
@@ -23,7 +25,8 @@ constexpr double infinity = std::numeric_limits<double>::infinity();
 /// 30 candidates with up to three parameters are tried; 25 keeps chance below one in a thousand when noise is
 /// white.
 constexpr double least_evidence = 25.0;
-/// The same as a t value of the saving per segment, which stays honest where the noise is not white.
+/// The same as a t value of the saving per quarter of a second, which stays honest where the noise is not
+/// white.
 constexpr double least_t = 3.0;
 /// Evidence so large that coloured noise cannot have made it, however few the segments are that hold it.
 constexpr double overwhelming_evidence = 1000.0;
@@ -37,6 +40,12 @@ constexpr double parameter_price = 10.0;
 constexpr double confusable_evidence = 16.0;
 /// A correction of the plant file is there when it is this many standard errors from nothing.
 constexpr double least_correction_z = 4.0;
+/// What is left goes with something when it does so by this many standard errors: of a dozen dependences
+/// tried, chance makes none.
+constexpr double least_dependence = 4.0;
+/// Noise whose colour is not known makes a plain simulation this many times as far off as white noise at
+/// most.
+constexpr double most_excess = 2.0;
 constexpr int most_rounds = 4;
 constexpr std::size_t finalists = 4;
 
@@ -174,13 +183,11 @@ class Diagnostician {
 
   /// Where a hypothesis and the data disagree most: in which equation, with what it goes, and when.
   std::string locate(const Hypothesis& h) const {
-    const ResidualStructure structure = examine_residuals(train_, h.train.point);
-    const bool force = structure.force_explained >= structure.torque_explained;
+    const ResidualPlace place = locate_residual(train_, h.train.point);
     std::size_t worst = 0;
     double largest = 0.0;
     for (std::size_t s = 0; s < h.train.segment_chi_square.size(); ++s) {
-      const double mean = h.train.segment_chi_square[s] /
-                          static_cast<double>(std::max<std::size_t>(h.train.segment_samples[s], 1));
+      const double mean = h.train.segment_chi_square[s] / std::max(h.train.segment_samples[s], 1.0);
       if (mean <= largest) continue;
       largest = mean;
       worst = s;
@@ -189,13 +196,24 @@ class Diagnostician {
     const Measurement& run = runs_[segment.run];
     std::ostringstream text;
     text.precision(3);
-    text << "in the " << (force ? "cart" : "pendulum") << " equation: the residual "
-         << (force ? "force" : "torque") << " goes with "
-         << (force ? structure.force_feature : structure.torque_feature) << " ("
-         << std::lround(100.0 * std::max(0.0, force ? structure.force_explained : structure.torque_explained))
-         << " percent of it can be predicted); the worst stretch is " << run.name << " from "
-         << run.time_s[segment.first] << " to " << run.time_s[segment.last] << " s";
+    text << "in the " << (place.in_pendulum ? "pendulum" : "cart") << " equation: the residual "
+         << (place.in_pendulum ? "torque" : "force") << " goes with " << place.goes_with << " ("
+         << std::lround(100.0 * place.share) << " percent of it can be predicted); the worst stretch is "
+         << run.name << " from " << run.time_s[segment.first] << " to " << run.time_s[segment.last] << " s";
     return text.str();
+  }
+
+  void record_trial(int round, std::size_t effect, const Hypothesis& h, const Improvement& improvement) {
+    Trial trial;
+    trial.round = static_cast<std::size_t>(round);
+    trial.effect = effect;
+    trial.evidence = improvement.train;
+    trial.held = improvement.held;
+    trial.t_value = improvement.t_value;
+    trial.certainty = certainty(h, effect);
+    trial.noise = h.train.point.noise;
+    if (std::isfinite(h.train.objective)) trial.parameters = estimates_of(effect, h);
+    result_.trials.push_back(trial);
   }
 
   void grow() {
@@ -227,6 +245,7 @@ class Diagnostician {
         search_->refine(current_, h);
         if (round == 0) finalists_.emplace_back(candidates[i], h);
         Improvement improvement = compare(current_, h);
+        record_trial(round, candidates[i], h, improvement);
         if (!is_plausible(h, candidates[i]) || !is_believed(improvement, candidates[i])) continue;
         if (improvement.train < overwhelming_evidence) {
           level_noise(h);
@@ -236,9 +255,9 @@ class Diagnostician {
         const bool correction = current_.train.point.plant.find(candidates[i]) != nullptr;
         if (!correction && certainty(h, candidates[i]) < least_certainty) continue;
         const double score = improvement.train - price_of(candidates[i]);
-        // Where two do equally well, the one that is registered first is the plainer one.
+        // Scores so close are equal: then the plainer effect is the one to believe.
         constexpr double equal = 4.0;
-        const bool plainer = best && candidates[i] < best_effect && score > best_score - equal;
+        const bool plainer = best && is_plainer(candidates[i], best_effect) && score > best_score - equal;
         if (!best || score > best_score + equal || plainer) {
           best = std::move(h);
           best_score = score;
@@ -246,6 +265,8 @@ class Diagnostician {
         }
       }
       if (!best) return;
+      for (Trial& trial : result_.trials)
+        if (trial.round == static_cast<std::size_t>(round) && trial.effect == best_effect) trial.taken = true;
       where_[best_effect] = locate(current_);
       current_ = std::move(*best);
       found_.push_back(best_effect);
@@ -261,7 +282,7 @@ class Diagnostician {
   /// Two effects can hide each other, so that a third, which resembles both, is found instead. Every pair of
   /// the first round's best candidates is tried in the place of what was found of them.
   void try_pairs() {
-    if (found_.empty() || finalists_.size() < 2) return;
+    if (finalists_.size() < 2) return;
     std::optional<Hypothesis> best;
     std::vector<std::size_t> best_found;
     for (std::size_t a = 0; a < finalists_.size(); ++a)
@@ -283,7 +304,7 @@ class Diagnostician {
       }
     if (!best) return;
     for (const std::size_t effect : best_found)
-      if (!where_.contains(effect)) where_[effect] = where_.begin()->second;
+      if (!where_.contains(effect)) where_[effect] = where_.empty() ? locate(given_) : where_.begin()->second;
     current_ = std::move(*best);
     found_ = best_found;
   }
@@ -358,14 +379,26 @@ class Diagnostician {
     }
     std::vector<std::size_t> corrections;
     for (const std::size_t j : open)
-      if (is_correction(j) && is_plausible(h, h.free[j].effect) &&
+      if (is_correction(j) && !is_within_belief(h, j) && is_plausible(h, h.free[j].effect) &&
           std::find(corrections.begin(), corrections.end(), h.free[j].effect) == corrections.end())
         corrections.push_back(h.free[j].effect);
     tell(0.88, "fitting what is left");
     std::vector<std::size_t> all = found_;
     all.insert(all.end(), corrections.begin(), corrections.end());
     final_ = search_->only(all, current_, nullptr, true);
+    tell(0.9, "fitting all runs");
+    known_ = search_->on_all(final_);
     order_corrections(corrections);
+  }
+
+  /// A coefficient of the plant file that moved no further than such coefficients do from day to day: the
+  /// number is set right, but nothing was missing.
+  bool is_within_belief(const Hypothesis& h, std::size_t j) const {
+    const FreeParameter& p = h.free[j];
+    if (effect_registry()[p.effect].enters == Enters::parameter || plant_.find(p.effect) == nullptr)
+      return false;
+    constexpr double far = 3.0;
+    return std::abs(h.train.point.plant.find(p.effect)->values[p.index] - p.prior_mean) < far * p.prior_sigma;
   }
 
   double gap_of(const Hypothesis& h) const {
@@ -389,16 +422,18 @@ class Diagnostician {
   void conclude() {
     tell(0.92, "measuring the gap");
     const ResidualStructure structure = examine();
-    const Noise noise = structure.structured ? sensor_noise() : final_.train.point.noise;
-    result_.noise = final_.train.point.noise;
+    result_.noise = known_.train.point.noise;
     std::vector<std::size_t> all = found_;
     all.insert(all.end(), corrections_.begin(), corrections_.end());
     const Noise& fitted_noise = final_.train.point.noise;
+    const Noise quiet = sensor_noise();
+    // Of what is left but cannot be told from noise, the floor is what such noise makes; else the sensors
+    // alone.
+    const double floor = structure.structured ? 1.0 : floor_of(final_);
     const auto gap_with = [&](const std::vector<std::size_t>& effects, const Hypothesis& from, bool settled) {
       Hypothesis h = search_->only(effects, from, &fitted_noise, settled);
-      if (held_.segments.empty()) return whitened_rms(h.train);
-      search_->judge(h, &noise);
-      return whitened_rms(h.held);
+      search_->judge(h, &quiet);
+      return gap_of(h) / floor;
     };
     double gap = result_.gap_before = gap_with({}, final_, false);
     for (std::size_t i = 0; i < all.size(); ++i) {
@@ -408,7 +443,7 @@ class Diagnostician {
       found.gap_before = gap;
       gap = gap_with(first, final_, i + 1 == all.size());
       found.gap_after = gap;
-      found.parameters = estimates_of(all[i], final_);
+      found.parameters = estimates_of(all[i], known_);
       if (where_.contains(all[i])) found.where = where_.at(all[i]);
       result_.effects.push_back(found);
     }
@@ -430,6 +465,13 @@ class Diagnostician {
     find_confusable();
   }
 
+  double floor_of(const Hypothesis& h) const {
+    if (held_.segments.empty()) return 1.0;
+    FitPoint point = h.held.point;
+    point.noise = h.train.point.noise;
+    return simulation_floor(held_, point);
+  }
+
   void trace_residuals() {
     if (held_.segments.empty()) return;
     const Noise noise = final_.train.point.noise;
@@ -446,14 +488,19 @@ class Diagnostician {
 
   ResidualStructure examine() {
     FitData all{&runs_, train_.segments};
-    FitPoint point = final_.train.point;
     all.segments.insert(all.segments.end(), held_.segments.begin(), held_.segments.end());
-    point.starts.insert(point.starts.end(), final_.held.point.starts.begin(), final_.held.point.starts.end());
-    ResidualStructure structure = examine_residuals(all, point);
-    const Noise quiet = sensor_noise();
-    Hypothesis plain = final_;
-    search_->judge(plain, &quiet);
-    structure.noise_ratio = gap_of(plain);
+    // At what all runs say, so that what few training runs left uncertain is not taken for something missing.
+    ResidualStructure structure = examine_residuals(all, known_.train.point);
+    FitOptions follow;
+    follow.starts_only = true;
+    follow.noise_rounds = 0;
+    FitPoint point = known_.train.point;
+    point.noise = sensor_noise();
+    const FitResult plain = fit(all, point, {}, follow);
+    structure.noise_ratio = whitened_rms(plain);
+    point = plain.point;
+    point.noise = known_.train.point.noise;
+    structure.excess = structure.noise_ratio / simulation_floor(all, point);
     judge_structure(structure);
     return structure;
   }
@@ -473,19 +520,27 @@ class Diagnostician {
       s.structured = true;
       text << "what is left comes in bursts: some stretches are " << s.dispersion
            << " times as far off as most";
-    } else if (s.force_tails > 5.5) {
+    } else if (s.tails > 5.5) {
       s.structured = true;
-      text << "what is left comes in bursts: the residual force has a kurtosis of " << s.force_tails
-           << ", chance gives 3";
-    } else if (s.force_explained > 0.15 || s.torque_explained > 0.15) {
+      text << "what is left comes in bursts: short pulses of force have a kurtosis of " << s.tails
+           << ", chance gives 3 (largest blocks " << s.dispersion << " times the median, dependence "
+           << s.certainty << " standard errors)";
+    } else if (s.excess > most_excess) {
       s.structured = true;
-      const bool force = s.force_explained >= s.torque_explained;
-      text << "what is left goes with " << (force ? s.force_feature : s.torque_feature) << " ("
-           << 100.0 * (force ? s.force_explained : s.torque_explained) << " percent of the residual "
-           << (force ? "force" : "torque") << ")";
+      text << "a plain simulation is " << s.excess
+           << " times as far off as noise like what is left would make it"
+           << " (dependence " << s.certainty << " standard errors)";
+    } else if (s.certainty > least_dependence) {
+      s.structured = true;
+      text << "what is left goes with " << s.goes_with << " in the " << (s.in_pendulum ? "pendulum" : "cart")
+           << " equation (" << s.certainty << " standard errors)";
     } else {
       text << "what is left is a disturbance that is the same all along and goes with nothing that was "
-              "measured";
+              "measured "
+              "(largest blocks "
+           << s.dispersion << " times the median, kurtosis of pulses " << s.tails << ", dependence "
+           << s.certainty << " standard errors, simulation " << s.excess
+           << " times as far off as such noise makes it)";
     }
     s.sentence = text.str();
   }
@@ -496,7 +551,7 @@ class Diagnostician {
     Plant model = plant_;
     const std::vector<std::size_t> all = all_found();
     if (all.empty()) return model;
-    const Plant& fitted = final_.train.point.plant;
+    const Plant& fitted = known_.train.point.plant;
     for (const std::size_t effect : search_->nuisances()) {
       if (std::find(all.begin(), all.end(), effect) != all.end()) continue;
       if (plant_.find(effect) != nullptr) {
@@ -547,38 +602,60 @@ class Diagnostician {
     return false;
   }
 
-  /// Other effects that do as well in the place of one that was found.
+  /// Other effects that do as well in the place of one that was found: from sensitivities, or fitted where an
+  /// effect does not act in proportion to its size.
   void find_confusable() {
+    tell(0.94, "what else could it be");
     std::vector<std::pair<std::size_t, Plant>> rivals;
-    for (std::size_t i = 0; i < result_.effects.size() && i < found_.size(); ++i) {
-      const std::size_t effect = found_[i];
-      tell(0.94, "what else could be " + kind_of(effect));
-      const Hypothesis without = search_->without(current_, effect);
-      if (!std::isfinite(without.train.objective)) continue;
+    for (const Rival& rival : linear_rivals(*search_, final_, all_found())) {
+      declare(rival.instead_of, rival.effect);
+      rivals.emplace_back(rival.effect, rival.plant);
+    }
+    for (const std::size_t effect : found_) {
+      std::optional<Hypothesis> without;
       for (const std::size_t other : near_[effect]) {
-        if (std::find(found_.begin(), found_.end(), other) != found_.end()) continue;
-        Hypothesis rival = search_->screened(without, other);
+        if (is_listed(other) || is_declared(effect, other)) continue;
+        tell(0.95, "is it " + kind_of(other) + " instead of " + kind_of(effect));
+        if (!without) without = search_->without(current_, effect);
+        if (!std::isfinite(without->train.objective)) break;
+        Hypothesis rival = search_->screened(*without, other);
         if (!std::isfinite(rival.train.objective)) continue;
         rival.train.point.noise = current_.train.point.noise;
-        search_->refine(without, rival);
+        search_->refine(*without, rival);
         const Improvement worse = compare(rival, current_);
         if (!is_plausible(rival, other)) continue;
         const bool same = worse.train < confusable_evidence ||
                           (worse.train < 10.0 * confusable_evidence && worse.t_value < 2.0);
         if (!same) continue;
-        result_.effects[i].confusable_with.push_back(other);
+        declare(effect, other);
         rivals.emplace_back(other, rival.train.point.plant);
       }
     }
     if (!rivals.empty()) result_.next_experiment = choose_experiment(final_.train.point.plant, rivals, runs_);
   }
 
+  FoundEffect& listed(std::size_t effect) {
+    return *std::find_if(result_.effects.begin(), result_.effects.end(),
+                         [&](const FoundEffect& found) { return found.effect == effect; });
+  }
+  bool is_listed(std::size_t effect) const {
+    const std::vector<std::size_t> all = all_found();
+    return std::find(all.begin(), all.end(), effect) != all.end();
+  }
+  bool is_declared(std::size_t effect, std::size_t other) {
+    const std::vector<std::size_t>& others = listed(effect).confusable_with;
+    return std::find(others.begin(), others.end(), other) != others.end();
+  }
+  void declare(std::size_t effect, std::size_t other) { listed(effect).confusable_with.push_back(other); }
+
   const Plant plant_;
   const std::vector<Measurement>& runs_;
   const DiagnosisOptions& options_;
   FitData train_, held_;
   std::optional<Search> search_;
-  Hypothesis given_, current_, final_;
+  Hypothesis given_, current_;
+  Hypothesis final_;  ///< fitted to the training runs, judged on the others
+  Hypothesis known_;  ///< the same effects fitted to all runs: what the model says in the end
   std::vector<std::size_t> found_, corrections_;
   std::map<std::size_t, std::vector<std::size_t>> near_;
   std::map<std::size_t, std::string> where_;

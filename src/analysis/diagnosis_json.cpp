@@ -16,18 +16,41 @@ json number(double value) {
   return std::isfinite(value) ? json(value) : json(nullptr);
 }
 
-json effect_json(const FoundEffect& effect) {
+json parameters_json(const std::vector<ParameterEstimate>& estimates) {
   json parameters = json::object();
-  for (const ParameterEstimate& p : effect.parameters)
+  for (const ParameterEstimate& p : estimates)
     parameters[p.name] = {
         {"value", number(p.value)}, {"ci95", {number(p.low), number(p.high)}}, {"unit", p.unit}};
+  return parameters;
+}
+
+json noise_json(const Noise& noise) {
+  return {{"force_n_sqrt_s", number(noise.force)},
+          {"torque_nm_sqrt_s", number(noise.torque)},
+          {"jitter_s", number(noise.jitter_s)},
+          {"sensors", number(noise.sensors)}};
+}
+
+json trial_json(const Trial& trial) {
+  return {{"round", trial.round + 1},
+          {"kind", kind_of(trial.effect)},
+          {"evidence", number(trial.evidence)},
+          {"held_out", number(trial.held)},
+          {"t", number(trial.t_value)},
+          {"standard_errors", number(trial.certainty)},
+          {"parameters", parameters_json(trial.parameters)},
+          {"noise", noise_json(trial.noise)},
+          {"taken", trial.taken}};
+}
+
+json effect_json(const FoundEffect& effect) {
   json confusable = json::array();
   for (const std::size_t other : effect.confusable_with) confusable.push_back(kind_of(other));
   return {{"kind", kind_of(effect.effect)},
           {"enters", std::string(name_of(effect_registry()[effect.effect].enters))},
           {"gap_before", number(effect.gap_before)},
           {"gap_after", number(effect.gap_after)},
-          {"parameters", parameters},
+          {"parameters", parameters_json(effect.parameters)},
           {"confusable_with", confusable},
           {"where", effect.where}};
 }
@@ -42,10 +65,13 @@ json diagnosis_json(const Diagnosis& diagnosis) {
     candidates.push_back({{"kind", kind_of(candidate.effect)},
                           {"gap_after", number(candidate.gap_after)},
                           {"evidence", number(candidate.evidence)}});
+  json trials = json::array();
+  for (const Trial& trial : diagnosis.trials) trials.push_back(trial_json(trial));
   json next = nullptr;
   if (diagnosis.next_experiment)
     next = {{"name", diagnosis.next_experiment->name},
             {"description", diagnosis.next_experiment->description},
+            {"file", diagnosis.next_experiment->file},
             {"distance", number(diagnosis.next_experiment->distance)}};
   return {{"verdict", std::string(name_of(diagnosis.verdict))},
           {"gap",
@@ -56,10 +82,8 @@ json diagnosis_json(const Diagnosis& diagnosis) {
           {"candidates", candidates},
           {"next_experiment", next},
           {"residual", diagnosis.residual},
-          {"noise",
-           {{"force_n_sqrt_s", number(diagnosis.noise.force)},
-            {"torque_nm_sqrt_s", number(diagnosis.noise.torque)},
-            {"jitter_s", number(diagnosis.noise.jitter_s)}}},
+          {"noise", noise_json(diagnosis.noise)},
+          {"trials", trials},
           {"notes", diagnosis.notes}};
 }
 

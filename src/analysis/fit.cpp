@@ -79,6 +79,11 @@ double measured(const Measurement& run, int channel, std::size_t k) {
   return channel == 0 ? run.cart_m[k] : run.theta_rad[k];
 }
 
+double weight_of(const Measurement& run, int channel, std::size_t k) {
+  const std::vector<double>& weights = channel == 0 ? run.cart_weight : run.theta_weight;
+  return weights.empty() ? 1.0 : weights[k];
+}
+
 bool has_channel(const Measurement& run, const Plant& plant, int channel) {
   return channel == 0 ? run.has_cart() : run.has_theta() && plant.pendulum.has_value();
 }
@@ -118,14 +123,18 @@ class Whitener {
 
   bool present(int channel) const { return present_[channel]; }
 
-  /// Prepares the update with one channel: gain and innovation variance.
+  /// Prepares the update with one channel: gain and innovation variance. What is only a part of a measurement
+  /// corrects by as much less.
   void prepare(const LinearStep& step, int channel) {
     const double c = step.gain[channel];
-    variance_ =
+    const double sensor =
         square(noise_.sensors) * sensor_variance_[channel] + square(noise_.jitter_s * step.rate[channel]);
+    variance_ = sensor;
     if (!active_) return;
-    variance_ += c * c * p_[channel][channel];
-    for (int i = 0; i < states; ++i) gain_[i] = c * p_[i][channel] / variance_;
+    const double spread = c * c * p_[channel][channel];
+    variance_ += spread;
+    const double with_weight = sensor / step.weight[channel] + spread;
+    for (int i = 0; i < states; ++i) gain_[i] = c * p_[i][channel] / with_weight;
     for (int i = 0; i < states; ++i)
       for (int j = 0; j < states; ++j) updated_[i][j] = p_[i][j] - gain_[i] * c * p_[channel][j];
     std::copy(&updated_[0][0], &updated_[0][0] + states * states, &p_[0][0]);
@@ -148,15 +157,15 @@ class Whitener {
 struct Likelihood {
   double chi_square = 0.0;
   double log_variance = 0.0;
-  std::size_t samples = 0;
+  double samples = 0.0;
   double objective() const { return chi_square + log_variance; }
 };
 
 /// Adds one innovation to a likelihood. A value that is not finite makes it infinite.
-void count(Likelihood& sum, double e, double variance) {
-  sum.chi_square += std::isfinite(e) ? e * e / variance : infinity;
-  sum.log_variance += std::log(variance);
-  ++sum.samples;
+void count(Likelihood& sum, double e, double variance, double weight) {
+  sum.chi_square += std::isfinite(e) ? weight * e * e / variance : infinity;
+  sum.log_variance += weight * std::log(variance);
+  sum.samples += weight;
 }
 
 /// Likelihood of a segment that is linearised, had the noise been another: to first order the filtered
@@ -183,7 +192,7 @@ Likelihood whiten(const std::vector<LinearStep>& steps, const Measurement& run, 
       const double c = step.gain[channel];
       const double e = step.residual[channel] - c * (shift[channel] + update[channel]);
       const double e_former = step.residual[channel] - c * former[channel];
-      count(sum, e, whitener.variance());
+      count(sum, e, whitener.variance(), step.weight[channel]);
       for (int i = 0; i < states; ++i) {
         update[i] += whitener.gain()[i] * e;
         former[i] += step.update[channel][i] * e_former;
@@ -199,6 +208,7 @@ struct Normal {
   NormalMatrix h;
   Eigen::VectorXd g;
   Likelihood likelihood;
+  std::vector<double> blocks;  ///< its objective, a stretch of time at a time
 };
 
 /// Adds a filter's correction to the state of an engine. A velocity at rest stays at rest: its gain is zero
@@ -257,7 +267,10 @@ void linearise_segment(const Measurement& run, const Segment& segment, const Fit
     normal.h.setZero(columns, columns);
     normal.g.setZero(columns);
     normal.likelihood = {};
+    normal.blocks.clear();
   }
+  constexpr double block_s = 0.25;
+  double block_end_s = -infinity, counted = 0.0;
 
   for (std::size_t k = segment.first; k <= segment.last; ++k) {
     LinearStep& step = steps[k - segment.first];
@@ -288,6 +301,7 @@ void linearise_segment(const Measurement& run, const Segment& segment, const Fit
     const double simulated[2] = {value_of(outputs.cart_m), value_of(outputs.theta_rad)};
     for (int channel = 0; channel < 2; ++channel) {
       step.gain[channel] = 1.0;
+      step.weight[channel] = weight_of(run, channel, k);
       step.residual[channel] =
           whitener.present(channel) ? measured(run, channel, k) - simulated[channel] : 0.0;
     }
@@ -338,18 +352,25 @@ void linearise_segment(const Measurement& run, const Segment& segment, const Fit
       const double e = step.residual[channel] - step.gain[channel] * update[channel];
       for (int i = 0; i < states; ++i) update[i] += whitener.gain()[i] * e;
       if (!with_normal) continue;
-      count(normal.likelihood, e, whitener.variance());
+      count(normal.likelihood, e, whitener.variance(), step.weight[channel]);
       if (!std::isfinite(e)) return;
       const Jet& shown = channel == 0 ? sensed.cart_m : sensed.theta_rad;
       row = step.gain[channel] * sensitivity.row(channel);
       for (int j = 0; j < parameters; ++j) row[states + j] += shown.v[states + j];
-      const double weight = 1.0 / whitener.variance();
+      const double weight = step.weight[channel] / whitener.variance();
       normal.h.template selfadjointView<Eigen::Lower>().rankUpdate(row.transpose(), weight);
       normal.g += row.transpose() * (weight * e);
       for (int i = 0; i < states; ++i)
         if (whitener.gain()[i] != 0.0) sensitivity.row(i) -= whitener.gain()[i] * row;
     }
     correct_state(simulator.engine(), update);
+    if (!with_normal) continue;
+    if (run.time_s[k] >= block_end_s) {
+      normal.blocks.push_back(0.0);
+      block_end_s = run.time_s[k] + block_s;
+    }
+    normal.blocks.back() += normal.likelihood.objective() - counted;
+    counted = normal.likelihood.objective();
   }
   if (with_normal) normal.h.template triangularView<Eigen::StrictlyUpper>() = normal.h.transpose();
 }
@@ -372,14 +393,14 @@ double prior_objective(const Plant& plant, const std::vector<FreeParameter>& fre
   return sum;
 }
 
-/// Inverse of an information matrix; directions that hold no information at all get none (a pseudo-inverse
-/// after scaling).
+/// Inverse of an information matrix. What holds no information at all is left out (zeros); combinations of
+/// the others that hold none are as good as unknown.
 NormalMatrix inverse_of(const NormalMatrix& h) {
-  const Eigen::VectorXd scale = h.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
+  const Eigen::VectorXd scale =
+      h.diagonal().unaryExpr([](double v) { return v > 1e-200 ? 1.0 / std::sqrt(v) : 0.0; });
   const Eigen::SelfAdjointEigenSolver<NormalMatrix> solver(scale.asDiagonal() * h * scale.asDiagonal());
   constexpr double least = 1e-13;
-  const Eigen::VectorXd inverse =
-      solver.eigenvalues().unaryExpr([](double v) { return v > least ? 1.0 / v : 0.0; });
+  const Eigen::VectorXd inverse = solver.eigenvalues().cwiseMax(least).cwiseInverse();
   return scale.asDiagonal() * solver.eigenvectors() * inverse.asDiagonal() *
          solver.eigenvectors().transpose() * scale.asDiagonal();
 }
@@ -417,6 +438,10 @@ class Fitter {
   FitResult run() {
     FitResult result;
     double objective = evaluate();
+    if (options_.or_noise && noise_objective(*options_.or_noise) < noise_objective(point_.noise)) {
+      point_.noise = *options_.or_noise;
+      objective = evaluate();
+    }
     if (options_.noise_rounds == 0) descend(objective);
     if (options_.noise_last && std::isfinite(objective)) {
       estimate_noise({4.0, 1.5, 1.15});
@@ -424,7 +449,7 @@ class Fitter {
     }
     for (int round = 0; round < options_.noise_rounds && std::isfinite(objective); ++round) {
       const double before = objective;
-      estimate_noise({10.0, 2.0, 1.2, 1.04});
+      estimate_noise({10.0, 2.0, 1.2, 1.04, 1.01});
       objective = evaluate();
       descend(objective);
       constexpr double settled = 2.0;
@@ -459,8 +484,8 @@ class Fitter {
     return sum;
   }
 
-  std::size_t sample_count() const {
-    std::size_t count = 0;
+  double sample_count() const {
+    double count = 0.0;
     for (const Normal& normal : normals_) count += normal.likelihood.samples;
     return count;
   }
@@ -491,7 +516,7 @@ class Fitter {
       damping = std::max(damping * 0.1, 1e-9);
       const double fall = objective - next_objective;
       objective = next_objective;
-      if (fall < options_.tolerance * static_cast<double>(sample_count()) * 0.1 + 0.02) {
+      if (fall < options_.tolerance * sample_count() * 0.1 + 0.02) {
         converged_ = true;
         break;
       }
@@ -580,7 +605,7 @@ class Fitter {
         const Eigen::Index j = moving[static_cast<std::size_t>(a)];
         const FreeParameter& p = free_[static_cast<std::size_t>(j)];
         const double value = point_.plant.find(p.effect)->values[p.index];
-        const double limit = std::max(0.5 * std::abs(value), 0.5 * p.scale);
+        const double limit = longest_step(p, value);
         delta[j] = std::clamp(std::isfinite(solved[a]) ? solved[a] * p.scale : 0.0, -limit, limit);
         const bool below = value <= p.low && delta[j] < 0.0;
         const bool above = value >= p.high && delta[j] > 0.0;
@@ -592,6 +617,12 @@ class Fitter {
       if (!again) break;
     }
     return delta;
+  }
+
+  /// Sizes enter nearly linearly and may go far at once; shapes, places and times may not.
+  static double longest_step(const FreeParameter& p, double value) {
+    const bool size = effect_registry()[p.effect].parameters[p.index].neutral == 0.0;
+    return size ? std::max(std::abs(value), 4.0 * p.scale) : 0.5 * std::max(std::abs(value), p.scale);
   }
 
   double noise_objective(const Noise& noise) const {
@@ -648,6 +679,20 @@ class Fitter {
     point_.noise = best;
   }
 
+  /// The information without what stands at a bound: that is not estimated but held there, and lends the
+  /// others no doubt.
+  NormalMatrix without_held(NormalMatrix h) const {
+    for (std::size_t j = 0; j < free_.size(); ++j) {
+      const FreeParameter& p = free_[j];
+      const double value = point_.plant.find(p.effect)->values[p.index];
+      if (value > p.low && value < p.high) continue;
+      const auto at = static_cast<Eigen::Index>(j);
+      h.row(at).setZero();
+      h.col(at).setZero();
+    }
+    return h;
+  }
+
   void finish(FitResult& result) const {
     result.point = point_;
     result.objective = prior_objective(point_.plant, free_);
@@ -659,6 +704,7 @@ class Fitter {
     }
     for (const Normal& n : normals_) {
       result.segment_objective.push_back(n.likelihood.objective());
+      result.block_objective.insert(result.block_objective.end(), n.blocks.begin(), n.blocks.end());
       result.segment_chi_square.push_back(n.likelihood.chi_square);
       result.segment_samples.push_back(n.likelihood.samples);
       result.objective += n.likelihood.objective();
@@ -674,7 +720,7 @@ class Fitter {
     if (!std::isfinite(result.objective)) result.objective = infinity;
     result.information = h;
     if (np == 0) return;
-    const NormalMatrix inverse = inverse_of(h);
+    const NormalMatrix inverse = inverse_of(without_held(h));
     const auto segments = static_cast<double>(normals_.size());
     const double small_sample = segments > np + 1.0 ? segments / (segments - 1.0) : 2.0;
     NormalMatrix prior = NormalMatrix::Zero(np, np);
@@ -740,6 +786,10 @@ std::vector<Segment> cut_segments(const std::vector<Measurement>& runs, double l
             upright_rate * std::max(0.0, std::cos(run.theta_rad[k])) * (run.time_s[k] - run.time_s[k - 1]);
       if (gap) {
         close(k - 1);
+        // What was commanded in the gap is not known, and may still act for a while.
+        constexpr double forgotten_s = 0.1;
+        const double resume_s = run.time_s[k] + forgotten_s;
+        while (k + 1 < run.size() && run.time_s[k] < resume_s) ++k;
         first = k;
         growth = 0.0;
       } else if (growth > largest_growth || run.time_s[k] - run.time_s[first] >= longest_s ||
@@ -751,6 +801,42 @@ std::vector<Segment> cut_segments(const std::vector<Measurement>& runs, double l
     }
   }
   return segments;
+}
+
+namespace {
+
+/// What the true value is when a sensor shows this one: sensors are linear.
+double behind_sensor(double shown, double shown_at_0, double shown_at_1) {
+  return (shown - shown_at_0) / (shown_at_1 - shown_at_0);
+}
+
+/// The state of which the sensors show these values.
+void undo_sensors(const Dynamics<double>& dynamics, PlantState<double>& state) {
+  PlantState<double> unit;
+  unit.cart_m = unit.theta_rad = 1.0;
+  const Outputs<double> at_0 = dynamics.measure(PlantState<double>{}), at_1 = dynamics.measure(unit);
+  state.cart_m = behind_sensor(state.cart_m, at_0.cart_m, at_1.cart_m);
+  state.theta_rad = behind_sensor(state.theta_rad, at_0.theta_rad, at_1.theta_rad);
+  state.cart_mps /= at_1.cart_m - at_0.cart_m;
+  state.theta_radps /= at_1.theta_rad - at_0.theta_rad;
+}
+
+}  // namespace
+
+void follow_sensors(std::vector<PlantState<double>>& starts, const Plant& from, const Plant& to) {
+  const PlantModel<double> model_from = make_model<double>(from), model_to = make_model<double>(to);
+  const Dynamics<double> before(model_from), after(model_to);
+  for (PlantState<double>& state : starts) {
+    PlantState<double> unit;
+    unit.cart_m = unit.theta_rad = 1.0;
+    const Outputs<double> shown = before.measure(state), at_0 = before.measure(PlantState<double>{}),
+                          at_1 = before.measure(unit);
+    state.cart_m = shown.cart_m;
+    state.theta_rad = shown.theta_rad;
+    state.cart_mps *= at_1.cart_m - at_0.cart_m;
+    state.theta_radps *= at_1.theta_rad - at_0.theta_rad;
+    undo_sensors(after, state);
+  }
 }
 
 std::vector<PlantState<double>> guess_starts(const std::vector<Measurement>& runs,
@@ -770,6 +856,7 @@ std::vector<PlantState<double>> guess_starts(const std::vector<Measurement>& run
     if (run.has_theta() && plant.pendulum)
       std::tie(s.theta_rad, s.theta_radps) =
           local_fit(run.time_s, run.theta_rad, segment.first, segment.first, segment.last, width_s);
+    undo_sensors(dynamics, s);
     if (dynamics.has_bristle_state() && s.cart_mps != 0.0) {
       const double direction = s.cart_mps > 0.0 ? 1.0 : -1.0;
       s.bristle_m = direction * dynamics.cart_dry_level(s.cart_m, std::abs(s.cart_mps), direction) /
@@ -800,9 +887,9 @@ double whitened_rms(const FitResult& result) {
   double count = 0.0;
   for (std::size_t s = 0; s < result.segment_chi_square.size(); ++s) {
     sum += result.segment_chi_square[s];
-    count += static_cast<double>(result.segment_samples[s]);
+    count += result.segment_samples[s];
   }
-  return std::sqrt(sum / std::max(count, 1.0));
+  return std::sqrt(sum / std::max(count, 1e-9));
 }
 
 }  // namespace upright

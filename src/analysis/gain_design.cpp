@@ -195,10 +195,34 @@ SampledProblem with_delay_line(const SampledProblem& direct, int periods) {
   return line;
 }
 
-/// The gain that feeding back `k` on the predicted state is on (state, voltages on their way).
-RowVectorXd gain_through_prediction(const RowVectorXd& k, const SampledProblem& direct, int periods) {
+/// The problem with the velocity estimator's states behind it: (lag, velocity) of each coordinate. They cost
+/// nothing and move nothing.
+SampledProblem with_estimator(const SampledProblem& line, Index coordinates, const EstimatorStep& f) {
+  const Index n = line.a.rows(), all = n + 2 * coordinates;
+  SampledProblem whole{MatrixXd::Zero(all, all), VectorXd::Zero(all), MatrixXd::Zero(all, all),
+                       VectorXd::Zero(all), line.r};
+  whole.a.topLeftCorner(n, n) = line.a;
+  whole.b.head(n) = line.b;
+  whole.q.topLeftCorner(n, n) = line.q;
+  whole.s.head(n) = line.s;
+  for (Index i = 0; i < coordinates; ++i) {
+    const Index lag = n + 2 * i, velocity = lag + 1;
+    RowVectorXd change = line.a.row(i);
+    change(i) -= 1.0;
+    whole.a.row(lag).head(n) = f.g1 * change;
+    whole.a.row(velocity).head(n) = f.g2 * change;
+    whole.b(lag) = f.g1 * line.b(i);
+    whole.b(velocity) = f.g2 * line.b(i);
+    whole.a.block(lag, lag, 2, 2) << f.p11, f.p12, f.p21, f.p22;
+  }
+  return whole;
+}
+
+/// The gain that feeding back `k` on the predicted state is on (state, voltages on their way, estimator).
+RowVectorXd gain_through_prediction(const RowVectorXd& k, const SampledProblem& direct, int periods,
+                                    Index estimator_states) {
   const Index n = direct.a.rows();
-  RowVectorXd whole(n + periods);
+  RowVectorXd whole = RowVectorXd::Zero(n + periods + estimator_states);
   RowVectorXd ahead = k;
   for (Index i = periods - 1; i >= 0; --i) {
     whole(n + i) = ahead.dot(direct.b);
@@ -208,11 +232,14 @@ RowVectorXd gain_through_prediction(const RowVectorXd& k, const SampledProblem& 
   return whole;
 }
 
-void check_with_delay_line(SampledDesign& result, const SampledProblem& direct, const RowVectorXd& k) {
-  if (result.delay_periods == 0 || result.delay_periods > longest_delay_line) return;
-  const SampledProblem line = with_delay_line(direct, result.delay_periods);
-  const RiccatiSolution solution = solve_discrete_riccati(line.a, line.b, line.q, line.s, line.r);
-  const RowVectorXd expected = gain_through_prediction(k, direct, result.delay_periods);
+void check_with_all_states(SampledDesign& result, const SampledProblem& direct, const RowVectorXd& k,
+                           Index coordinates, const EstimatorStep& estimator) {
+  if (result.delay_periods > longest_delay_line) return;
+  const SampledProblem line =
+      result.delay_periods > 0 ? with_delay_line(direct, result.delay_periods) : direct;
+  const SampledProblem whole = with_estimator(line, coordinates, estimator);
+  const RiccatiSolution solution = solve_discrete_riccati(whole.a, whole.b, whole.q, whole.s, whole.r);
+  const RowVectorXd expected = gain_through_prediction(k, direct, result.delay_periods, 2 * coordinates);
   result.delay_line_residual = solution.residual;
   result.delay_line_difference = (solution.gain - expected).norm() / expected.norm();
 }
@@ -220,7 +247,7 @@ void check_with_delay_line(SampledDesign& result, const SampledProblem& direct, 
 }  // namespace
 
 SampledDesign design_sampled_gains(const Plant& plant, const DesignWeights& weights, double smoothing,
-                                   double rate_hz, double delay_s) {
+                                   double rate_hz, double delay_s, const EstimatorConfig& estimator) {
   const LinearPlant linear = linearize(plant, smoothing);
   refuse_unreadable(linear);
   bool lagging = false;
@@ -242,7 +269,8 @@ SampledDesign design_sampled_gains(const Plant& plant, const DesignWeights& weig
   add_shares(result.design, part, solution.gain);
   if (lagging)
     result.design.notes.emplace_back("motor_lag: the gains take it as quick; the predictor follows it");
-  check_with_delay_line(result, direct, solution.gain);
+  check_with_all_states(result, direct, solution.gain, static_cast<Index>(linear.fed_back.size()) / 2,
+                        make_estimator_step(estimator, period_s));
   return result;
 }
 

@@ -10,6 +10,8 @@
 
 #include "upright/model/error.hpp"
 #include "upright/model/yaml_reader.hpp"
+#include "upright/runtime/experiment_file.hpp"
+#include "upright/runtime/run_reader.hpp"
 
 namespace upright {
 
@@ -239,6 +241,8 @@ Measurement load(const Mapping& mapping, const std::string& name) {
   if (still) throw ConfigError("record a run in which something moves: " + file + " holds constant data");
   m.cart_resolution_m = mapping.cart_resolution_m.value_or(find_resolution(m.cart_m));
   m.theta_resolution_rad = mapping.theta_resolution_rad.value_or(find_resolution(m.theta_rad));
+  if (m.cart_resolution_m > 0.0) m.cart_weight = dwell_weights(m.cart_m);
+  if (m.theta_resolution_rad > 0.0) m.theta_weight = dwell_weights(m.theta_rad);
   const bool motor_off = is_constant(m.voltage_v) && m.voltage_v.front() == 0.0;
   if (m.cart_m.empty() && motor_off && !m.cart_locked) {
     m.cart_locked = true;
@@ -246,6 +250,34 @@ Measurement load(const Mapping& mapping, const std::string& name) {
   }
   if (m.has_cart() && m.cart_locked) m.cart_m.clear();
   return m;
+}
+
+/// A run directory's mapping. Of an experiment's run, what somebody's hands did is left out: before the
+/// pendulum was let go no equation of motion holds.
+Mapping mapping_of_run(const fs::path& directory) {
+  Mapping mapping = plain_mapping(directory / "samples.csv");
+  std::error_code problem;
+  if (!fs::exists(directory / "run.yaml", problem)) return mapping;
+  const YamlMap document = YamlMap::from_file(directory / "run.yaml");
+  if (!document.has("experiment")) return mapping;
+  const PieceKind kind = read_piece(document.map("experiment").map("piece")).kind;
+  if (kind != PieceKind::free_decay && kind != PieceKind::closed_loop && kind != PieceKind::delay_sweep)
+    return mapping;
+  const std::vector<LogRecord> rows = read_samples(mapping.file).rows;
+  std::size_t from = 0;
+  if (kind == PieceKind::free_decay) {
+    mapping.cart_locked = true;
+    // Held still: the last row before the angle has left where it was held.
+    constexpr double left_rad = 0.02;
+    while (from + 1 < rows.size() && std::abs(rows[from + 1].theta_rad - rows[0].theta_rad) < left_rad)
+      ++from;
+  } else {
+    while (from + 1 < rows.size() && (rows[from].flags & row_flag::feedback) == 0) ++from;
+    // Its first voltage is what lets the hand go.
+    from = std::min(from + 2, rows.empty() ? 0 : rows.size() - 1);
+  }
+  if (from > 0) mapping.from_s = static_cast<double>(rows[from].time_ns) / 1e9;
+  return mapping;
 }
 
 }  // namespace
@@ -279,6 +311,29 @@ double find_resolution(const std::vector<double>& values) {
     quantum = sum / count;
   }
   return quantum;
+}
+
+std::vector<double> dwell_weights(const std::vector<double>& values) {
+  struct Dwell {
+    std::size_t first, length;
+  };
+  std::vector<Dwell> dwells;
+  for (std::size_t k = 0; k < values.size(); ++k) {
+    if (dwells.empty() || values[k] != values[k - 1]) dwells.push_back({k, 0});
+    ++dwells.back().length;
+  }
+  std::vector<double> weights(values.size(), 1.0);
+  for (std::size_t d = 0; d < dwells.size(); ++d) {
+    const bool last = d + 1 == dwells.size();
+    const auto length = static_cast<double>(dwells[d].length);
+    const double before = d > 0 ? static_cast<double>(dwells[d - 1].length) : length;
+    const double after = last ? length : static_cast<double>(dwells[d + 1].length);
+    const bool turns = d > 0 && !last && values[dwells[d - 1].first] == values[dwells[d + 1].first];
+    const double new_ones = turns ? 1.0 : std::min({length, before, after});
+    const auto from = weights.begin() + static_cast<std::ptrdiff_t>(dwells[d].first);
+    std::fill(from, from + static_cast<std::ptrdiff_t>(dwells[d].length), new_ones / length);
+  }
+  return weights;
 }
 
 double find_noise(const std::vector<double>& values) {
@@ -318,7 +373,7 @@ Measurement read_measurement(const fs::path& path) {
     if (!fs::exists(samples, problem))
       throw ConfigError("name a run directory, a CSV or a dataset file: " + path.string() +
                         " has no samples.csv");
-    return load(plain_mapping(samples),
+    return load(mapping_of_run(path),
                 path.filename().empty() ? path.parent_path().filename().string() : path.filename().string());
   }
   const std::string extension = path.extension().string();

@@ -146,58 +146,203 @@ std::pair<double, std::size_t> explained_share(const Rows& rows, const std::vect
   return {total > 0.0 ? 1.0 - left / total : 0.0, best};
 }
 
-/// Fourth moment over the square of the second: 3 for a Gaussian, more where a residual comes in bursts.
-/// Blocks at rest do not count, since friction hides the force there.
-double kurtosis_of(const std::vector<double>& y, const Rows& rows, std::size_t speed_feature) {
-  double second = 0.0, fourth = 0.0, count = 0.0;
-  for (std::size_t k = 0; k < y.size(); ++k) {
-    if (std::abs(rows.features[k][speed_feature]) < 2e-3) continue;
-    second += y[k] * y[k];
-    fourth += y[k] * y[k] * y[k] * y[k];
-    count += 1.0;
+/// Forces and torques that no effect of the registry has, as the residual might follow them: of unit size.
+struct Probe {
+  const char* name;
+  bool torque;
+};
+constexpr std::array probes = {Probe{"time", false},
+                               Probe{"time and direction of motion", false},
+                               Probe{"time and velocity", false},
+                               Probe{"time and voltage", false},
+                               Probe{"the time after a reversal of motion", false},
+                               Probe{"the time after a reversal of motion", false},
+                               Probe{"the time after a reversal of voltage", false},
+                               Probe{"time", true},
+                               Probe{"time and direction of the pendulum", true},
+                               Probe{"time and the pendulum's rate", true},
+                               Probe{"the time after a reversal of the pendulum", true}};
+using ProbeValues = std::array<double, probes.size()>;
+
+/// Follows one run of samples and says what each probe is at the last one.
+class ProbeState {
+ public:
+  explicit ProbeState(double middle_s) : middle_s_(middle_s) {}
+
+  ProbeValues at(double time_s, double dt, double cart_mps, double theta_radps, double voltage_v) {
+    const double direction = sign(cart_mps, 2e-3), turn = sign(theta_radps, 0.02);
+    motion_.pass(direction, dt);
+    voltage_.pass(sign(voltage_v, 0.02), dt);
+    pendulum_.pass(turn, dt);
+    const double t = time_s - middle_s_;
+    return {t,
+            t * direction,
+            t * cart_mps,
+            t * voltage_v,
+            motion_.fading(0.03),
+            motion_.fading(0.15),
+            voltage_.fading(0.05),
+            t,
+            t * turn,
+            t * theta_radps,
+            pendulum_.fading(0.1)};
   }
-  return count > 50.0 && second > 0.0 ? fourth * count / (second * second) : 3.0;
+
+ private:
+  struct Reversal {
+    double since_s = 10.0, last = 0.0;
+    void pass(double now, double dt) {
+      since_s += dt;
+      if (now == 0.0) return;
+      if (now != last) since_s = 0.0;
+      last = now;
+    }
+    double fading(double over_s) const { return std::exp(-since_s / over_s) * last; }
+  };
+  double middle_s_;
+  Reversal motion_, voltage_, pendulum_;
+};
+
+constexpr int states = LinearStep::states;
+
+/// How an unmodelled force of unit size would show in the innovations: the error it makes, less what the
+/// filter corrects of it.
+struct Response {
+  std::array<double, states> error{};
+
+  /// Carries the error over a sample period in which the force or torque was `size`.
+  void advance(const LinearStep& step, bool torque, double size) {
+    const double* by = torque ? step.by_torque : step.by_force;
+    std::array<double, states> next{};
+    for (int i = 0; i < states; ++i) {
+      next[i] = (step.transition[i][2] * by[0] + step.transition[i][3] * by[1]) * step.period_s * size;
+      for (int j = 0; j < states; ++j) next[i] += step.transition[i][j] * error[j];
+    }
+    error = next;
+  }
+  /// What it shows in one channel, which the filter then corrects.
+  double show(const LinearStep& step, int channel) {
+    const double shown = step.gain[channel] * error[channel];
+    for (int i = 0; i < states; ++i) error[i] -= step.update[channel][i] * shown;
+    return shown;
+  }
+};
+
+/// Score and information of a force in the innovations.
+struct Score {
+  double score = 0.0, information = 0.0;
+  void add(double shown, double innovation, double variance) {
+    score += shown * innovation / variance;
+    information += shown * shown / variance;
+  }
+};
+
+/// What whitened innovations say, a block at a time.
+struct Blocks {
+  std::vector<double> rms;                              ///< of whitened innovations
+  std::array<std::vector<Score>, probes.size()> probe;  ///< each probe in each block
+  std::array<std::vector<double>, 2> pulses;            ///< a short force and torque, in standard errors
+};
+
+void examine_segment(const Measurement& run, const Segment& segment, const Plant& plant,
+                     const std::vector<LinearStep>& steps, Blocks& blocks) {
+  constexpr double block_s = 0.15;
+  const bool present[2] = {run.has_cart(), run.has_theta() && plant.pendulum.has_value()};
+  const auto length =
+      static_cast<std::size_t>(std::max(20.0, block_s / std::max(run.median_period_s(), 1e-9)));
+  ProbeState state(0.5 * (run.time_s.front() + run.time_s.back()));
+  std::array<Response, probes.size()> responses;
+  std::array<Response, 2> pulses;
+  ProbeValues acting{};
+  std::array<Score, probes.size()> scores;
+  std::array<Score, 2> pulse_scores;
+  double sum = 0.0, count = 0.0;
+  for (std::size_t k = 0; k < steps.size(); ++k) {
+    const LinearStep& step = steps[k];
+    if (k > 0) {
+      for (std::size_t i = 0; i < probes.size(); ++i) responses[i].advance(step, probes[i].torque, acting[i]);
+      for (int i = 0; i < 2; ++i) pulses[i].advance(step, i == 1, 1.0);
+    }
+    double update[states] = {};
+    for (int channel = 0; channel < 2; ++channel) {
+      if (!present[channel]) continue;
+      const double e = step.residual[channel] - step.gain[channel] * update[channel];
+      for (int i = 0; i < states; ++i) update[i] += step.update[channel][i] * e;
+      sum += step.weight[channel] * e * e / step.variance[channel];
+      count += step.weight[channel];
+      for (std::size_t i = 0; i < probes.size(); ++i)
+        scores[i].add(responses[i].show(step, channel), e, step.variance[channel] / step.weight[channel]);
+      for (int i = 0; i < 2; ++i)
+        pulse_scores[i].add(pulses[i].show(step, channel), e, step.variance[channel] / step.weight[channel]);
+    }
+    acting = state.at(run.time_s[segment.first + k], step.period_s, step.rate[0], step.rate[1],
+                      run.voltage_v[segment.first + k]);
+    if ((k + 1) % length != 0) continue;
+    constexpr double enough = 10.0;
+    if (count > enough) blocks.rms.push_back(std::sqrt(sum / count));
+    for (std::size_t i = 0; i < probes.size(); ++i) blocks.probe[i].push_back(scores[i]);
+    for (int i = 0; i < 2; ++i)
+      if (pulse_scores[i].information > 0.0)
+        blocks.pulses[i].push_back(pulse_scores[i].score / std::sqrt(pulse_scores[i].information));
+    sum = count = 0.0;
+    scores.fill({});
+    pulse_scores.fill({});
+    pulses.fill({});
+  }
+}
+
+/// Fourth moment over the square of the second: 3 for a Gaussian, more where something comes in bursts.
+double kurtosis_of(const std::vector<double>& values) {
+  double second = 0.0, fourth = 0.0;
+  for (const double v : values) {
+    second += v * v;
+    fourth += v * v * v * v;
+  }
+  const auto n = static_cast<double>(values.size());
+  return n > 50.0 && second > 0.0 ? fourth * n / (second * second) : 3.0;
+}
+
+/// How certainly the residual goes with a probe, by the scatter of its scores over blocks: honest where the
+/// innovations are not white.
+double certainty_of(const std::vector<Score>& scores) {
+  double sum = 0.0, spread = 0.0, information = 0.0;
+  for (const Score& s : scores) {
+    sum += s.score;
+    spread += s.score * s.score;
+    information += s.information;
+  }
+  return spread > 0.0 ? std::abs(sum) / std::sqrt(std::max(spread, information)) : 0.0;
 }
 
 }  // namespace
 
-ResidualStructure examine_residuals(const FitData& data, const FitPoint& point) {
-  ResidualStructure result;
-  const std::vector<std::vector<LinearStep>> steps = linearise(data, point);
-  std::vector<double> blocks;
-  for (std::size_t s = 0; s < steps.size(); ++s) {
-    const Measurement& run = (*data.runs)[data.segments[s].run];
-    const bool present[2] = {run.has_cart(), run.has_theta() && point.plant.pendulum.has_value()};
-    constexpr double block_s = 0.15;
-    const double period = run.median_period_s();
-    const auto length = static_cast<std::size_t>(std::max(20.0, block_s / period));
-    for (std::size_t first = 0; first + length <= steps[s].size(); first += length) {
-      double sum = 0.0, count = 0.0;
-      for (std::size_t k = first; k < first + length; ++k) {
-        double update[LinearStep::states] = {};
-        for (int channel = 0; channel < 2; ++channel) {
-          if (!present[channel]) continue;
-          const double e = steps[s][k].residual[channel] - steps[s][k].gain[channel] * update[channel];
-          for (int i = 0; i < LinearStep::states; ++i) update[i] += steps[s][k].update[channel][i] * e;
-          sum += e * e / steps[s][k].variance[channel];
-          count += 1.0;
-        }
-      }
-      blocks.push_back(std::sqrt(sum / std::max(count, 1.0)));
-    }
-  }
-  if (blocks.size() >= 20) {
-    std::sort(blocks.begin(), blocks.end());
-    result.dispersion = blocks[blocks.size() * 95 / 100] / std::max(blocks[blocks.size() / 2], 1e-12);
-  }
+ResidualPlace locate_residual(const FitData& data, const FitPoint& point) {
   const Rows rows = collect(data, smooth_residuals(data, point));
   const auto [force_share, force_feature] = explained_share(rows, rows.force);
   const auto [torque_share, torque_feature] = explained_share(rows, rows.torque);
-  result.force_tails = kurtosis_of(rows.force, rows, 1);
-  result.force_explained = force_share;
-  result.torque_explained = torque_share;
-  result.force_feature = feature_names[force_feature];
-  result.torque_feature = feature_names[torque_feature];
+  if (force_share >= torque_share) return {false, std::max(force_share, 0.0), feature_names[force_feature]};
+  return {true, std::max(torque_share, 0.0), feature_names[torque_feature]};
+}
+
+ResidualStructure examine_residuals(const FitData& data, const FitPoint& point) {
+  const std::vector<std::vector<LinearStep>> steps = linearise(data, point);
+  Blocks blocks;
+  for (std::size_t s = 0; s < steps.size(); ++s)
+    examine_segment((*data.runs)[data.segments[s].run], data.segments[s], point.plant, steps[s], blocks);
+  ResidualStructure result;
+  if (blocks.rms.size() >= 20) {
+    std::sort(blocks.rms.begin(), blocks.rms.end());
+    result.dispersion =
+        blocks.rms[blocks.rms.size() * 95 / 100] / std::max(blocks.rms[blocks.rms.size() / 2], 1e-12);
+  }
+  result.tails = std::max(kurtosis_of(blocks.pulses[0]), kurtosis_of(blocks.pulses[1]));
+  for (std::size_t i = 0; i < probes.size(); ++i) {
+    const double certainty = certainty_of(blocks.probe[i]);
+    if (certainty <= result.certainty) continue;
+    result.certainty = certainty;
+    result.goes_with = probes[i].name;
+    result.in_pendulum = probes[i].torque;
+  }
   return result;
 }
 

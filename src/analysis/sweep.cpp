@@ -7,7 +7,9 @@
 #include <set>
 
 #include "sweep_journal.hpp"
+#include "upright/analysis/delay_margin.hpp"
 #include "upright/model/error.hpp"
+#include "upright/model/linear_plant.hpp"
 #include "upright/model/yaml_reader.hpp"
 
 namespace upright {
@@ -259,6 +261,14 @@ std::string transitions_csv(const std::vector<Transition>& transitions) {
   return text;
 }
 
+std::string margins_csv(const std::vector<LinearMargin>& margins) {
+  std::string text = "model,critical_delay_s,crossing_radps\n";
+  for (const LinearMargin& margin : margins)
+    text += margin.model + "," + exact_text(margin.critical_delay_s) + "," +
+            exact_text(margin.crossing_radps) + "\n";
+  return text;
+}
+
 /// Whole or not at all.
 void write_file(const std::filesystem::path& file, const std::string& text) {
   const std::filesystem::path beside = file.string() + ".new";
@@ -277,7 +287,7 @@ void prepare_folder(const std::filesystem::path& folder, bool overwrite) {
   if (error)
     throw Error(ExitCode::usage,
                 "check the path and its permissions: cannot make the folder " + folder.string());
-  for (const char* name : {"sweep.csv", "transitions.csv", "sweep.yaml", "sweep.partial"}) {
+  for (const char* name : {"sweep.csv", "transitions.csv", "margins.csv", "sweep.yaml", "sweep.partial"}) {
     const std::filesystem::path file = folder / name;
     const bool result = std::string(name) != "sweep.partial";
     if (overwrite)
@@ -288,6 +298,34 @@ void prepare_folder(const std::filesystem::path& folder, bool overwrite) {
 }
 
 }  // namespace
+
+std::vector<LinearMargin> linear_margins(const SweepConfig& config) {
+  if (config.setup.make_compensator) return {};
+  constexpr double usual_smoothing = 100.0;  // as `upright margin` takes it
+  const double smoothing =
+      config.setup.model.smoothing > 0.0 ? config.setup.model.smoothing : usual_smoothing;
+  ControlConfig control = config.setup.control;
+  control.delay_s = 0.0;
+  const auto margin_of = [&](const char* name, const Plant& plant) {
+    const LoopMargin margin = config.setup.sampled ? sampled_margin(plant, control, smoothing, false)
+                                                   : continuous_margin(plant, control.gains, smoothing);
+    return LinearMargin{name, margin.critical_delay_s, margin.crossing_radps};
+  };
+  std::vector<LinearMargin> margins{margin_of("near rest", config.plant)};
+  const Plant sliding = sliding_plant(config.plant);
+  if (sliding.effects.size() < config.plant.effects.size()) margins.push_back(margin_of("sliding", sliding));
+  return margins;
+}
+
+void refuse_unstable(const SweepConfig& config, const std::vector<LinearMargin>& margins) {
+  if (margins.empty() || std::any_of(margins.begin(), margins.end(), [](const LinearMargin& margin) {
+        return margin.critical_delay_s > 0.0;
+      }))
+    return;
+  throw ConfigError("check the plant file, or design gains for it (upright design PLANT --out GAINS): " +
+                    (config.plant_file.empty() ? std::string("the plant") : config.plant_file.string()) +
+                    " is unstable with these gains even without delay");
+}
 
 std::vector<Transition> find_transitions(const SweepConfig& config, SweepTeam& team) {
   const SweepOptions options;
@@ -301,6 +339,8 @@ std::vector<Transition> find_transitions(const SweepConfig& config, SweepTeam& t
 
 SweepResult run_sweep(const SweepConfig& config, const std::filesystem::path& folder,
                       const SweepOptions& options, SweepTeam& team) {
+  const std::vector<LinearMargin> margins = linear_margins(config);
+  refuse_unstable(config, margins);
   prepare_folder(folder, options.overwrite);
   const std::string mode = options.transitions_only ? "# transitions only\n" : "";
   SweepJournal journal(folder / "sweep.partial", mode + config.resolved_text);
@@ -326,6 +366,7 @@ SweepResult run_sweep(const SweepConfig& config, const std::filesystem::path& fo
   sort_runs(result.runs);
   result.transitions = search.transitions();
   write_file(folder / "sweep.yaml", mode + config.resolved_text);
+  write_file(folder / "margins.csv", margins_csv(margins));
   write_file(folder / "transitions.csv", transitions_csv(result.transitions));
   write_file(folder / "sweep.csv", sweep_csv(config, result.runs));
   journal.remove();

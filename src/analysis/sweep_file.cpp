@@ -142,6 +142,8 @@ SweepConfig read_sweep_file(const std::filesystem::path& file) {
   const std::string engine = map.choice("engine", {"fast", "reference"});
   config.engine = engine == "fast" ? SweepEngine::fast : SweepEngine::reference;
   setup.model = make_model<double>(plant);
+  config.plant = plant;
+  config.plant_file = map.path("plant");
   setup.model.smoothing = map.number_or("smoothing", 0.0, Range::not_negative());
   map.finish();
 

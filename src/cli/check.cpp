@@ -13,6 +13,7 @@
 #include "upright/hal/rig_file.hpp"
 #include "upright/model/error.hpp"
 #include "upright/model/plant_file.hpp"
+#include "upright/runtime/experiment_file.hpp"
 
 namespace upright::cli {
 
@@ -36,11 +37,18 @@ void check_rig(const std::filesystem::path& file) {
   if (rig.simulated) read_plant_file(rig.simulated->plant);
 }
 
+void check_experiment(const std::filesystem::path& file) {
+  const Experiment experiment = read_experiment_file(file);
+  if (!experiment.plant.empty()) read_plant_file(experiment.plant);
+  if (!experiment.gains.empty()) check_gains(experiment.gains);
+}
+
 constexpr std::array file_kinds = {
     FileKind{"plant", "plant", [](const std::filesystem::path& file) { read_plant_file(file); }},
     FileKind{"gain", "gains", check_gains},
     FileKind{"rig", "backend", check_rig},
     FileKind{"sweep", "sweep", [](const std::filesystem::path& file) { read_sweep_file(file); }},
+    FileKind{"experiment", "experiment", check_experiment},
     FileKind{"dataset", "dataset",
              [](const std::filesystem::path& file) { read_measurement(file.string()); }},
 };

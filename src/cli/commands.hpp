@@ -11,6 +11,8 @@ void add_check(CLI::App& app, int& exit_code);
 void add_design(CLI::App& app, int& exit_code);
 void add_diagnose(CLI::App& app, int& exit_code);
 void add_effects(CLI::App& app, int& exit_code);
+void add_experiment(CLI::App& app, int& exit_code);
+void add_identify(CLI::App& app, int& exit_code);
 void add_paper(CLI::App& app, int& exit_code);
 void add_margin(CLI::App& app, int& exit_code);
 void add_replay(CLI::App& app, int& exit_code);

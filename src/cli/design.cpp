@@ -66,9 +66,11 @@ void print(const GainDesign& design, const std::optional<SampledDesign>& sampled
   for (const auto& pole : design.closed_loop_poles)
     std::printf("  %14.6f %+14.6fi\n", pole.real(), pole.imag());
   std::printf("Riccati residual %.1e (relative)\n", design.residual);
-  if (sampled && sampled->delay_periods > 0)
-    std::printf("delay line of %d periods as states: residual %.1e, its gains and these agree to %.1e\n",
-                sampled->delay_periods, sampled->delay_line_residual, sampled->delay_line_difference);
+  if (sampled)
+    std::printf(
+        "delay line of %d periods and velocity filter as states: residual %.1e, its gains and these "
+        "agree to %.1e\n",
+        sampled->delay_periods, sampled->delay_line_residual, sampled->delay_line_difference);
   for (const EliminatedState& state : design.eliminated)
     std::printf("eliminated: %s\n", state.explanation.c_str());
   for (const std::string& note : design.notes) std::printf("note: %s\n", note.c_str());
@@ -105,7 +107,11 @@ void design(const DesignOptions& options) {
   std::optional<SampledDesign> sampled;
   GainDesign gains;
   if (options.delay_s) {
-    sampled = design_sampled_gains(plant, weights, options.smoothing, options.rate_hz, *options.delay_s);
+    EstimatorConfig estimator;
+    estimator.cutoff_hz = options.cutoff_hz;
+    estimator.damping = options.damping;
+    sampled =
+        design_sampled_gains(plant, weights, options.smoothing, options.rate_hz, *options.delay_s, estimator);
     gains = sampled->design;
   } else {
     gains = design_gains(plant, weights, options.smoothing);

@@ -15,6 +15,7 @@
 #include "options.hpp"
 #include "upright/analysis/diagnosis.hpp"
 #include "upright/analysis/diagnosis_json.hpp"
+#include "upright/analysis/trace.hpp"
 #include "upright/model/error.hpp"
 #include "upright/model/plant_file.hpp"
 
@@ -29,6 +30,7 @@ struct DiagnoseFlags {
   std::vector<std::string> data;
   std::string out;
   bool as_json = false;
+  bool trials = false;
 };
 
 std::string kind_of(std::size_t effect) {
@@ -81,10 +83,22 @@ void print(const Diagnosis& d, const std::string& out) {
   }
   std::printf("Remaining: %s.\n", d.residual.c_str());
   if (d.next_experiment)
-    std::printf("Next run, to tell them apart: %s (%s).\n", d.next_experiment->name.c_str(),
-                d.next_experiment->description.c_str());
+    std::printf("Next run, to tell them apart: upright experiment %s --rig RIG\n  %s\n",
+                d.next_experiment->file.c_str(), d.next_experiment->description.c_str());
   for (const std::string& note : d.notes) std::printf("Note: %s.\n", note.c_str());
   if (!out.empty()) std::printf("Written: %s\n", out.c_str());
+}
+
+/// Why each effect was taken or not.
+void print_trials(const Diagnosis& d) {
+  for (const Trial& trial : d.trials) {
+    std::printf("%s round %zu  %-28s evidence %.1f, held out %.1f, t %.1f, %.1f standard errors;",
+                trial.taken ? "+" : " ", trial.round + 1, kind_of(trial.effect).c_str(), trial.evidence,
+                trial.held, trial.t_value, trial.certainty);
+    for (const ParameterEstimate& p : trial.parameters) std::printf(" %s %.5g", p.name.c_str(), p.value);
+    std::printf("; noise %.3g N, %.3g N m, %.2g s, x%.3g\n", trial.noise.force, trial.noise.torque,
+                trial.noise.jitter_s, trial.noise.sensors);
+  }
 }
 
 std::vector<std::string> provenance(const Diagnosis& d, const DiagnoseFlags& flags) {
@@ -126,14 +140,53 @@ void write_residuals(const Diagnosis& d, const fs::path& file) {
     throw ConfigError("free some space or choose another folder with --out: cannot write " + file.string());
 }
 
-void write_results(const Diagnosis& d, const DiagnoseFlags& flags) {
+/// Measured and simulated on held-out segments, with the plant file as given and with the model that was
+/// found. A cell is empty where there is nothing measured.
+void write_traces(const Diagnosis& d, const Plant& given, const std::vector<Measurement>& runs,
+                  const fs::path& file) {
+  constexpr std::size_t most_rows = 20000;
+  const std::vector<Segment> segments = held_out_segments(d, runs);
+  const std::vector<SimulatedTrace> before = simulate_segments(given, runs, segments);
+  const std::vector<SimulatedTrace> after = simulate_segments(d.model, runs, segments);
+  std::size_t count = 0;
+  for (const SimulatedTrace& trace : before) count += trace.time_s.size();
+  const std::size_t stride = 1 + count / most_rows;
+  std::ofstream out(file);
+  out << "segment,run,time_s,voltage_v,cart_m,cart_before_m,cart_after_m,theta_rad,theta_before_rad,theta_"
+         "after_rad\n";
+  const auto cell = [&](const std::vector<double>& values, std::size_t k) {
+    out << ',';
+    if (k < values.size()) out << exact_text(values[k]);
+  };
+  for (std::size_t s = 0; s < before.size(); ++s) {
+    for (std::size_t k = 0; k < before[s].time_s.size(); k += stride) {
+      std::string name = runs[before[s].run].name;
+      std::replace(name.begin(), name.end(), ',', '_');
+      out << s << ',' << name;
+      for (const auto* values :
+           {&before[s].time_s, &before[s].voltage_v, &before[s].cart_m, &before[s].simulated_cart_m,
+            &after[s].simulated_cart_m, &before[s].theta_rad, &before[s].simulated_theta_rad,
+            &after[s].simulated_theta_rad})
+        cell(*values, k);
+      out << '\n';
+    }
+  }
+  out.close();
+  if (!out)
+    throw ConfigError("free some space or choose another folder with --out: cannot write " + file.string());
+}
+
+void write_results(const Diagnosis& d, const Plant& given, const std::vector<Measurement>& runs,
+                   const DiagnoseFlags& flags) {
   std::error_code problem;
   fs::create_directories(flags.out, problem);
   if (problem)
     throw ConfigError("choose another folder with --out: cannot make " + flags.out + " (" +
                       problem.message() + ")");
   write_plant_file(d.model, fs::path(flags.out) / "model.yaml", provenance(d, flags));
+  write_plant_file(given, fs::path(flags.out) / "given.yaml", {"The plant file as given: " + flags.model});
   write_residuals(d, fs::path(flags.out) / "residuals.csv");
+  write_traces(d, given, runs, fs::path(flags.out) / "traces.csv");
   const fs::path file = fs::path(flags.out) / "diagnosis.json";
   std::ofstream json(file);
   json << diagnosis_json(d).dump(2) << "\n";
@@ -153,10 +206,11 @@ void run_diagnose(const DiagnoseFlags& flags) {
   if (watched) options.progress = show_progress;
   const Diagnosis diagnosis = diagnose(plant, runs, options);
   if (watched) std::fprintf(stderr, "\r%80s\r", "");
-  if (!flags.out.empty()) write_results(diagnosis, flags);
+  if (!flags.out.empty()) write_results(diagnosis, plant, runs, flags);
   if (flags.as_json) {
     std::cout << diagnosis_json(diagnosis).dump(2) << "\n";
   } else {
+    if (flags.trials) print_trials(diagnosis);
     print(diagnosis, flags.out);
     std::fflush(stdout);
   }
@@ -174,6 +228,7 @@ void add_diagnose(CLI::App& app, int&) {
   command->add_option("--model", flags->model, "Plant file: what is believed of the rig")->required();
   command->add_option("--data", flags->data, "Runs: run directories, CSV or dataset files")->required();
   command->add_option("--out", flags->out, "Folder for diagnosis.json and model.yaml");
+  command->add_flag("--trials", flags->trials, "Show every fit of the search, and which were taken");
   command->add_flag("--json", flags->as_json, "One JSON document on stdout");
   command->callback([flags] { run_diagnose(*flags); });
 }

@@ -94,11 +94,13 @@ int run(int argc, char** argv) {
   upright::cli::add_paper(app, exit_code);
   upright::cli::add_sweep(app, exit_code);
   upright::cli::add_run(app, exit_code);
+  upright::cli::add_experiment(app, exit_code);
   upright::cli::add_replay(app, exit_code);
   upright::cli::add_report(app, exit_code);
   upright::cli::add_design(app, exit_code);
   upright::cli::add_margin(app, exit_code);
   upright::cli::add_diagnose(app, exit_code);
+  upright::cli::add_identify(app, exit_code);
   upright::cli::add_virtual_rig(app, exit_code);
   try {
     app.parse(argc, argv);

@@ -10,6 +10,7 @@
 #include "upright/control/predictor.hpp"
 #include "upright/model/error.hpp"
 #include "upright/model/yaml_reader.hpp"
+#include "upright/runtime/experiment.hpp"
 
 namespace upright::cli {
 
@@ -51,7 +52,8 @@ void print(const RunRecord& run, const ReplayResult& result) {
 
 ExitCode replay_run(const std::string& directory, bool as_json) {
   const RunRecord run = read_run(directory);
-  const ReplayResult result = replay(run, make_compensator(run.control));
+  const std::unique_ptr<CommandSource> script = script_of(run);
+  const ReplayResult result = replay(run, make_compensator(run.control), script.get());
   if (as_json)
     std::cout << json_of(run, result).dump(2, ' ', false, Json::error_handler_t::replace) << "\n";
   else

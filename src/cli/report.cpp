@@ -6,6 +6,7 @@
 #include "commands.hpp"
 #include "upright/model/error.hpp"
 #include "upright/report/diagnosis_report.hpp"
+#include "upright/report/experiment_report.hpp"
 #include "upright/report/run_report.hpp"
 #include "upright/report/sweep_report.hpp"
 
@@ -20,6 +21,7 @@ std::filesystem::path write_report(const std::filesystem::path& path) {
   const std::filesystem::path directory = is_part ? path.parent_path() / "" : path;
   if (std::filesystem::exists(directory / "run.yaml", ignored)) return write_run_report(directory);
   if (is_diagnosis_folder(path)) return write_diagnosis_report(path);
+  if (is_experiment_folder(path)) return write_experiment_report(path);
   if (is_sweep_folder(path)) return write_sweep_report(path);
   if (!std::filesystem::exists(path, ignored))
     throw ConfigError("check the path: there is no " + path.string());

@@ -1,13 +1,10 @@
 // `upright run`: closes the loop on a rig and leaves a run directory.
-#include <signal.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <fstream>
 #include <iostream>
-#include <iterator>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <numbers>
@@ -15,6 +12,7 @@
 
 #include "commands.hpp"
 #include "options.hpp"
+#include "signals.hpp"
 #include "upright/analysis/delay_margin.hpp"
 #include "upright/control/predictor.hpp"
 #include "upright/hal/rig_factory.hpp"
@@ -22,6 +20,7 @@
 #include "upright/model/error.hpp"
 #include "upright/model/plant_file.hpp"
 #include "upright/runtime/session.hpp"
+#include "upright/runtime/wait_upright.hpp"
 
 namespace upright::cli {
 
@@ -32,46 +31,17 @@ constexpr double degrees_per_rad = 180.0 / std::numbers::pi;
 struct Arguments {
   std::string rig, gains, plant, out = "runs", label = "run";
   std::optional<double> delay_s, theta0_deg;
-  double duration_s = 10.0;
+  double duration_s = 10.0, wait_s = WaitOptions{}.patience_s;
   std::optional<std::uint64_t> seed;
   int priority = RealtimeRequest{}.priority, cpu = RealtimeRequest{}.cpu;
   bool fast = false, as_json = false;
 };
-
-SignalFlag caught_signal{0};
-static_assert(SignalFlag::is_always_lock_free);
-
-void note_signal(int number) {
-  caught_signal.store(number, std::memory_order_relaxed);
-}
-
-void catch_signals() {
-  struct sigaction action {};
-  action.sa_handler = note_signal;
-  for (const int number : {SIGINT, SIGTERM, SIGHUP}) sigaction(number, &action, nullptr);
-  // A file size limit shall be a failed write, which stops the motor, not the end of the process.
-  action.sa_handler = SIG_IGN;
-  sigaction(SIGXFSZ, &action, nullptr);
-}
-
-bool is_simulated(const RigFile& rig) {
-  return rig.encoders == Backend::simulated && rig.output == Backend::simulated;
-}
 
 void refuse_what_only_simulation_can(const Arguments& arguments) {
   const std::string why = ": " + arguments.rig + " is not a simulated rig";
   if (arguments.fast) throw ConfigError("remove --fast, or name a simulated rig" + why);
   if (arguments.theta0_deg) throw ConfigError("remove --theta0-deg, or name a simulated rig" + why);
   if (arguments.seed) throw ConfigError("remove --seed, or name a simulated rig" + why);
-}
-
-/// The command as it was typed.
-std::string command_line() {
-  std::ifstream in("/proc/self/cmdline", std::ios::binary);
-  std::string text((std::istreambuf_iterator<char>(in)), std::istreambuf_iterator<char>());
-  while (!text.empty() && text.back() == '\0') text.pop_back();
-  std::replace(text.begin(), text.end(), '\0', ' ');
-  return text;
 }
 
 RunSetup make_setup(const Arguments& arguments) {
@@ -131,6 +101,15 @@ std::string tolerance_line(const std::optional<OverrunTolerance>& tolerance, con
          " periods in a row are late.";
 }
 
+std::string delay_line(const ControlConfig& control) {
+  const DelayLine delay(control.delay_s, control.period_s());
+  if (control.delay_s == 0.0) return "Delay: none";
+  const std::string amount = "Delay: " + exact_text(control.delay_s * 1e3) + " ms, ";
+  if (delay.exact()) return amount + std::to_string(delay.whole_periods()) + " periods, exact to the sample";
+  return amount + exact_text(static_cast<double>(delay.whole_periods()) + delay.fraction()) +
+         " periods: linear between two samples, for it is no whole number of them";
+}
+
 std::unique_ptr<Rig> make(const RunSetup& setup, Clock& clock) {
   if (is_simulated(setup.rig)) return make_simulated_rig(setup.rig, clock, {setup.seed, setup.theta0_rad});
   return make_rig(setup.rig, {setup.control.period_s()});
@@ -139,6 +118,29 @@ std::unique_ptr<Rig> make(const RunSetup& setup, Clock& clock) {
 void show_live(const LiveStatus& live) {
   std::fprintf(stderr, "\r%8.1f s  angle %+7.2f deg  %+6.2f V  worst lateness %7.0f us ", live.time_s.load(),
                live.theta_rad.load() * degrees_per_rad, live.voltage_v.load(), live.worst_late_us.load());
+}
+
+void show_wait(const WaitStatus& wait, bool on_terminal, bool first) {
+  constexpr const char* request =
+      "lift the pendulum upright, hold it still and keep the cart off the ends: waiting at zero volts";
+  if (on_terminal)
+    std::fprintf(stderr, "\r%s, %3.0f s left (angle %+7.2f deg, x %+.3f m; counts %lld, %lld) ", request,
+                 wait.left_s, wait.pose.theta_rad * degrees_per_rad, wait.pose.cart_m,
+                 static_cast<long long>(wait.cart_counts), static_cast<long long>(wait.pendulum_counts));
+  else if (first)
+    std::fprintf(stderr, "upright: %s for %.0f s\n", request, wait.left_s);
+}
+
+/// On a real rig the operator lifts the pendulum first.
+void wait_for_operator(const Arguments& arguments, Rig& rig, Clock& clock, const RigFile& file,
+                       const SignalFlag& caught_signal, bool on_terminal) {
+  if (is_simulated(file) || arguments.wait_s <= 0.0) return;
+  bool asked = false;
+  wait_upright(rig, clock, file, caught_signal, {arguments.wait_s, [&](const WaitStatus& wait) {
+                                                   show_wait(wait, on_terminal, !asked);
+                                                   asked = true;
+                                                 }});
+  if (asked && on_terminal) std::fputs("\n", stderr);
 }
 
 using Json = nlohmann::ordered_json;
@@ -237,8 +239,9 @@ ExitCode run(const Arguments& arguments) {
   RunSetup setup = make_setup(arguments);
   const std::optional<OverrunTolerance> tolerance = tolerance_of(arguments, setup);
   if (tolerance) setup.limits.most_periods_late = periods_late(*tolerance, setup.control.period_s());
-  if (!arguments.as_json) std::cout << tolerance_line(tolerance, setup.limits) << std::endl;
-  catch_signals();
+  if (!arguments.as_json)
+    std::cout << delay_line(setup.control) << ".\n" << tolerance_line(tolerance, setup.limits) << std::endl;
+  const SignalFlag& caught_signal = catch_signals();
   MonotonicClock real_clock;
   VirtualClock virtual_clock;
   Clock& clock = arguments.fast ? static_cast<Clock&>(virtual_clock) : real_clock;
@@ -246,12 +249,13 @@ ExitCode run(const Arguments& arguments) {
   rig->open();
   constexpr double patience_s = 2.0;
   find_zero(*rig, clock, setup.rig, patience_s);
+  const bool on_terminal = ::isatty(STDERR_FILENO) != 0;
+  wait_for_operator(arguments, *rig, clock, setup.rig, caught_signal, on_terminal);
 
   SessionOptions options;
   options.out = arguments.out;
   options.realtime = {arguments.priority, arguments.cpu};
   options.compensator = make_compensator(setup.control);
-  const bool on_terminal = ::isatty(STDERR_FILENO) != 0;
   if (on_terminal && !arguments.fast) options.show = show_live;
   const LoopLimits limits = setup.limits;
   const SessionResult result = run_session(std::move(setup), *rig, clock, caught_signal, std::move(options));
@@ -288,6 +292,10 @@ void add_run(CLI::App& app, int& exit_code) {
   constexpr double longest_run_s = 1e6;
   command->add_option("--duration", a->duration_s, "How long to run [s] (10)")
       ->check(number_in({0.0, longest_run_s, true}));
+  command
+      ->add_option("--wait", a->wait_s,
+                   "How long to wait at zero volts for the pendulum to be lifted upright [s], real rigs (30)")
+      ->check(number_in(Range::within(0.0, 86400.0)));
   command->add_option("--theta0-deg", a->theta0_deg, "Initial angle [degree], simulated rigs only")
       ->check(number_in(Range::within(-180.0, 180.0)));
   command->add_option("--seed", a->seed, "Of noise and jitter, simulated rigs only (1)");

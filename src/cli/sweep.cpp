@@ -4,6 +4,7 @@
 #include <array>
 #include <atomic>
 #include <chrono>
+#include <cmath>
 #include <csignal>
 #include <cstdio>
 #include <iostream>
@@ -57,20 +58,41 @@ class ProgressBar {
     if (!shown_) return;
     const auto now = std::chrono::steady_clock::now();
     if (drawn_ && done < known && now - drawn_at_ < std::chrono::milliseconds(100)) return;
-    const double spent_s = std::chrono::duration<double>(now - begin_).count();
     const double part = static_cast<double>(done) / static_cast<double>(known);
-    const double left_s = spent_s * static_cast<double>(known - done) / static_cast<double>(done);
     constexpr int width = 30;
     const std::string bar(static_cast<std::size_t>(width * part), '#');
-    std::fprintf(stderr, "\r[%-*s] %zu of %zu runs, %.0f s left   ", width, bar.c_str(), done, known, left_s);
+    std::fprintf(stderr, "\r[%-*s] %zu of %zu runs, %s left   ", width, bar.c_str(), done, known,
+                 time_left(done, known, now).c_str());
     std::fflush(stderr);
     drawn_ = true;
     drawn_at_ = now;
   }
 
  private:
+  using Time = std::chrono::steady_clock::time_point;
+
+  /// By the pace since the first report: what an earlier call had done took no time in this one.
+  std::string time_left(std::size_t done, std::size_t known, Time now) {
+    if (done_at_first_ == 0) {
+      done_at_first_ = done;
+      first_at_ = now;
+    }
+    if (done == known) return "0 s";
+    if (done == done_at_first_) return "? s";
+    const double pace_s =
+        std::chrono::duration<double>(now - first_at_).count() / static_cast<double>(done - done_at_first_);
+    const double left_s = std::ceil(pace_s * static_cast<double>(known - done));
+    std::array<char, 32> text;
+    if (left_s < 120.0)
+      std::snprintf(text.data(), text.size(), "%.0f s", left_s);
+    else
+      std::snprintf(text.data(), text.size(), "%.0f min", std::ceil(left_s / 60.0));
+    return text.data();
+  }
+
   bool shown_, drawn_ = false;
-  std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now(), drawn_at_{};
+  std::size_t done_at_first_ = 0;
+  Time first_at_{}, drawn_at_{};
 };
 
 struct SweepArguments {

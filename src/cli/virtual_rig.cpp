@@ -17,7 +17,7 @@ namespace {
 
 struct Flags {
   std::string rig, tcp, rtu, plant, trace;
-  double theta0_deg = 0.0, duration_s = 0.0, late_ms = 0.0;
+  double theta0_deg = 0.0, hang_s = 0.0, duration_s = 0.0, late_ms = 0.0;
   bool theta0_given = false;
   bool no_pace = false;
   InjectedFaults faults;
@@ -63,6 +63,7 @@ void serve(const Flags& flags) {
     options.cart0_m = rig.simulated->initial.cart_m;
   }
   if (flags.theta0_given) options.theta0_rad = flags.theta0_deg * std::numbers::pi / 180.0;
+  options.hang_s = flags.hang_s;
   options.trace = flags.trace;
   options.duration_s = flags.duration_s;
   options.faults = flags.faults;
@@ -89,6 +90,10 @@ void add_virtual_rig(CLI::App& app, int& exit_code) {
                       "Serial line; where nothing exists, a pseudo-terminal gets this name");
   CLI::Option* theta0 = command->add_option("--theta0-deg", flags->theta0_deg, "Initial angle, 0 upright")
                             ->check(CLI::Range(-360.0, 360.0));
+  command
+      ->add_option("--hang", flags->hang_s,
+                   "The pendulum hangs for so many seconds from the first request on, then it is lifted")
+      ->check(CLI::Range(0.0, 1e6));
   command->add_option("--plant", flags->plant, "Plant file, in place of the rig file's");
   command->add_option("--trace", flags->trace, "CSV of the plant's side: time, voltage, position, angle");
   command->add_option("--duration", flags->duration_s, "Seconds to serve; 0 until interrupted")

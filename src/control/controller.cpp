@@ -41,6 +41,14 @@ void Controller::advance(double cart_m, double theta_rad) noexcept {
   if (compensator_) acting_ = compensator_->compensate(acting_, voltage_v_);
 }
 
+double Controller::feedback(const Demand& demand) const noexcept {
+  const Gains& k = config_.gains;
+  return k.cart_position_v_per_m * (acting_.cart_m - demand.reference_m) +
+         k.pendulum_angle_v_per_rad * (acting_.theta_rad - demand.reference_rad) +
+         k.cart_velocity_v_per_mps * acting_.cart_velocity_mps +
+         k.pendulum_rate_v_per_radps * acting_.pendulum_rate_radps;
+}
+
 ControlOutput Controller::step(const ControlInput& input) noexcept {
   const std::uint64_t periods = input.tick - tick_;
   if (!started_ || periods == 0 || periods > most_missing_periods) {
@@ -55,13 +63,14 @@ ControlOutput Controller::step(const ControlInput& input) noexcept {
     advance(input.cart_m, input.theta_rad);
   }
   tick_ = input.tick;
-  const Gains& k = config_.gains;
   ControlOutput output;
   output.state = state_;
-  output.voltage_requested_v = k.cart_position_v_per_m * (acting_.cart_m - input.reference_m) +
-                               k.pendulum_angle_v_per_rad * acting_.theta_rad +
-                               k.cart_velocity_v_per_mps * acting_.cart_velocity_mps +
-                               k.pendulum_rate_v_per_radps * acting_.pendulum_rate_radps;
+  if (source_ != nullptr)
+    output.demand = source_->next(input.tick, state_);
+  else
+    output.demand.reference_m = input.reference_m;
+  output.lean_rad = state_.theta_rad - output.demand.reference_rad;
+  output.voltage_requested_v = output.demand.feedback ? feedback(output.demand) : output.demand.voltage_v;
   const LimitedVoltage limited = limit_voltage(output.voltage_requested_v, limit_v_);
   output.voltage_v = limited.voltage_v;
   output.saturated = limited.saturated;

@@ -179,8 +179,22 @@ struct YamlMap::Node {
 
   YAML::Node require(const std::string& key, const std::string& what) {
     YAML::Node node = find(key);
-    if (!node.IsDefined()) fail(yaml, key, "is missing", "add " + key + " (" + what + ")");
-    return node;
+    if (node.IsDefined()) return node;
+    if (const YAML::Node slip = slip_for(key); slip.IsDefined())
+      fail(slip, shown(slip.Scalar()), "is not a known key, and " + key + " is missing",
+           "did you mean " + key + "? otherwise add " + key + " (" + what + ")");
+    fail(yaml, key, "is missing", "add " + key + " (" + what + ")");
+  }
+
+  /// A key that nobody asked for and that is nearly `key`: what was meant by it.
+  YAML::Node slip_for(const std::string& key) const {
+    constexpr std::size_t shortest = 6;  // below it other keys are as near as slips
+    const std::size_t most = key.size() < shortest ? 1 : std::max<std::size_t>(2, key.size() / 4);
+    for (const auto& entry : yaml)
+      if (entry.first.IsScalar() && asked.count(entry.first.Scalar()) == 0 &&
+          edit_distance(entry.first.Scalar(), key) <= most)
+        return entry.first;
+    return YAML::Node(YAML::NodeType::Undefined);
   }
 
   double number(const YAML::Node& node, const std::string& key, const Range& range,
@@ -233,7 +247,7 @@ YamlMap YamlMap::from_text(const std::string& text, const std::filesystem::path&
     node->yaml.reset(YAML::Load(text));
   } catch (const YAML::Exception& problem) {
     throw ConfigError("correct the YAML: " + file.string() + ":" +
-                      std::to_string(std::max(problem.mark.line, 0) + 1) + ": " + problem.msg);
+                      std::to_string(std::max(problem.mark.line, 0) + 1) + ": " + shown(problem.msg));
   }
   if (!node->yaml.IsMap())
     throw ConfigError("write 'key: value' lines: " + file.string() + ":1: the top level is not a map");

@@ -1,5 +1,7 @@
 #include "upright/report/diagnosis_report.hpp"
 
+#include <algorithm>
+#include <cmath>
 #include <cstdlib>
 #include <fstream>
 #include <limits>
@@ -7,6 +9,7 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 #include <string>
+#include <tuple>
 #include <vector>
 
 #include "upright/model/error.hpp"
@@ -68,7 +71,9 @@ void add_gap(HtmlPage& page, const json& d) {
   }
   plot.series.push_back(bars);
   plot.horizontal_marks.push_back({1.0, "noise floor"});
-  page.figure(plot, "Root mean square of the held-out innovations in units of the estimated noise.");
+  page.figure(
+      plot,
+      "What a plain simulation of held-out data is off, over what the noise makes of it: 1 is the floor.");
   if (!table.rows.empty()) page.table(table);
 }
 
@@ -97,33 +102,175 @@ void add_effects(HtmlPage& page, const json& d) {
                   next.at("description").get<std::string>() + ").");
 }
 
-void add_residuals(HtmlPage& page, const std::filesystem::path& file) {
+/// Cells of a CSV without its header, every row `width` long; none where there is no file.
+std::vector<std::vector<std::string>> read_rows(const std::filesystem::path& file, std::size_t width) {
+  std::vector<std::vector<std::string>> rows;
   std::ifstream in(file);
   std::string line;
-  if (!std::getline(in, line)) return;
-  std::vector<std::vector<double>> columns(10);
+  std::getline(in, line);
   while (std::getline(in, line)) {
-    std::istringstream cells(line);
-    std::size_t i = 0;
-    for (std::string cell; i < columns.size() && std::getline(cells, cell, ','); ++i)
-      columns[i].push_back(std::strtod(cell.c_str(), nullptr));
-    if (i != columns.size())
+    std::vector<std::string> row;
+    std::size_t begin = 0;
+    for (std::size_t end; (end = line.find(',', begin)) != std::string::npos; begin = end + 1)
+      row.push_back(line.substr(begin, end - begin));
+    row.push_back(line.substr(begin));
+    if (row.size() != width)
       throw ConfigError("make the diagnosis anew: " + file.string() + " has a row that is cut off");
+    rows.push_back(std::move(row));
   }
+  return rows;
+}
+
+double number(const std::string& cell) {
+  return cell.empty() ? nan_value : std::strtod(cell.c_str(), nullptr);
+}
+
+/// What one quantity of a held-out run was, and what the two models make of it. Between segments, each of
+/// which starts from a state of its own, the lines are broken.
+struct Trace {
+  std::vector<double> time_s, measured, before, after;
+  double before_rms = 0.0, after_rms = 0.0;
+};
+
+Trace trace_of(const std::vector<std::vector<std::string>>& rows, const std::string& run,
+               std::size_t column) {
+  Trace trace;
+  std::string segment;
+  double count = 0.0;
+  for (const auto& row : rows) {
+    if (row[1] != run || row[column].empty()) continue;
+    const double measured = number(row[column]), before = number(row[column + 1]),
+                 after = number(row[column + 2]);
+    const bool breaks = !trace.time_s.empty() && row[0] != segment;
+    segment = row[0];
+    trace.time_s.push_back(number(row[2]));
+    trace.measured.push_back(measured);
+    trace.before.push_back(breaks ? nan_value : before);
+    trace.after.push_back(breaks ? nan_value : after);
+    trace.before_rms += (measured - before) * (measured - before);
+    trace.after_rms += (measured - after) * (measured - after);
+    count += 1.0;
+  }
+  trace.before_rms = std::sqrt(trace.before_rms / std::max(count, 1.0));
+  trace.after_rms = std::sqrt(trace.after_rms / std::max(count, 1.0));
+  return trace;
+}
+
+void add_traces(HtmlPage& page, const std::filesystem::path& file) {
+  const std::vector<std::vector<std::string>> rows = read_rows(file, 10);
+  std::vector<std::string> runs;
+  for (const auto& row : rows)
+    if (std::find(runs.begin(), runs.end(), row[1]) == runs.end()) runs.push_back(row[1]);
+  if (runs.empty()) return;
+  page.section("Measured and simulated, on held-out data");
+  HtmlTable table{
+      {"run", "quantity", "off before", "off after", "unit"},
+      {},
+      "Root mean square of measured minus simulated: plain simulation with the recorded voltages, segment by "
+      "segment, each from the initial state that suits the model best."};
+  constexpr std::size_t most_shown = 3;
+  for (std::size_t r = 0; r < runs.size(); ++r) {
+    std::vector<Plot> plots;
+    for (const auto& [column, label, unit] :
+         {std::tuple<std::size_t, std::string, std::string>{4, "cart position", "m"},
+          {7, "pendulum angle", "rad"}}) {
+      const Trace trace = trace_of(rows, runs[r], column);
+      if (trace.time_s.empty()) continue;
+      table.rows.push_back(
+          {runs[r], label, number_text(trace.before_rms), number_text(trace.after_rms), unit});
+      Plot plot, errors;
+      plot.title = runs[r];
+      plot.x.label = errors.x.label = "time [s]";
+      plot.y.label = label + " [" + unit + "]";
+      plot.series.push_back({"before", trace.time_s, trace.before, Series::Style::line, 1, false});
+      plot.series.push_back({"measured", trace.time_s, trace.measured, Series::Style::line, 3, false});
+      plot.series.push_back({"after", trace.time_s, trace.after, Series::Style::line, 0, true});
+      errors.y.label = "measured minus simulated [" + unit + "]";
+      std::vector<double> before = trace.before, after = trace.after;
+      for (std::size_t k = 0; k < before.size(); ++k) {
+        before[k] = trace.measured[k] - before[k];
+        after[k] = trace.measured[k] - after[k];
+      }
+      errors.series.push_back({"before", trace.time_s, before, Series::Style::line, 1, false});
+      errors.series.push_back({"after", trace.time_s, after, Series::Style::line, 0, false});
+      plot.width_px = errors.width_px = 440;
+      plots.push_back(plot);
+      plots.push_back(errors);
+    }
+    if (r < most_shown)
+      page.figures(plots, "Held-out run " + runs[r] + ": before and after the effects were added.");
+  }
+  page.table(table);
+}
+
+/// What the model has that the plant file had not, line by line: the longest common lines stay, the others go
+/// or come.
+std::string difference(const std::string& from, const std::string& to) {
+  const auto lines_of = [](const std::string& text) {
+    std::vector<std::string> lines;
+    std::istringstream in(text);
+    for (std::string line; std::getline(in, line);)
+      if (line.empty() || line[0] != '#') lines.push_back(line);
+    return lines;
+  };
+  const std::vector<std::string> a = lines_of(from), b = lines_of(to);
+  std::vector<std::vector<std::size_t>> common(a.size() + 1, std::vector<std::size_t>(b.size() + 1, 0));
+  for (std::size_t i = a.size(); i-- > 0;)
+    for (std::size_t j = b.size(); j-- > 0;)
+      common[i][j] = a[i] == b[j] ? common[i + 1][j + 1] + 1 : std::max(common[i + 1][j], common[i][j + 1]);
+  std::string text;
+  for (std::size_t i = 0, j = 0; i < a.size() || j < b.size();) {
+    if (i < a.size() && j < b.size() && a[i] == b[j]) {
+      text += "  " + a[i++] + "\n";
+      ++j;
+    } else if (i < a.size() && (j == b.size() || common[i + 1][j] >= common[i][j + 1])) {
+      text += "- " + a[i++] + "\n";
+    } else {
+      text += "+ " + b[j++] + "\n";
+    }
+  }
+  return text;
+}
+
+void add_model(HtmlPage& page, const std::filesystem::path& folder) {
+  page.section("The model");
+  const std::string given = file_text(folder / "given.yaml"), model = file_text(folder / "model.yaml");
+  if (!given.empty()) page.preformatted(difference(given, model));
+  page.folded("model.yaml", model);
+}
+
+void add_residuals(HtmlPage& page, const std::filesystem::path& file) {
+  std::vector<std::vector<double>> columns(10);
+  for (const auto& row : read_rows(file, columns.size()))
+    for (std::size_t i = 0; i < columns.size(); ++i) columns[i].push_back(number(row[i]));
   if (columns[0].empty()) return;
-  page.section("The residual force on held-out data");
-  const auto against = [&](std::size_t column, const std::string& label) {
+  const auto against = [&](std::size_t column, const std::string& label, std::size_t value,
+                           const std::string& name) {
     Plot plot;
     plot.x.label = label;
-    plot.y.label = "residual force [N]";
-    plot.series.push_back({"before", columns[column], columns[6], Series::Style::points, 1, false});
-    plot.series.push_back({"after", columns[column], columns[7], Series::Style::points, 0, false});
+    plot.y.label = name;
+    plot.series.push_back({"before", columns[column], columns[value], Series::Style::points, 1, false});
+    plot.series.push_back({"after", columns[column], columns[value + 1], Series::Style::points, 0, false});
     plot.width_px = 440;
     return plot;
   };
-  page.figures({against(4, "cart velocity [m/s]"), against(3, "cart position [m]")},
-               "The force on the cart that the model would need beside its own, by a Kalman smoother.");
-  page.figures({against(5, "voltage [V]"), against(2, "time [s]")}, "The same against voltage and time.");
+  const auto is_there = [&](std::size_t value) {
+    return std::any_of(columns[value].begin(), columns[value].end(), [](double v) { return v != 0.0; });
+  };
+  if (is_there(6)) {
+    const std::string force = "residual force [N]";
+    page.section("The residual force on held-out data");
+    page.figures({against(4, "cart velocity [m/s]", 6, force), against(3, "cart position [m]", 6, force)},
+                 "The force on the cart that the model would need beside its own, by a Kalman smoother.");
+    page.figures({against(5, "voltage [V]", 6, force), against(2, "time [s]", 6, force)},
+                 "The same against voltage and time.");
+  }
+  if (is_there(8)) {
+    const std::string torque = "residual torque [N m]";
+    page.section("The residual torque on held-out data");
+    page.figures({against(4, "cart velocity [m/s]", 8, torque), against(2, "time [s]", 8, torque)},
+                 "The torque on the pendulum that the model would need beside its own.");
+  }
 }
 
 void add_candidates(HtmlPage& page, const json& d) {
@@ -151,10 +298,10 @@ std::filesystem::path write_diagnosis_report(const std::filesystem::path& folder
     add_answer(page, d);
     add_gap(page, d);
     add_effects(page, d);
+    add_traces(page, folder / "traces.csv");
     add_residuals(page, folder / "residuals.csv");
     add_candidates(page, d);
-    page.section("The model");
-    page.folded("model.yaml", file_text(folder / "model.yaml"));
+    add_model(page, folder);
     for (const json& note : d.at("notes")) page.note(Tone::neutral, note.get<std::string>() + ".");
     page.write(file);
   } catch (const json::exception& problem) {

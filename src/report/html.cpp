@@ -168,6 +168,10 @@ void HtmlPage::figures(const std::vector<Plot>& plots, const std::string& captio
   body_ += "</figure>\n";
 }
 
+void HtmlPage::preformatted(const std::string& text) {
+  body_ += "<pre>" + html_escaped(text) + "</pre>\n";
+}
+
 void HtmlPage::folded(const std::string& heading, const std::string& text) {
   body_ += "<details><summary>" + html_escaped(heading) + "</summary><pre>" + html_escaped(text) +
            "</pre></details>\n";

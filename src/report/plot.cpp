@@ -102,7 +102,9 @@ void add_series(const Plot& plot, Curves& curves) {
   for (const Series& series : plot.series) {
     require(series.x.size() == series.y.size(), "series has unequal lengths");
     const int chosen = series.color >= 0 ? series.color : next_color++;
-    const std::string color = palette[static_cast<std::size_t>(chosen) % palette.size()];
+    // On a map's colours only black is seen everywhere.
+    const std::string color =
+        plot.heat_map ? "#000000" : palette[static_cast<std::size_t>(chosen) % palette.size()];
     const std::string line = " lc rgb '" + color + "' lw 1.4" + (series.dashed ? " dt 2" : "");
     std::string how;
     switch (series.style) {
@@ -184,8 +186,11 @@ void add_heat_map(const Plot& plot, Curves& curves, std::string& settings) {
   curves.add(cells_data(map, plot), "using 1:2:3:4:5:6:7 with boxxyerror fs solid noborder fc palette", "");
   const std::vector<double> x_edges = edges_of(map.x, plot.x);
   const std::vector<double> y_edges = edges_of(map.y, plot.y);
-  settings += "set xrange [" + exact_text(x_edges.front()) + ":" + exact_text(x_edges.back()) + "]\n";
-  settings += "set yrange [" + exact_text(y_edges.front()) + ":" + exact_text(y_edges.back()) + "]\n";
+  const auto range = [](const std::vector<double>& edges, const Axis& axis) {
+    return "range [" + exact_text(axis.low.value_or(edges.front())) + ":" +
+           exact_text(axis.high.value_or(edges.back())) + "]\n";
+  };
+  settings += "set x" + range(x_edges, plot.x) + "set y" + range(y_edges, plot.y);
 }
 
 /// The finite range of what is drawn along one axis.
@@ -258,13 +263,15 @@ std::string bar_width(const Plot& plot) {
 
 std::string marks(const Plot& plot) {
   std::string text;
-  const std::string style = " nohead lc rgb '#888888' lw 1 dt 3 front\n";
+  const std::string style = plot.heat_map ? " nohead lc rgb '#ffffff' lw 2 dt 3 front\n"
+                                          : " nohead lc rgb '#888888' lw 1 dt 3 front\n";
   for (const Mark& mark : plot.vertical_marks) {
     if (!drawable(mark.at, plot.x)) continue;
     const std::string at = exact_text(mark.at);
     text += "set arrow from first " + at + ", graph 0 to first " + at + ", graph 1" + style;
     text += "set label " + quoted(mark.label) + " at first " + at +
-            ", graph 0.95 offset 0.5,0 textcolor rgb '#555555' front\n";
+            (plot.heat_map ? ", graph 1 center offset 0,0.7" : ", graph 0.95 offset 0.5,0") +
+            " textcolor rgb '#555555' front\n";
   }
   for (const Mark& mark : plot.horizontal_marks) {
     if (!drawable(mark.at, plot.y)) continue;
@@ -274,6 +281,13 @@ std::string marks(const Plot& plot) {
             " right offset 0,0.5 textcolor rgb '#555555' front\n";
   }
   return text;
+}
+
+/// Room for the key: two names stand beside each other, and two rows of them fit in the usual three.
+std::size_t rows_above(const Plot& plot) {
+  const auto named = static_cast<std::size_t>(
+      std::count_if(plot.series.begin(), plot.series.end(), [](const Series& s) { return !s.name.empty(); }));
+  return named > 4 ? 3 + (named - 3) / 2 : 3;
 }
 
 std::string script_for(const Plot& plot) {
@@ -287,7 +301,8 @@ std::string script_for(const Plot& plot) {
                          "set tics nomirror\n"
                          "set format '%g'\n"
                          "set key above right horizontal\n"
-                         "set tmargin 3\n";
+                         "set tmargin " +
+                         std::to_string(rows_above(plot)) + "\n";
   if (!plot.title.empty())
     settings += "set label " + quoted(plot.title) + " at graph 0, graph 1 left offset 0,0.9 font ',14'\n";
   settings += axes(plot) + bar_width(plot);
@@ -383,6 +398,10 @@ Series histogram(const std::vector<double>& values, std::size_t bins, const std:
 
 std::string svg_of(const Plot& plot, const std::string& id) {
   return as_element(gnuplot_output(script_for(plot)), id);
+}
+
+std::string svg_file_of(const Plot& plot) {
+  return "<svg xmlns=\"http://www.w3.org/2000/svg\"" + svg_of(plot, "p").substr(4) + "\n";
 }
 
 }  // namespace upright

@@ -88,7 +88,8 @@ Map read_map(const std::filesystem::path& folder) {
 
 /// The map over logarithmic axes where all values are positive; a delay of zero has no place on one and is
 /// left to the table and the file.
-Plot map_plot(const Map& map, const std::vector<Row>& transitions, bool log_delay) {
+Plot map_plot(const Map& map, const std::vector<Row>& transitions, const std::vector<Row>& margins,
+              bool log_delay) {
   Plot plot;
   plot.height_px = 460;
   plot.x.label = "delay [s]";
@@ -106,14 +107,36 @@ Plot map_plot(const Map& map, const std::vector<Row>& transitions, bool log_dela
     }
   heat.classes.assign(outcomes.begin(), outcomes.end());
   plot.heat_map = heat;
-  Series falls;
-  falls.name = "falls from (0.1 ms)";
-  for (const Row& row : transitions) {
-    falls.x.push_back(number(row[2]));
-    falls.y.push_back(number(row[0]) * per_degree);
+  for (const auto& [name, column] : {std::pair{"oscillates from (0.1 ms)", 1}, {"falls from (0.1 ms)", 2}}) {
+    Series line;
+    line.name = name;
+    line.dashed = column == 1;
+    for (const Row& row : transitions) {
+      line.x.push_back(number(row[static_cast<std::size_t>(column)]));
+      line.y.push_back(number(row[0]) * per_degree);
+    }
+    plot.series.push_back(line);
   }
-  plot.series = {falls};
+  for (const Row& row : margins) {
+    const double delay = number(row[1]);
+    if (!(delay > 0.0) || std::isinf(delay)) continue;
+    plot.vertical_marks.push_back({delay, "linear, " + row[0]});
+    // The axis reaches as far as the line, so that it is seen how far short of it the falls come.
+    if (delay > map.delays_s.back()) plot.x.high = std::max(plot.x.high.value_or(0.0), 1.1 * delay);
+  }
   return plot;
+}
+
+/// What the linear analysis says of the loop, in words.
+std::string margin_sentence(const Row& row) {
+  const double delay = number(row[1]);
+  const std::string which = row[0] == "near rest"
+                                ? "Linearised near rest, its dry friction smoothed, the loop "
+                                : "While the cart slides (no dry friction) the linear loop ";
+  if (delay <= 0.0) return which + "is unstable without any delay.";
+  if (std::isinf(delay)) return which + "is stable under any delay.";
+  return which + "loses stability at " + milliseconds(delay) + " ms, with " + number_text(number(row[2]), 4) +
+         " rad/s.";
 }
 
 }  // namespace
@@ -134,6 +157,11 @@ std::filesystem::path write_sweep_report(const std::filesystem::path& folder) {
       read_rows(folder / "transitions.csv", "theta0_rad,oscillates_from_s,falls_from_s", 3);
   if (map.outcome.empty()) throw ConfigError("make the sweep anew: " + folder.string() + " holds no runs");
 
+  // Folders of before margins were written have none.
+  std::vector<Row> margins;
+  if (std::filesystem::exists(folder / "margins.csv", ignored))
+    margins = read_rows(folder / "margins.csv", "model,critical_delay_s,crossing_radps", 3);
+
   HtmlPage page("Delay sweep", folder.string());
   double first_fall = std::numeric_limits<double>::infinity();
   for (const Row& row : transitions)
@@ -146,9 +174,11 @@ std::filesystem::path write_sweep_report(const std::filesystem::path& folder) {
   else
     page.answer(Tone::good, "No start falls within these delays", counts);
   page.section("Outcome over delay and initial angle");
-  page.figure(map_plot(map, transitions, false), "The map, delay linear.");
+  for (const Row& row : margins) page.paragraph(margin_sentence(row));
+  const std::string lines = margins.empty() ? "" : " White: the critical delay of the linear analysis.";
   if (map.delays_s.size() > 3)
-    page.figure(map_plot(map, transitions, true), "The same, both axes logarithmic where they can be.");
+    page.figure(map_plot(map, transitions, margins, true), "The map, both axes logarithmic." + lines);
+  page.figure(map_plot(map, transitions, margins, false), "The same, delay linear.");
   page.section("Where the outcome changes");
   HtmlTable table;
   table.header = {"initial angle [degree]", "oscillates from [ms]", "falls from [ms]"};

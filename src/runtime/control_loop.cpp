@@ -31,6 +31,8 @@ const char* name_of(StopReason reason) noexcept {
       return "emergency_stop";
     case StopReason::log_failed:
       return "log_failed";
+    case StopReason::not_ready:
+      return "not_ready";
   }
   return "unknown";
 }
@@ -134,12 +136,18 @@ std::string sentence_of(const LoopOutcome& o, const LoopLimits& limits) {
     case StopReason::emergency_stop:
       return "release the emergency stop when it is safe: it was pressed" + when;
     case StopReason::log_failed:
-      return "free space where the run directory goes: the log could not be written any more" + when;
+      return "free space, or use a faster disk, where the run directory goes: the log could not keep every "
+             "row" +
+             when;
+    case StopReason::not_ready:
+      return "bring the rig to where the experiment starts (at rest, or held upright as it says): it waited "
+             "in vain" +
+             when;
   }
   return "unknown reason";
 }
 
-ControlLoop::ControlLoop(Rig& rig, Clock& clock, Controller& controller, PoseScaler& scaler, RunLog& log,
+ControlLoop::ControlLoop(Rig& rig, Clock& clock, Controller& controller, PoseScaler& scaler, RowSink& log,
                          const LoopLimits& limits, const SignalFlag& signal, LiveStatus& live)
     : rig_(rig),
       clock_(clock),
@@ -202,14 +210,20 @@ void ControlLoop::compute(const Wake& wake, LoopOutcome& outcome) noexcept {
   }
   outcome.last_theta_rad = pose.theta_rad;
   outcome.last_cart_m = pose.cart_m;
-  outcome.worst_theta_rad = std::max(outcome.worst_theta_rad, std::abs(pose.theta_rad));
+  const bool balancing = output.demand.feedback;
+  if (balancing) outcome.worst_theta_rad = std::max(outcome.worst_theta_rad, std::abs(output.lean_rad));
   outcome.worst_cart_m = std::max(outcome.worst_cart_m, std::abs(pose.cart_m));
   if (!output.finite)
     stop(outcome, StopReason::not_finite, wake.tick);
-  else if (std::abs(pose.theta_rad) >= limits_.fall_angle_rad)
+  else if (balancing && std::abs(output.lean_rad) >= limits_.fall_angle_rad)
     stop(outcome, StopReason::fell, wake.tick);
   else if (std::abs(pose.cart_m) >= limits_.track_limit_m)
     stop(outcome, StopReason::track_limit, wake.tick);
+  else if (output.demand.gave_up)
+    stop(outcome, StopReason::not_ready, wake.tick);
+  over_ = output.demand.over;
+  if (scripted_ && balancing) row_.flags |= row_flag::feedback;
+  live_.balancing.store(balancing, std::memory_order_relaxed);
 }
 
 void ControlLoop::write(const Wake& wake, LoopOutcome& outcome) noexcept {
@@ -312,10 +326,12 @@ void ControlLoop::run(LoopOutcome& outcome) noexcept {
   constexpr std::int64_t lead_periods = 4;
   const auto period_ns = static_cast<std::int64_t>(std::llround(1e9 * controller_.config().period_s()));
   phase_ = {clock_.now_ns() + (clock_.is_virtual() ? 0 : lead_periods * period_ns), period_ns, 0};
+  outcome.start_ns = phase_.start_ns;
   watchdog_ns_ = static_cast<std::int64_t>(std::llround(limits_.watchdog_s * 1e9));
   last_fresh_ns_ = last_write_ns_ = phase_.start_ns;
   live_.running.store(true, std::memory_order_relaxed);
-  while (!stopped_) {
+  scripted_ = controller_.is_scripted();
+  while (!stopped_ && !over_) {
     clock_.sleep_until(phase_.due_ns(phase_.next_tick));
     const std::int64_t woke_ns = clock_.now_ns();
     if (const int signal = signal_.load(std::memory_order_relaxed); signal != 0) {

@@ -15,8 +15,10 @@ bool same(double a, double b) {
 
 }  // namespace
 
-ReplayResult replay(const RunRecord& run, std::unique_ptr<DelayCompensator> compensator) {
+ReplayResult replay(const RunRecord& run, std::unique_ptr<DelayCompensator> compensator,
+                    CommandSource* source) {
   Controller controller(run.control, run.rig.amplifier.limit_v, std::move(compensator));
+  controller.follow(source);
   PoseScaler scaler(calibration_in_use(run.rig));
   ReplayResult result;
   bool begun = false;

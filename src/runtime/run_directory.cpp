@@ -92,7 +92,8 @@ std::string flags_text() {
                           {"overrun_write", row_flag::overrun_write},
                           {"missed", row_flag::missed},
                           {"write_failed", row_flag::write_failed},
-                          {"stopped", row_flag::stopped}};
+                          {"stopped", row_flag::stopped},
+                          {"feedback", row_flag::feedback}};
   std::string text = "flags: {";
   for (const Bit& bit : bits)
     text += std::string(bit.bit == 1 ? "" : ", ") + bit.name + ": " + std::to_string(bit.bit);
@@ -118,7 +119,9 @@ std::string outcome_text(const LoopOutcome& o, const LoopLimits& limits, const L
   const LoopCounts& c = o.counts;
   std::string text = "outcome:\n  result: " + std::string(result_of(o)) + "\n  reason: " + name_of(o.reason) +
                      "\n  sentence: " + yaml_quoted(sentence_of(o, limits)) +
-                     "\n  time_s: " + exact_text(o.time_s) + "\n  tick: " + std::to_string(o.first_bad_tick) +
+                     "\n  time_s: " + exact_text(o.time_s) +
+                     "\n  started_monotonic_s: " + exact_text(static_cast<double>(o.start_ns) * 1e-9) +
+                     "\n  tick: " + std::to_string(o.first_bad_tick) +
                      "\n  worst_theta_rad: " + exact_text(o.worst_theta_rad) +
                      "\n  worst_cart_m: " + exact_text(o.worst_cart_m) + "\n";
   text += "  rows_written: " + std::to_string(log.rows_written) +
@@ -203,6 +206,7 @@ void RunDirectory::write_start(const RunSetup& setup) {
   text += "controller:\n" + indented(gain_text(setup.control));
   text += "rig:\n" + indented(rig_text(setup.rig));
   if (setup.plant) text += plant_text(*setup.plant);
+  text += setup.experiment_text;
   text += flags_text();
   start_text_ = text;
   if (!write_file(path_ / "run.yaml", text, 0) || !write_file(path_ / completed_name, "", room_for_outcome))

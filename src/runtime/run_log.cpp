@@ -1,6 +1,8 @@
 #include "upright/runtime/run_log.hpp"
 
 #include <fcntl.h>
+#include <pthread.h>
+#include <sched.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -23,6 +25,7 @@ constexpr auto writer_pause = 10ms;
 constexpr auto sync_pause = 50ms;
 constexpr std::size_t buffer_bytes = 64 * 1024;
 constexpr std::size_t rows_at_once = 64;
+constexpr int writer_priority = 5;  // below everything that moves the motor, above what merely computes
 
 char* put(char* out, double value) noexcept {
   return std::to_chars(out, out + 40, value).ptr;
@@ -139,6 +142,10 @@ bool RunLog::write_all(const char* text, std::size_t size) noexcept {
 }
 
 void RunLog::write_loop() noexcept {
+  if (options_.sync_while_running) {
+    const sched_param parameters{writer_priority};
+    pthread_setschedparam(pthread_self(), SCHED_FIFO, &parameters);  // where allowed
+  }
   static_assert(buffer_bytes > rows_at_once * longest_row);
   std::array<LogRecord, rows_at_once> records;
   static thread_local std::array<char, buffer_bytes> buffer;
@@ -146,7 +153,7 @@ void RunLog::write_loop() noexcept {
   std::uint64_t rows = 0;
   const auto flush = [&] {
     if (used == 0) return;
-    if (!failed() && write_all(buffer.data(), used)) {
+    if (!cannot_write() && write_all(buffer.data(), used)) {
       rows_.fetch_add(rows, std::memory_order_relaxed);
       unsynced_.store(true, std::memory_order_relaxed);
     }
@@ -157,7 +164,7 @@ void RunLog::write_loop() noexcept {
     const bool last_round = closing_.load(std::memory_order_acquire);
     const std::size_t count = queue_.pop(records.data(), records.size());
     // After a failure rows are still taken, so that a waiting loop goes on to its stop.
-    if (!failed())
+    if (!cannot_write())
       for (std::size_t i = 0; i < count; ++i) {
         if (used + longest_row > buffer.size()) flush();
         used += format_row(records[i], buffer.data() + used);
@@ -183,13 +190,17 @@ void RunLog::close() noexcept {
   closing_.store(true, std::memory_order_release);
   if (writer_.joinable()) writer_.join();
   if (syncer_.joinable()) syncer_.join();
-  if (::fdatasync(fd_) != 0 && errno != EINVAL && !failed()) error_.store(errno, std::memory_order_relaxed);
+  if (::fdatasync(fd_) != 0 && errno != EINVAL && !cannot_write())
+    error_.store(errno, std::memory_order_relaxed);
   ::close(fd_);
   fd_ = -1;
 }
 
 std::string RunLog::failure() const {
   if (!failed()) return {};
+  if (!cannot_write())
+    return "use a faster disk for --out: it held up " + file_.string() + " until " +
+           std::to_string(rows_dropped()) + " rows were lost";
   return "free space where the run directory goes: " + file_.string() + " could not be written (" +
          std::strerror(error_.load(std::memory_order_relaxed)) + ")";
 }

@@ -71,11 +71,13 @@ SessionResult run_session(RunSetup setup, Rig& rig, Clock& clock, const SignalFl
                           SessionOptions options) {
   const StopAtEnd stop_at_end(rig);
   Controller controller(setup.control, setup.rig.amplifier.limit_v, std::move(options.compensator));
+  controller.follow(options.source);
   PoseScaler scaler(calibration_in_use(setup.rig));
   RunDirectory directory(options.out, setup.label);
   keep_prediction_plant(directory, setup.control);
   RunLog::Options log_options;
   log_options.sync_while_running = !clock.is_virtual();
+  log_options.queue_rows = options.log_queue_rows;
   RunLog log(directory.samples(), log_options);
   LiveStatus live;
   ControlLoop loop(rig, clock, controller, scaler, log, setup.limits, signal, live);

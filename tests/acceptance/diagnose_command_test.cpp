@@ -7,6 +7,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <set>
+#include <sstream>
 
 #include "command.hpp"
 
@@ -59,7 +60,11 @@ TEST_F(Diagnose, NamesCoulombAndStribeckInThePapersOwnCase) {
   EXPECT_LT(d.at("gap").at("after"), 1.1);
   EXPECT_EQ(run_upright("check " + in_folder("out/model.yaml")).exit_code, 0);
   EXPECT_EQ(run_upright("report " + in_folder("out")).exit_code, 0);
-  EXPECT_TRUE(fs::exists(folder_ / "out" / "report.html"));
+  std::ostringstream page;
+  page << std::ifstream(folder_ / "out" / "report.html").rdbuf();
+  // The simulated traces, and the plant file's new line.
+  EXPECT_NE(page.str().find("Measured and simulated"), std::string::npos);
+  EXPECT_NE(page.str().find("+     - {kind: coulomb_friction"), std::string::npos);
   EXPECT_EQ(run_upright("diagnose --model " + source + "/config/plants/viscous.yaml --data" + data +
                         " --out " + in_folder("out"))
                 .exit_code,

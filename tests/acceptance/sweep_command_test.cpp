@@ -1,14 +1,18 @@
 // `upright sweep` as a user and a cluster meet it: errors, Ctrl-C and going on, mpirun.
 #include <gtest/gtest.h>
+#include <pty.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
+#include <array>
 #include <chrono>
 #include <csignal>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <regex>
 #include <sstream>
 #include <thread>
 
@@ -37,6 +41,8 @@ class SweepCommand : public ::testing::Test {
         << "  delay_s: {from: 0.0, to: 0.04, count: 21}\n  duration_s: " << duration_s
         << "\n  outcome: {stable_below_rad: 0.0016, fell_above_rad: 1.0}\n  engine: " << engine << "\n";
   }
+
+  static ssize_t write_byte(int to, char byte) { return ::write(to, &byte, 1); }
 
   std::string file() const { return (folder_ / "sweep.yaml").string(); }
   std::string out(const std::string& name) const { return (folder_ / name).string(); }
@@ -76,6 +82,25 @@ TEST_F(SweepCommand, ReportDrawsTheMap) {
   EXPECT_NE(page.find("Falls from"), std::string::npos);
   EXPECT_NE(page.find("oscillating"), std::string::npos);
   EXPECT_NE(page.find("<svg"), std::string::npos);
+  // The linear critical delays of the sampled loop, as lines in the map and in words.
+  EXPECT_NE(page.find("linear, near rest"), std::string::npos);
+  EXPECT_NE(page.find("linear, sliding"), std::string::npos);
+  const std::string margins = content(folder_ / "a" / "margins.csv");
+  EXPECT_EQ(margins.find("model,critical_delay_s,crossing_radps\nnear rest,0."), 0u) << margins;
+}
+
+TEST_F(SweepCommand, ReportDrawsTheLinearCriticalDelayOfTheContinuousLoop) {
+  std::ofstream(file()) << "sweep:\n  plant: " << source
+                        << "/config/plants/exponential.yaml\n  gains: " << source
+                        << "/config/gains/exponential.yaml\n  loop: continuous\n"
+                        << "  theta0_deg: [1, 3, 5]\n  delay_s: {from: 0.0, to: 0.03, count: 4}\n"
+                        << "  duration_s: 2\n  outcome: {stable_below_rad: 0.0016, fell_above_rad: 1.0}\n"
+                        << "  engine: fast\n";
+  EXPECT_EQ(run_upright("sweep " + file() + " --out " + out("a")).exit_code, 0);
+  EXPECT_EQ(run_upright("report " + out("a")).exit_code, 0);
+  const std::string page = content(folder_ / "a" / "report.html");
+  EXPECT_NE(page.find("loses stability at 106.9 ms, with 10.23 rad/s"), std::string::npos);
+  EXPECT_NE(page.find("loses stability at 15.36 ms"), std::string::npos);
 }
 
 TEST_F(SweepCommand, RefusesToOverwriteAndSaysHow) {
@@ -93,6 +118,89 @@ TEST_F(SweepCommand, RefusesAnUnknownEngineWithFileLineAndKey) {
   EXPECT_NE(result.err.find("sweep.yaml:10"), std::string::npos) << result.err;
   EXPECT_NE(result.err.find("engine"), std::string::npos) << result.err;
   EXPECT_FALSE(std::filesystem::exists(out("a")));
+}
+
+TEST_F(SweepCommand, RefusesBadInputWithTheRemedyAndWritesNothing) {
+  std::ofstream(folder_ / "unstable.yaml")
+      << "plant:\n  cart_mass_kg: 0.815\n  pendulum: {mass_kg: 0.21, length_to_com_m: 0.02}\n"
+         "  gravity_mps2: 9.8\n  motor: {force_per_volt_n: 0.05, back_emf_n_per_mps: 7.682}\n"
+         "  effects:\n    - {kind: viscous_friction, coefficient_n_per_mps: 3.0}\n";
+  const std::tuple<std::string, std::string, std::string> wrong[] = {
+      {"engine: fast", "engine: warp", "reference"},
+      {"theta0_deg: {from: 0.5, to: 5, count: 7, spacing: log}", "theta0_deg: []", "at least one value"},
+      {"delay_s: {from: 0.0, to: 0.04, count: 21}", "delay_s: []", "at least one value"},
+      {"delay_s: {from: 0.0, to: 0.04, count: 21}", "delay_s: [0.0, 0.02, 0.01]", "sort the delays"},
+      {"delay_s: {from: 0.0, to: 0.04, count: 21}", "delay_s: {from: 0.04, to: 0.0, count: 5}", "more than"},
+      {"fell_above_rad: 1.0", "fell_above_rad: 0.001", "more than 0.0016"},
+      {source + "/config/plants/exponential.yaml", (folder_ / "unstable.yaml").string(), "upright design"},
+      {source + "/config/plants/exponential.yaml", (folder_ / "none.yaml").string(), "none.yaml"},
+  };
+  const std::string good = content(file());
+  for (const auto& [from, to, remedy] : wrong) {
+    SCOPED_TRACE(to);
+    std::string text = good;
+    ASSERT_NE(text.find(from), std::string::npos);
+    text.replace(text.find(from), from.size(), to);
+    std::ofstream(file()) << text;
+    const CommandResult result = run_upright("sweep " + file() + " --out " + out("wrong"));
+    EXPECT_EQ(result.exit_code, 2);
+    EXPECT_NE(result.err.find(remedy), std::string::npos) << result.err;
+    EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
+    EXPECT_FALSE(std::filesystem::exists(out("wrong")));
+  }
+}
+
+/// The rig's plant with its limits against the paper's experiment: 0.025 s for gain (7), 0.023 s for gain
+/// (10).
+TEST_F(SweepCommand, OnePlantFilePredictsTheMeasuredFallsOfBothControllers) {
+  const std::pair<const char*, double> measured[] = {{"rig-exponential", 0.025},
+                                                     {"rig-exponential-gain10", 0.023}};
+  for (const auto& [name, falls_s] : measured) {
+    const CommandResult result = run_upright("sweep " + source + "/config/sweeps/" + name +
+                                             ".yaml --transitions-only --json --out " + out(name));
+    ASSERT_EQ(result.exit_code, 0) << result.err;
+    for (const auto& transition : nlohmann::json::parse(result.out).at("transitions"))
+      EXPECT_NEAR(transition.at("falls_from_s").get<double>(), falls_s, 0.1 * falls_s) << name;
+  }
+}
+
+/// On a terminal: the bar shows the time left, Ctrl-C stops it, and the same command goes on from there.
+TEST_F(SweepCommand, ShowsTheTimeLeftOnATerminalAndStopsOnItsCtrlC) {
+  write("60", "fast");
+  const std::string to = out("cut");
+  int terminal = -1;
+  const pid_t child = forkpty(&terminal, nullptr, nullptr, nullptr);
+  ASSERT_GE(child, 0);
+  if (child == 0) {
+    execl(UPRIGHT_BINARY, UPRIGHT_BINARY, "sweep", file().c_str(), "--threads", "1", "--out", to.c_str(),
+          static_cast<char*>(nullptr));
+    _exit(127);
+  }
+  std::string seen;
+  bool asked = false;
+  std::array<char, 4096> part;
+  for (ssize_t count = 0; (count = read(terminal, part.data(), part.size())) > 0;) {
+    seen.append(part.data(), static_cast<std::size_t>(count));
+    // A number of seconds, which takes two reports; then Ctrl-C as the terminal sends it.
+    if (!asked && std::regex_search(seen, std::regex("of [0-9]+ runs, [0-9]+ (s|min) left"))) {
+      ASSERT_EQ(write_byte(terminal, '\x03'), 1);
+      asked = true;
+    }
+  }
+  close(terminal);
+  int status = 0;
+  waitpid(child, &status, 0);
+  EXPECT_TRUE(asked) << seen;
+  ASSERT_TRUE(WIFEXITED(status));
+  EXPECT_EQ(WEXITSTATUS(status), 3);
+  EXPECT_NE(seen.find("goes on from there"), std::string::npos) << seen;
+  const CommandResult rest = run_upright("sweep " + file() + " --json --out " + to);
+  ASSERT_EQ(rest.exit_code, 0) << rest.err;
+  EXPECT_EQ(rest.err, "");  // no bar where stderr is no terminal
+  const CommandResult whole = run_upright("sweep " + file() + " --json --out " + out("whole"));
+  EXPECT_LT(nlohmann::json::parse(rest.out).at("runs_made"),
+            nlohmann::json::parse(whole.out).at("runs_made"));
+  expect_same("cut", "whole");
 }
 
 TEST_F(SweepCommand, KeepsWhatIsDoneOnAnInterruptAndGoesOn) {
@@ -123,20 +231,43 @@ TEST_F(SweepCommand, KeepsWhatIsDoneOnAnInterruptAndGoesOn) {
   expect_same("cut", "whole");
 }
 
-TEST_F(SweepCommand, GivesTheSameBytesOverTwoAndThreeRanks) {
-  if (std::system("command -v mpirun >/dev/null 2>&1") != 0) GTEST_SKIP() << "no mpirun on this machine";
+#ifdef UPRIGHT_WITH_MPI
+
+class SweepOverRanks : public SweepCommand {
+ protected:
+  CommandResult with_ranks(int ranks, const std::string& arguments) const {
+    return run_shell("ASAN_OPTIONS=detect_leaks=0 " + shell_quoted(UPRIGHT_MPIRUN) +
+                     " --allow-run-as-root --oversubscribe -n " + std::to_string(ranks) + " " +
+                     shell_quoted(UPRIGHT_BINARY) + " sweep " + arguments);
+  }
+};
+
+TEST_F(SweepOverRanks, GivesTheBytesOfOneProcessOverTwoAndThree) {
   EXPECT_EQ(run_upright("sweep " + file() + " --out " + out("one")).exit_code, 0);
-  const CommandResult probe =
-      run_shell("PMIX_RANK=0 " + shell_quoted(UPRIGHT_BINARY) + " sweep nothing.yaml");
-  if (probe.err.find("built without MPI") != std::string::npos) GTEST_SKIP() << probe.err;
-  for (const char* ranks : {"2", "3"}) {
-    const std::string command =
-        std::string("ASAN_OPTIONS=detect_leaks=0 mpirun --allow-run-as-root --oversubscribe -n ") + ranks +
-        " " + UPRIGHT_BINARY + " sweep " + file() + " --out " + out(ranks) + " >/dev/null 2>&1";
-    EXPECT_EQ(std::system(command.c_str()), 0);
-    expect_same("one", ranks);
+  for (const int ranks : {1, 2, 3}) {
+    const std::string to = std::to_string(ranks) + "-ranks";
+    const CommandResult result = with_ranks(ranks, file() + " --out " + out(to));
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    expect_same("one", to);
   }
 }
+
+TEST_F(SweepOverRanks, SpeaksOnceAndWithTheSameExitCode) {
+  write("4", "quick");
+  const CommandResult result = with_ranks(2, file() + " --out " + out("a"));
+  EXPECT_EQ(result.exit_code, 2);
+  const std::size_t first = result.err.find("sweep.yaml:10");
+  EXPECT_NE(first, std::string::npos) << result.err;
+  EXPECT_EQ(result.err.find("sweep.yaml:10", first + 1), std::string::npos) << result.err;
+}
+
+#else
+
+TEST_F(SweepCommand, GivesTheBytesOfOneProcessOverTwoAndThreeRanks) {
+  GTEST_SKIP() << "built without MPI; install libopenmpi-dev and configure again";
+}
+
+#endif
 
 }  // namespace
 }  // namespace upright::testing

@@ -1,19 +1,16 @@
 // Data in which the effect is hidden: made by the CVODE reference engine with true events, not by the engine
-// that fits. Quantised encoders, base parameters a few percent off, the voltages recorded as commanded. The
-// diagnosis sees the runs only.
+// that fits (tests/blind). Quantised encoders, base parameters a few percent off, the voltages recorded as
+// commanded. The diagnosis sees the runs only. Hundreds of cases more: tests/bench/diagnosis_matrix.
 #include "upright/analysis/diagnosis.hpp"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <numbers>
 #include <random>
 
+#include "blind_case.hpp"
 #include "upright/model/error.hpp"
-#include "upright/sim/cvode_engine.hpp"
-#include "upright/sim/simulator.hpp"
 
 namespace upright {
 namespace {
@@ -39,42 +36,20 @@ Plant true_plant(std::mt19937_64& random) {
   return plant;
 }
 
-double quantised(double value, double step) {
-  return step * std::round(value / step);
-}
-
-/// Eight seconds with the pendulum hanging: a multisine, or a square wave that grows and then coasts.
-Measurement hanging_run(const Plant& plant, int number, std::mt19937_64& random) {
-  std::uniform_real_distribution<double> phase(0.0, 2.0 * std::numbers::pi);
-  std::array<double, 6> phases;
-  for (double& p : phases) p = phase(random);
-  constexpr double period_s = 4e-3;
-  Measurement run;
-  run.name = "run" + std::to_string(number);
-  run.cart_resolution_m = 2.27485e-5;
-  run.theta_resolution_rad = 2.0 * std::numbers::pi / 4096.0;
-  BasicSimulator<CvodeEngine, double> simulator(make_model<double>(plant));
-  PlantState<double> start;
-  start.theta_rad = std::numbers::pi + 0.3;
-  simulator.start(start);
-  for (int k = 0; k < 2000; ++k) {
-    const double t = k * period_s;
-    const Outputs<double> y = simulator.engine().outputs();
-    run.time_s.push_back(t);
-    run.cart_m.push_back(quantised(y.cart_m, run.cart_resolution_m));
-    run.theta_rad.push_back(quantised(y.theta_rad, run.theta_resolution_rad));
-    double volts = -8.0 * run.cart_m.back();
-    if (number % 2 == 0) {
-      for (std::size_t i = 0; i < phases.size(); ++i)
-        volts += 0.9 * std::sin(2.0 * std::numbers::pi * 0.2 * std::pow(1.87, i) * t + phases[i]);
-    } else if (t < 7.0) {
-      volts += (std::fmod(t, 1.1) < 0.55 ? 1.0 : -1.0) * (1.0 + 0.25 * std::floor(t / 2.0));
-    }
-    run.voltage_v.push_back(volts);
-    simulator.command(t, volts);
-    simulator.advance_to(t + period_s);
+/// Three runs with the pendulum hanging: a multisine, a square wave that grows and then
+/// coasts, a multisine.
+std::vector<Measurement> hanging_runs(const blind::Rig& rig, unsigned seed, double duration_s = 5.0) {
+  std::vector<Measurement> runs;
+  for (unsigned r = 0; r < 3; ++r) {
+    blind::Plan plan;
+    plan.experiment = r % 2 == 0 ? blind::Experiment::multisine : blind::Experiment::square;
+    plan.rate_hz = 250.0;
+    plan.duration_s = duration_s;
+    plan.swing_rad = 0.3;
+    plan.seed = 100 * seed + r;
+    runs.push_back(measure(rig, plan, std::string("run").append(std::to_string(r))));
   }
-  return run;
+  return runs;
 }
 
 struct Hidden {
@@ -82,13 +57,11 @@ struct Hidden {
   std::vector<double> values;
 };
 
-Diagnosis diagnose_hidden(const std::vector<Hidden>& hidden, unsigned seed) {
+Diagnosis diagnose_hidden(const std::vector<Hidden>& hidden, unsigned seed, double duration_s = 5.0) {
   std::mt19937_64 random(seed);
-  Plant plant = true_plant(random);
-  for (const Hidden& effect : hidden) plant.set(effect_number(effect.kind), effect.values);
-  std::vector<Measurement> runs;
-  for (int i = 0; i < 3; ++i) runs.push_back(hanging_run(plant, i, random));
-  return diagnose(believed_plant(), runs);
+  blind::Rig rig{.plant = true_plant(random)};
+  for (const Hidden& effect : hidden) rig.plant.set(effect_number(effect.kind), effect.values);
+  return diagnose(believed_plant(), hanging_runs(rig, seed, duration_s));
 }
 
 bool is_correction(std::size_t effect) {
@@ -119,7 +92,7 @@ INSTANTIATE_TEST_SUITE_P(Effects, OneHiddenEffect,
                          [](const auto& test) { return test.param.kind; });
 
 TEST(Diagnosis, NamesAConstantForceTogetherWithWhatItCannotBeToldFrom) {
-  const Diagnosis d = diagnose_hidden({{"constant_force", {0.3}}}, 12);
+  const Diagnosis d = diagnose_hidden({{"constant_force", {0.3}}}, 12, 8.0);
   ASSERT_FALSE(d.effects.empty());
   const FoundEffect& first = d.effects.front();
   std::vector<std::string> set = {std::string(effect_registry()[first.effect].kind)};
@@ -149,27 +122,126 @@ TEST(Diagnosis, NamesNoEffectWhereNoneIsHidden) {
 }
 
 TEST(Diagnosis, SaysNoDiscrepancyOfAPlantThatIsRight) {
-  std::mt19937_64 random(15);
-  std::vector<Measurement> runs;
-  for (int i = 0; i < 3; ++i) runs.push_back(hanging_run(believed_plant(), i, random));
-  const Diagnosis d = diagnose(believed_plant(), runs);
+  const Diagnosis d = diagnose(believed_plant(), hanging_runs({.plant = believed_plant()}, 15));
   EXPECT_EQ(d.verdict, Verdict::no_discrepancy);
   EXPECT_TRUE(d.effects.empty());
 }
 
 TEST(Diagnosis, SaysUnexplainedOfBacklash) {
   std::mt19937_64 random(16);
-  const Plant plant = true_plant(random);
-  std::vector<Measurement> runs;
-  for (int i = 0; i < 3; ++i) {
-    Measurement run = hanging_run(plant, i, random);
-    double shown = 0.0;
-    for (double& x : run.cart_m)
-      x = quantised(shown = std::clamp(shown, x - 1e-3, x + 1e-3), run.cart_resolution_m);
-    runs.push_back(run);
-  }
-  EXPECT_EQ(diagnose(believed_plant(), runs).verdict, Verdict::unexplained);
+  const blind::Rig rig{.plant = true_plant(random), .unknown = blind::Unknown::backlash, .backlash_m = 2e-3};
+  EXPECT_EQ(diagnose(believed_plant(), hanging_runs(rig, 16)).verdict, Verdict::unexplained);
 }
+
+/// A case of the matrix: experiments, rate, number and length of runs, falls and gaps follow from the seed.
+struct BlindCase {
+  std::vector<std::string> hidden;
+  blind::Size size = blind::Size::typical;
+  bool disturbed = false;
+  std::uint64_t seed = 1;
+};
+
+class Blind : public testing::TestWithParam<BlindCase> {
+ protected:
+  void SetUp() override {
+    const BlindCase& c = GetParam();
+    case_ = blind::make_case({.hidden = c.hidden,
+                              .size = c.size,
+                              .seed = c.seed,
+                              .disturbed = c.disturbed,
+                              .most_samples = 4000.0});
+    diagnosis_ = diagnose(case_.believed, measure_all(case_));
+  }
+
+  /// Effects found that are more than the correction of a number in the plant file.
+  std::vector<std::string> structural() const {
+    std::vector<std::string> kinds;
+    for (const FoundEffect& found : diagnosis_.effects)
+      if (!is_correction(found.effect) && case_.believed.find(found.effect) == nullptr)
+        kinds.emplace_back(effect_registry()[found.effect].kind);
+    return kinds;
+  }
+
+  /// The first effect and what is declared not to be told from it.
+  std::vector<std::string> first_set() const {
+    if (diagnosis_.effects.empty()) return {};
+    const FoundEffect& first = diagnosis_.effects.front();
+    std::vector<std::string> set = {std::string(effect_registry()[first.effect].kind)};
+    for (const std::size_t other : first.confusable_with) set.emplace_back(effect_registry()[other].kind);
+    return set;
+  }
+
+  blind::Case case_;
+  Diagnosis diagnosis_;
+};
+
+std::string name_of_case(const testing::TestParamInfo<BlindCase>& test) {
+  std::string name = std::string(name_of(test.param.size)) + "_";
+  for (const std::string& kind : test.param.hidden) name.append(kind).append("_");
+  if (test.param.hidden.empty()) name.append("none_");
+  return name.append(test.param.disturbed ? "disturbed_" : "").append(std::to_string(test.param.seed));
+}
+
+class BlindEffect : public Blind {};
+
+TEST_P(BlindEffect, IsNamedWithItsParameter) {
+  const std::vector<std::string> set = first_set();
+  EXPECT_NE(std::find(set.begin(), set.end(), GetParam().hidden[0]), set.end())
+      << case_.campaign << ": " << testing::PrintToString(set);
+  const blind::HiddenEffect& hidden = case_.hidden[0];
+  const FoundEffect& first = diagnosis_.effects.at(0);
+  if (first.effect != hidden.effect) return;
+  const double share = GetParam().disturbed ? 0.15 : 0.05;
+  EXPECT_NEAR(first.parameters[0].value, hidden.values[0], share * std::abs(hidden.values[0]));
+}
+
+class BlindPair : public Blind {};
+
+TEST_P(BlindPair, IsNamedWhole) {
+  const std::vector<std::string> found = structural();
+  for (const std::string& kind : GetParam().hidden)
+    EXPECT_NE(std::find(found.begin(), found.end(), kind), found.end()) << testing::PrintToString(found);
+}
+
+class BlindNothing : public Blind {};
+
+TEST_P(BlindNothing, IsNotTakenForAnEffect) {
+  EXPECT_TRUE(structural().empty()) << case_.campaign << ": " << testing::PrintToString(structural());
+}
+
+class BlindUnknown : public Blind {};
+
+TEST_P(BlindUnknown, IsUnexplained) {
+  EXPECT_EQ(diagnosis_.verdict, Verdict::unexplained) << testing::PrintToString(structural());
+}
+
+using blind::Size;
+
+INSTANTIATE_TEST_SUITE_P(Cases, BlindEffect,
+                         testing::Values(BlindCase{{"coulomb_friction"}, Size::typical, true, 201},
+                                         BlindCase{{"cogging_force"}, Size::strong, false, 202},
+                                         BlindCase{{"pivot_coulomb_friction"}, Size::typical, true, 203},
+                                         BlindCase{{"motor_lag"}, Size::strong, false, 204},
+                                         BlindCase{{"voltage_offset"}, Size::typical, true, 205},
+                                         BlindCase{{"cable_spring"}, Size::typical, true, 206},
+                                         BlindCase{{"viscous_asymmetry"}, Size::typical, false, 207},
+                                         BlindCase{{"pendulum_length"}, Size::strong, false, 208},
+                                         BlindCase{{"quadratic_drag"}, Size::strong, true, 209}),
+                         name_of_case);
+INSTANTIATE_TEST_SUITE_P(
+    Cases, BlindPair,
+    testing::Values(BlindCase{{"coulomb_friction", "cable_spring"}, Size::strong, false, 211},
+                    BlindCase{{"input_delay", "pivot_viscous_friction"}, Size::strong, true, 212}),
+    name_of_case);
+INSTANTIATE_TEST_SUITE_P(Cases, BlindNothing,
+                         testing::Values(BlindCase{{}, Size::typical, false, 221},
+                                         BlindCase{{}, Size::typical, true, 222},
+                                         BlindCase{{}, Size::typical, true, 223}),
+                         name_of_case);
+INSTANTIATE_TEST_SUITE_P(Cases, BlindUnknown,
+                         testing::Values(BlindCase{{"gusts"}, Size::strong, false, 231},
+                                         BlindCase{{"warming_friction"}, Size::strong, true, 232}),
+                         name_of_case);
 
 TEST(Diagnosis, RefusesRunsThatTheModelCannotShow) {
   Plant cart_alone = believed_plant();

@@ -190,18 +190,10 @@ TEST_P(ModbusFaults, NoOldCountIsEverFresh) {
   const std::vector<TraceRow> trace = server.trace();
   std::size_t wrong = 0, compared = 0;
   for (const Taken& t : taken) {
-    constexpr double grid_s = 0.003;  // the trace has a line a millisecond, when the machine is not busy
-    double low_m = 1e9, high_m = -1e9;
-    for (auto row = std::lower_bound(trace.begin(), trace.end(), t.from_s - grid_s,
-                                     [](const TraceRow&r, double s) { return r.time_s < s; });
-         row != trace.end() && row->time_s < t.to_s + grid_s; ++row) {
-      low_m = std::min(low_m, row->cart_m);
-      high_m = std::max(high_m, row->cart_m);
-    }
-    if (low_m > high_m) continue;
+    constexpr double line_s = 0.001;  // apart, in the trace
+    const CartRange range = cart_between(trace, t.from_s - line_s, t.to_s + line_s);
     ++compared;
-    const double cart_m = 2.27485e-5 * static_cast<double>(t.cart);
-    if (cart_m < low_m - 5e-5 || cart_m > high_m + 5e-5) ++wrong;
+    if (!range.holds(2.27485e-5 * static_cast<double>(t.cart))) ++wrong;
   }
   // A wrong bit in a TCP reply has no check sum to betray it; what no motion explains is refused.
   const bool undetectable = !serial && faulty && GetParam().flags.front() == "--inject-corrupt-every";

@@ -1,12 +1,13 @@
 """An independent Modbus server: pymodbus with known counts, and the requests it saw.
 
-usage: pymodbus_server.py PORT. Prints 'ready', then serves and prints each write to the voltage register.
+usage: pymodbus_server.py PORT|SERIAL-LINE. Prints 'ready', then serves and prints each write to the voltage register.
 """
 import asyncio
 import sys
 
 from pymodbus.datastore import ModbusSequentialDataBlock, ModbusServerContext, ModbusSlaveContext
-from pymodbus.server import StartAsyncTcpServer
+from pymodbus.framer.rtu_framer import ModbusRtuFramer
+from pymodbus.server import StartAsyncSerialServer, StartAsyncTcpServer
 
 CART, PENDULUM = -123456, 70001  # as the test expects them
 
@@ -25,7 +26,7 @@ class Registers(ModbusSequentialDataBlock):
             print("voltage", values[0] if isinstance(values, list) else values, flush=True)
 
 
-async def main(port):
+async def main(line):
     holding = Registers(0, words(CART) + words(PENDULUM) + [7] + [0] * 60)
     inputs = ModbusSequentialDataBlock(0, words(CART) + words(PENDULUM) + [7] + [0] * 60)
     context = ModbusServerContext(ModbusSlaveContext(hr=holding, ir=inputs, zero_mode=True), single=True)
@@ -35,7 +36,10 @@ async def main(port):
         print("ready", flush=True)
 
     asyncio.get_running_loop().create_task(say_ready())
-    await StartAsyncTcpServer(context, address=("127.0.0.1", port))
+    if line.isdigit():
+        await StartAsyncTcpServer(context, address=("127.0.0.1", int(line)))
+    else:
+        await StartAsyncSerialServer(context, framer=ModbusRtuFramer, port=line, baudrate=115200)
 
 
-asyncio.run(main(int(sys.argv[1])))
+asyncio.run(main(sys.argv[1]))

@@ -2,10 +2,16 @@
 // on or is at zero volts within the watchdog's time, seen from the plant's side, and the log says which cycle
 // was the first.
 #include <gtest/gtest.h>
+#include <time.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <cstdint>
 #include <cstdlib>
+#include <memory>
+#include <random>
+#include <sstream>
 #include <thread>
 
 #include "virtual_rig_process.hpp"
@@ -15,10 +21,14 @@ namespace {
 
 const std::string config = UPRIGHT_SOURCE_DIR "/config/";
 
-/// Seconds each run lasts; UPRIGHT_LONG=1 makes them the 30 s that the rig must hold.
-std::string duration() {
-  return std::getenv("UPRIGHT_LONG") != nullptr ? "30" : "5";
+/// Seconds each run lasts; UPRIGHT_SECONDS makes them others.
+double duration_s() {
+  const char* seconds = std::getenv("UPRIGHT_SECONDS");
+  return seconds != nullptr ? std::stod(seconds) : 30.0;
 }
+
+constexpr double watchdog_s = 0.1;
+constexpr double scheduling_margin_s = 0.05;
 
 struct Outcome {
   int exit_code = -1;
@@ -27,11 +37,18 @@ struct Outcome {
   std::vector<TraceRow> trace;
 };
 
+enum class End { balances, any, stops };
+
 struct Case {
   const char* name;
   bool serial;
+  End end;
   std::vector<std::string> flags;
 };
+
+void PrintTo(const Case& c, std::ostream* out) {
+  *out << c.name;
+}
 
 Outcome run(const Case& c) {
   Folder folder;
@@ -44,7 +61,7 @@ Outcome run(const Case& c) {
       << replaced(text_of(config + "gains/exponential.yaml"), "sample_rate_hz: 1000",
                   c.serial ? "sample_rate_hz: 200" : "sample_rate_hz: 500");
   Process client({UPRIGHT_BINARY, "run", "--rig", folder / "rig.yaml", "--gains", folder / "gains.yaml",
-                  "--duration", duration(), "--out", folder / "run", "--json"});
+                  "--duration", std::to_string(duration_s()), "--out", folder / "run", "--json"});
   Outcome outcome;
   outcome.said = client.rest();
   outcome.exit_code = client.wait();
@@ -58,54 +75,335 @@ Outcome run(const Case& c) {
   return outcome;
 }
 
-/// time_s of the last row of samples.
-double last_sample_s(const std::string& samples) {
-  const std::size_t end = samples.find_last_not_of('\n');
-  const std::string row = samples.substr(samples.rfind('\n', end) + 1);
-  return std::stod(row.substr(row.find(',') + 1));
+struct Row {
+  std::uint64_t tick = 0;
+  double time_s = 0.0;
+  std::int64_t cart_counts = 0;
+  double cart_m = 0.0, read_s = 0.0;
+  std::uint32_t flags = 0;
+  std::uint64_t sequence = 0;
+  bool held() const { return (flags & 3u) != 0; }  // stale or fault
+  bool write_failed() const { return (flags & 256u) != 0; }
+  bool stopped() const { return (flags & 512u) != 0; }
+};
+
+std::vector<Row> rows_of(const std::string& samples) {
+  std::istringstream lines(samples);
+  std::string line;
+  std::getline(lines, line);
+  std::vector<Row> rows;
+  while (std::getline(lines, line)) {
+    std::vector<std::string> cells;
+    std::istringstream words(line);
+    for (std::string cell; std::getline(words, cell, ',');) cells.push_back(cell);
+    if (cells.size() != 16) throw std::runtime_error("not a row: " + line);
+    rows.push_back({std::stoull(cells[0]), std::stod(cells[1]), std::stoll(cells[2]), std::stod(cells[4]),
+                    1e-6 * std::stod(cells[11]), static_cast<std::uint32_t>(std::stoul(cells[14])),
+                    std::stoull(cells[15])});
+  }
+  return rows;
+}
+
+/// The number behind "KEY: " in run.yaml's outcome.
+double outcome_number(const std::string& yaml, const std::string& key) {
+  const std::size_t outcome = yaml.find("\noutcome:");
+  const std::size_t at = yaml.find("  " + key + ": ", outcome);
+  if (outcome == std::string::npos || at == std::string::npos)
+    throw std::runtime_error("run.yaml's outcome has no " + key);
+  return std::stod(yaml.substr(at + key.size() + 4));
+}
+
+/// Every fresh row against what the plant did while it was read; every other row repeats the last fresh one
+/// and says so.
+void expect_no_old_count(const Outcome& outcome, const std::vector<Row>& rows, bool can_be_told) {
+  const double start_s = outcome_number(outcome.run_yaml, "started_monotonic_s");
+  std::uint64_t sequence = 0;
+  std::int64_t counts = 0;
+  std::size_t fresh = 0, wrong = 0;
+  for (const Row& row : rows) {
+    if (row.held()) {
+      EXPECT_EQ(row.sequence, sequence) << "cycle " << row.tick;
+      EXPECT_EQ(row.cart_counts, counts) << "cycle " << row.tick;
+      continue;
+    }
+    EXPECT_GT(row.sequence, sequence) << "cycle " << row.tick;
+    sequence = row.sequence;
+    counts = row.cart_counts;
+    ++fresh;
+    const double within_s = 0.001 + row.read_s;  // the time is that of the middle of the exchange
+    const CartRange range =
+        cart_between(outcome.trace, start_s + row.time_s - within_s, start_s + row.time_s + within_s);
+    if (!range.holds(row.cart_m)) ++wrong;
+  }
+  EXPECT_GT(fresh, 0u);
+  EXPECT_EQ(can_be_told ? wrong : 0u, 0u) << "of " << fresh;
+}
+
+/// The cycle that the outcome names is the first of the trouble, the log's row of it says so, and the plant
+/// had its zero volts within the watchdog's time of it.
+void expect_named_stop(const Outcome& outcome, const std::vector<Row>& rows) {
+  const double start_s = outcome_number(outcome.run_yaml, "started_monotonic_s");
+  const auto tick = static_cast<std::uint64_t>(outcome_number(outcome.run_yaml, "tick"));
+  ASSERT_FALSE(rows.empty());
+  EXPECT_TRUE(rows.back().stopped());
+  const auto named = std::find_if(rows.begin(), rows.end(), [&](const Row& row) { return row.tick >= tick; });
+  ASSERT_NE(named, rows.end()) << "cycle " << tick << " is not in the log";
+  EXPECT_EQ(named->tick, tick);
+  EXPECT_TRUE(named->held() || named->write_failed() || named->stopped()) << "cycle " << tick;
+  EXPECT_NE(outcome.run_yaml.find("in cycle " + std::to_string(tick)), std::string::npos);
+  double on_until_s = 0.0;
+  for (const TraceRow& row : outcome.trace)
+    if (row.voltage_v != 0.0) on_until_s = row.time_s;
+  EXPECT_LT(on_until_s - (start_s + named->time_s), watchdog_s + scheduling_margin_s);
 }
 
 class RunOverModbus : public testing::TestWithParam<Case> {};
 
 TEST_P(RunOverModbus, BalancesOrStopsAtZeroVolts) {
-  const Outcome outcome = run(GetParam());
+  const Case& c = GetParam();
+  const Outcome outcome = run(c);
   ASSERT_FALSE(outcome.trace.empty());
-  EXPECT_FALSE(outcome.samples.empty());
   EXPECT_EQ(outcome.trace.back().voltage_v, 0.0) << "the motor is off in the end";
-  const bool faulty = !GetParam().flags.empty();
-  if (!faulty) {
+  const std::vector<Row> rows = rows_of(outcome.samples);
+  const std::string name = c.name;
+  // A wrong bit in a TCP reply has no check sum to betray it; only what no motion explains is refused.
+  expect_no_old_count(outcome, rows, name != "tcp_corrupt");
+  const auto held = std::count_if(rows.begin(), rows.end(), [](const Row& row) { return row.held(); });
+  const std::size_t counts = outcome.run_yaml.find("\n  counts: {");
+  ASSERT_NE(counts, std::string::npos) << outcome.run_yaml;
+  const auto counted = [&](const std::string& key) {
+    return std::stoll(outcome.run_yaml.substr(outcome.run_yaml.find(key + ": ", counts) + key.size() + 2));
+  };
+  EXPECT_EQ(held, counted("stale") + counted("faults")) << "each faulty cycle is marked in the log";
+  if (c.end == End::balances) {
     EXPECT_EQ(outcome.exit_code, 0) << outcome.said << outcome.run_yaml;
   }
-  double let_go_s = 0.0, on_until_s = 0.0;
-  for (const TraceRow& row : outcome.trace) {
-    if (row.held && on_until_s == 0.0) let_go_s = row.time_s;
-    if (row.voltage_v != 0.0) on_until_s = row.time_s;
+  if (c.end == End::stops) {
+    EXPECT_EQ(outcome.exit_code, 3) << outcome.said;
   }
-  constexpr double watchdog_s = 0.1, margin_s = 0.05;
-  EXPECT_LT(on_until_s - let_go_s, last_sample_s(outcome.samples) + watchdog_s + margin_s);
   if (outcome.exit_code == 0) {
-    EXPECT_GT(on_until_s - let_go_s, 0.9 * std::stod(duration()));
+    EXPECT_GT(rows.back().time_s, 0.99 * duration_s());
     return;
   }
-  // A stop: a whole report that names its cycle, with the samples kept.
-  EXPECT_TRUE(outcome.exit_code == 3 || outcome.exit_code == 4) << outcome.said << outcome.run_yaml;
-  EXPECT_NE(outcome.run_yaml.find("tick"), std::string::npos) << outcome.run_yaml;
-  if (std::string(GetParam().name).find("restart") != std::string::npos) {
+  EXPECT_EQ(outcome.exit_code, 3) << outcome.said << outcome.run_yaml;
+  expect_named_stop(outcome, rows);
+  if (name.find("restart") != std::string::npos) {
     EXPECT_NE(outcome.run_yaml.find("restarted"), std::string::npos) << outcome.run_yaml;
   }
 }
 
+/// A rig as it is found: the pendulum hangs, with its zero taken there, and somebody lifts it while the
+/// program waits.
+TEST(RunFromHanging, WaitsAtZeroVoltsUntilThePendulumIsHeldUpright) {
+  const Folder folder;
+  std::string rig = replaced(text_of(config + "rigs/modbus-tcp.yaml"),
+                             "zero: {at: counts, cart_counts: 0, pendulum_counts: 0, pose: upright}",
+                             "zero: {at: start, pose: hanging}");
+  VirtualRigProcess server(folder, rig, false, {"--hang", "1", "--theta0-deg", "2"});
+  std::ofstream(folder / "rig.yaml") << replaced(rig, "port: 1502", "port: " + std::to_string(server.port()));
+  std::ofstream(folder / "gains.yaml")
+      << replaced(text_of(config + "gains/exponential.yaml"), "sample_rate_hz: 1000", "sample_rate_hz: 500");
+  const std::vector<std::string> command = {
+      UPRIGHT_BINARY, "run", "--rig", folder / "rig.yaml", "--gains", folder / "gains.yaml",
+      "--duration",   "3",   "--out", folder / "run",      "--json"};
+  Process client(command);
+  const std::string said = client.rest();
+  EXPECT_EQ(client.wait(), 0) << said;
+  server.end();
+  double lifted_s = 0.0, on_s = 0.0, on_until_s = 0.0;
+  for (const TraceRow& row : server.trace()) {
+    if (lifted_s == 0.0 && std::abs(row.theta_rad) < 0.1) lifted_s = row.time_s;
+    if (row.voltage_v != 0.0 && on_s == 0.0) on_s = row.time_s;
+    if (row.voltage_v != 0.0) on_until_s = row.time_s;
+  }
+  ASSERT_GT(lifted_s, 0.0);
+  EXPECT_GT(on_s, lifted_s + 0.45) << "it is held for half a second before the motor comes on";
+  EXPECT_GT(on_until_s - on_s, 2.7) << "and then balanced";
+}
+
+TEST(RunFromHanging, GivesUpAfterTheWaitAndSaysThatItFell) {
+  const Folder folder;
+  const std::string rig = text_of(config + "rigs/modbus-tcp.yaml");
+  VirtualRigProcess server(folder, rig, false, {"--theta0-deg", "180"});
+  std::ofstream(folder / "rig.yaml") << replaced(rig, "port: 1502", "port: " + std::to_string(server.port()));
+  std::ofstream(folder / "gains.yaml")
+      << replaced(text_of(config + "gains/exponential.yaml"), "sample_rate_hz: 1000", "sample_rate_hz: 500");
+  for (const char* wait_s : {"0", "0.7"}) {
+    Process client({UPRIGHT_BINARY, "run", "--rig", folder / "rig.yaml", "--gains", folder / "gains.yaml",
+                    "--duration", "3", "--wait", wait_s, "--out", folder / "run", "--json"});
+    const std::string said = client.rest();
+    EXPECT_EQ(client.wait(), 3);
+    EXPECT_NE(said.find("\"reason\": \"fell\""), std::string::npos) << said;
+    EXPECT_NE(said.find("\"rows_written\": 1"), std::string::npos) << said;
+  }
+  server.end();
+  for (const TraceRow& row : server.trace()) EXPECT_EQ(row.voltage_v, 0.0);
+}
+
+struct Started {
+  Folder folder;
+  std::unique_ptr<VirtualRigProcess> server;
+  std::vector<std::string> command;
+};
+
+/// A virtual rig over TCP, and the command that runs on it, into the folder "run".
+std::unique_ptr<Started> start_rig() {
+  auto started = std::make_unique<Started>();
+  const std::string rig = text_of(config + "rigs/modbus-tcp.yaml");
+  started->server = std::make_unique<VirtualRigProcess>(started->folder, rig, false);
+  const std::filesystem::path rig_file = started->folder / "rig.yaml", gains = started->folder / "gains.yaml";
+  std::ofstream(rig_file) << replaced(rig, "port: 1502", "port: " + std::to_string(started->server->port()));
+  std::ofstream(gains) << replaced(text_of(config + "gains/exponential.yaml"), "sample_rate_hz: 1000",
+                                   "sample_rate_hz: 500");
+  started->command = {UPRIGHT_BINARY, "run",        "--rig", rig_file, "--gains",
+                      gains,          "--duration", "60",    "--out",  started->folder / "run"};
+  return started;
+}
+
+std::filesystem::path only_entry(const std::filesystem::path& folder) {
+  std::filesystem::path found;
+  for (const auto& entry : std::filesystem::directory_iterator(folder)) found = entry.path();
+  return found;
+}
+
+/// Waits until the run has written its first rows: the motor is on.
+void wait_for_rows(const std::filesystem::path& runs) {
+  for (int i = 0; i < 2000; ++i) {
+    std::error_code none_yet;
+    if (std::filesystem::exists(runs, none_yet)) {
+      const std::filesystem::path run = only_entry(runs);
+      const auto size = std::filesystem::file_size(run / "samples.csv", none_yet);
+      if (!none_yet && size > 300) return;
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  }
+  ADD_FAILURE() << "the run does not begin";
+}
+
+/// The plant knows when the first voltage came, which is when the log's time begins, and the test knows when
+/// it killed: no row between them that is older than a tenth of a second may be missing.
+TEST(KilledRun, KeepsEveryRowOlderThanATenthOfASecondAndItsReport) {
+  std::mt19937 random(std::random_device{}());
+  std::uniform_real_distribution<double> moment_s(0.0, 1.0);
+  for (int attempt = 0; attempt < 8; ++attempt) {
+    const auto started = start_rig();
+    Process client(started->command);
+    const double alive_s = moment_s(random);
+    SCOPED_TRACE("killed " + std::to_string(alive_s) + " s after its first rows");
+    wait_for_rows(started->folder / "run");
+    std::this_thread::sleep_for(std::chrono::duration<double>(alive_s));
+    timespec now{};
+    clock_gettime(CLOCK_MONOTONIC, &now);
+    client.end(SIGKILL);
+    const double killed_s = static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+    std::this_thread::sleep_for(std::chrono::milliseconds(200));
+    started->server->end();
+    double let_go_s = 0.0, on_until_s = 0.0;
+    for (const TraceRow& row : started->server->trace()) {
+      if (row.voltage_v == 0.0) continue;
+      if (let_go_s == 0.0) let_go_s = row.time_s;
+      on_until_s = row.time_s;
+    }
+    ASSERT_GT(let_go_s, 0.0);
+    EXPECT_LT(on_until_s - killed_s, watchdog_s + scheduling_margin_s) << "the device's watchdog";
+    const std::filesystem::path run = only_entry(started->folder / "run");
+    std::string samples = text_of(run / "samples.csv");
+    samples.resize(samples.rfind('\n') + 1);
+    const std::vector<Row> rows = rows_of(samples);
+    ASSERT_FALSE(rows.empty());
+    constexpr double period_s = 0.002, may_be_missing_s = 0.1;
+    EXPECT_GT(rows.back().time_s + 2 * period_s, killed_s - let_go_s - may_be_missing_s);
+    for (const char* verb : {"report", "replay"}) {
+      Process reader({UPRIGHT_BINARY, verb, run});
+      const std::string said = reader.rest();
+      EXPECT_EQ(reader.wait(), 0) << said;
+    }
+    EXPECT_TRUE(std::filesystem::exists(run / "report.html"));
+  }
+}
+
+TEST(Signalled, IsAtZeroVoltsWithinAPeriodWithACompleteRunDirectory) {
+  for (const int signal_number : {SIGINT, SIGTERM}) {
+    const auto started = start_rig();
+    Process client(started->command);
+    wait_for_rows(started->folder / "run");
+    std::this_thread::sleep_for(std::chrono::milliseconds(200));
+    timespec now{};
+    clock_gettime(CLOCK_MONOTONIC, &now);
+    EXPECT_EQ(client.end(signal_number), 3);
+    const double signalled_s = static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+    started->server->end();
+    double on_until_s = 0.0;
+    for (const TraceRow& row : started->server->trace())
+      if (row.voltage_v != 0.0) on_until_s = row.time_s;
+    ASSERT_GT(on_until_s, 0.0) << "the motor was on";
+    // A period, the exchange that carries the zero volts, and what a busy machine adds.
+    constexpr double period_s = 0.002, busy_s = 0.015;
+    EXPECT_LT(on_until_s - signalled_s, period_s + busy_s);
+    const std::string yaml = text_of(only_entry(started->folder / "run") / "run.yaml");
+    EXPECT_NE(yaml.find("reason: signal"), std::string::npos) << yaml;
+  }
+}
+
+/// A file system of half a megabyte, in a mount name space of its own.
+void fill_the_disk(bool& too_busy) {
+  const auto started = start_rig();
+  const std::filesystem::path disk = started->folder / "run";
+  std::filesystem::create_directory(disk);
+  std::string command;
+  for (const std::string& word : started->command) command += "'" + word + "' ";
+  const std::string kept = started->folder / "kept";
+  const std::string script = "mount -t tmpfs -o size=500k none '" + disk.string() + "' || exit 77\n" +
+                             command + "--json 2>&1\nstatus=$?\ncp -r '" + disk.string() + "' '" + kept +
+                             "'\nexit $status\n";
+  std::vector<std::string> own_space = {"unshare", "--mount", "sh", "-c", script};
+  // A user name space would cost root its real-time scheduling, and get everybody else this far.
+  if (geteuid() != 0) own_space.insert(own_space.begin() + 1, "--map-root-user");
+  Process client(own_space);
+  const std::string said = client.rest();
+  const int status = client.wait();
+  started->server->end();
+  too_busy = said.find("\"reason\": \"overrun\"") != std::string::npos;
+  if (too_busy) return;
+  if (status != 3 && said.find("rows_written") == std::string::npos)
+    GTEST_SKIP() << "this machine gives no mount name space: " << said;
+  EXPECT_EQ(status, 3) << said;
+  EXPECT_NE(said.find("\"reason\": \"log_failed\""), std::string::npos) << said;
+  EXPECT_EQ(started->server->trace().back().voltage_v, 0.0);
+  const std::filesystem::path run = only_entry(kept);
+  const std::vector<Row> rows = rows_of(text_of(run / "samples.csv"));
+  EXPECT_GT(rows.size(), 1000u);
+  for (std::size_t i = 0; i < rows.size(); ++i) ASSERT_LE(i, rows[i].tick);
+  EXPECT_NE(text_of(run / "run.yaml").find("reason: log_failed"), std::string::npos) << said;
+  Process reader({UPRIGHT_BINARY, "report", run});
+  EXPECT_NE(reader.rest().find("report.html"), std::string::npos);
+  EXPECT_EQ(reader.wait(), 0);
+}
+
+TEST(FullDisk, StopsTheMotorAndKeepsTheRows) {
+  bool too_busy = true;  // a machine that stops a run before its disk is full
+  for (int attempt = 0; attempt < 5 && too_busy; ++attempt) fill_the_disk(too_busy);
+  if (too_busy) GTEST_SKIP() << "this machine is too busy to run until its disk is full";
+}
+
 INSTANTIATE_TEST_SUITE_P(
     Links, RunOverModbus,
-    testing::Values(Case{"tcp", false, {}}, Case{"rtu", true, {}},
-                    Case{"tcp_late", false, {"--inject-late-every", "300", "--inject-late-ms", "5"}},
-                    Case{"rtu_late", true, {"--inject-late-every", "300", "--inject-late-ms", "5"}},
-                    Case{"tcp_drop", false, {"--inject-drop-every", "300"}},
-                    Case{"rtu_drop", true, {"--inject-drop-every", "300"}},
-                    Case{"tcp_corrupt", false, {"--inject-corrupt-every", "300"}},
-                    Case{"rtu_corrupt", true, {"--inject-corrupt-every", "300"}},
-                    Case{"tcp_restart", false, {"--inject-restart-after", "2"}},
-                    Case{"rtu_restart", true, {"--inject-restart-after", "2"}}),
+    testing::Values(
+        Case{"tcp", false, End::balances, {}}, Case{"rtu", true, End::balances, {}},
+        Case{"tcp_late", false, End::any, {"--inject-late-every", "300", "--inject-late-ms", "5"}},
+        Case{"rtu_late", true, End::any, {"--inject-late-every", "300", "--inject-late-ms", "5"}},
+        Case{"tcp_drop", false, End::any, {"--inject-drop-every", "300"}},
+        Case{"rtu_drop", true, End::any, {"--inject-drop-every", "300"}},
+        Case{"tcp_corrupt", false, End::any, {"--inject-corrupt-every", "300"}},
+        Case{"rtu_corrupt", true, End::any, {"--inject-corrupt-every", "300"}},
+        Case{"tcp_restart", false, End::stops, {"--inject-restart-after", std::to_string(duration_s() / 2)}},
+        Case{"rtu_restart", true, End::stops, {"--inject-restart-after", std::to_string(duration_s() / 2)}},
+        // Nothing comes back any more: the motor may not go on with the last voltage.
+        Case{"tcp_silent", false, End::stops, {"--inject-drop-every", "1"}},
+        Case{"rtu_silent", true, End::stops, {"--inject-drop-every", "1"}},
+        Case{"tcp_always_late", false, End::stops, {"--inject-late-every", "1", "--inject-late-ms", "300"}},
+        Case{"rtu_always_late", true, End::stops, {"--inject-late-every", "1", "--inject-late-ms", "300"}},
+        Case{"rtu_all_corrupt", true, End::stops, {"--inject-corrupt-every", "1"}}),
     [](const auto& item) { return std::string(item.param.name); });
 
 }  // namespace

@@ -124,6 +124,30 @@ inline std::vector<TraceRow> read_trace(const std::filesystem::path& file) {
   return rows;
 }
 
+/// Where the cart was at any time from `from_s` to `to_s`: from the last line of the trace before to the
+/// first after it, for a busy machine leaves gaps between lines.
+struct CartRange {
+  double low_m = 1e9, high_m = -1e9;
+  bool holds(double cart_m) const {
+    constexpr double count_m = 5e-5;  // two of them
+    return cart_m >= low_m - count_m && cart_m <= high_m + count_m;
+  }
+};
+
+inline CartRange cart_between(const std::vector<TraceRow>& trace, double from_s, double to_s) {
+  const auto earlier = [](const TraceRow& row, double time_s) { return row.time_s < time_s; };
+  auto first = std::lower_bound(trace.begin(), trace.end(), from_s, earlier);
+  auto last = std::lower_bound(first, trace.end(), to_s, earlier);
+  if (first != trace.begin()) --first;
+  if (last != trace.end()) ++last;
+  CartRange range;
+  for (; first != last; ++first) {
+    range.low_m = std::min(range.low_m, first->cart_m);
+    range.high_m = std::max(range.high_m, first->cart_m);
+  }
+  return range;
+}
+
 /// `upright virtual-rig` on a free port or a new pseudo-terminal, with its trace.
 class VirtualRigProcess {
  public:

@@ -9,13 +9,21 @@
 #include <cstdlib>
 #include <filesystem>
 #include <functional>
+#include <future>
 #include <memory>
 #include <mutex>
 #include <new>
 #include <numbers>
+#include <string>
+#include <thread>
+#include <utility>
 #include <vector>
 
+#include "upright/control/predictor.hpp"
+#include "upright/hal/rig_factory.hpp"
 #include "upright/hal/simulated_rig.hpp"
+#include "upright/hal/virtual_rig.hpp"
+#include "upright/model/plant_file.hpp"
 #include "upright/runtime/control_loop.hpp"
 #include "upright/runtime/session.hpp"
 
@@ -110,21 +118,16 @@ class CountingRig final : public Rig {
   std::function<void()> extra_;
 };
 
-Counted count_in_loop(Clock& clock, double duration_s, const std::function<void()>& in_each_cycle) {
+/// Runs the loop on a rig that is not open yet.
+Counted count_on(Rig& plain, const RigFile& file, const ControlConfig& control, Clock& clock,
+                 double duration_s, const std::function<void()>& in_each_cycle) {
   std::string folder = (fs::temp_directory_path() / "upright-XXXXXX").string();
   ::mkdtemp(folder.data());
-  RigFile file = read_rig_file(UPRIGHT_SOURCE_DIR "/config/rigs/simulated.yaml");
-  file.simulated->plant = UPRIGHT_SOURCE_DIR "/config/plants/dynamic.yaml";
-  file.simulated->theta_noise_rad = 1e-4;
-  file.simulated->timing_jitter_s = 1e-5;
-  ControlConfig control = read_gain_file(UPRIGHT_SOURCE_DIR "/config/gains/exponential.yaml");
-  control.delay_s = 0.0035;
-  const auto plain = make_simulated_rig(file, clock, {1, 3.0 * std::numbers::pi / 180.0});
-  CountingRig rig(*plain, in_each_cycle);
+  CountingRig rig(plain, in_each_cycle);
   rig.open();
   Counted counted;
   {
-    Controller controller(control, file.amplifier.limit_v);
+    Controller controller(control, file.amplifier.limit_v, make_compensator(control));
     PoseScaler scaler(calibration_in_use(file));
     RunLog::Options options;
     options.queue_rows = 1024;
@@ -146,6 +149,22 @@ Counted count_in_loop(Clock& clock, double duration_s, const std::function<void(
   return counted;
 }
 
+ControlConfig gains(const std::string& name) {
+  return read_gain_file(UPRIGHT_SOURCE_DIR "/config/gains/" + name + ".yaml");
+}
+
+Counted count_in_loop(Clock& clock, double duration_s, const std::function<void()>& in_each_cycle,
+                      const std::string& gain_file = "exponential") {
+  RigFile file = read_rig_file(UPRIGHT_SOURCE_DIR "/config/rigs/simulated.yaml");
+  file.simulated->plant = UPRIGHT_SOURCE_DIR "/config/plants/dynamic.yaml";
+  file.simulated->theta_noise_rad = 1e-4;
+  file.simulated->timing_jitter_s = 1e-5;
+  ControlConfig control = gains(gain_file);
+  control.delay_s = 0.0035;
+  const auto rig = make_simulated_rig(file, clock, {1, 3.0 * std::numbers::pi / 180.0});
+  return count_on(*rig, file, control, clock, duration_s, in_each_cycle);
+}
+
 TEST(RealtimeSafety, TheLoopNeitherAllocatesNorLocksInVirtualTime) {
   VirtualClock clock;
   const Counted counted = count_in_loop(clock, 20.0, [] {});
@@ -156,6 +175,45 @@ TEST(RealtimeSafety, TheLoopNeitherAllocatesNorLocksInVirtualTime) {
 TEST(RealtimeSafety, TheLoopNeitherAllocatesNorLocksInRealTime) {
   MonotonicClock clock;
   const Counted counted = count_in_loop(clock, 1.0, [] {});
+  EXPECT_EQ(counted.allocations, 0);
+  EXPECT_EQ(counted.locks, 0);
+}
+
+TEST(RealtimeSafety, ThePredictorNeitherAllocatesNorLocks) {
+  VirtualClock virtual_clock;
+  MonotonicClock real_clock;
+  for (const auto& [clock, duration_s] :
+       {std::pair<Clock*, double>{&virtual_clock, 20.0}, {&real_clock, 1.0}}) {
+    const Counted counted = count_in_loop(
+        *clock, duration_s, [] {}, "compensated");
+    EXPECT_EQ(counted.allocations, 0);
+    EXPECT_EQ(counted.locks, 0);
+  }
+}
+
+TEST(RealtimeSafety, TheModbusRigNeitherAllocatesNorLocks) {
+  RigFile file = read_rig_file(UPRIGHT_SOURCE_DIR "/config/rigs/modbus-tcp.yaml");
+  file.modbus->response_timeout_s = 0.004;
+  ControlConfig control = gains("exponential");
+  control.sample_rate_hz = 200;
+  VirtualRigOptions options;
+  options.tcp_host = "127.0.0.1";
+  options.theta0_rad = 0.02;
+  std::promise<std::string> listening;
+  options.listening = [&listening](const std::string& name) { listening.set_value(name); };
+  std::atomic<bool> stopped{false};
+  std::thread server([&] {
+    serve_virtual_rig(file, read_plant_file(UPRIGHT_SOURCE_DIR "/config/plants/exponential.yaml"), options,
+                      stopped);
+  });
+  const std::string name = listening.get_future().get();
+  RigFile client = file;
+  client.modbus->port = std::stoi(name.substr(name.rfind(':') + 1));
+  MonotonicClock clock;
+  const auto rig = make_rig(client, {control.period_s()});
+  const Counted counted = count_on(*rig, client, control, clock, 1.0, [] {});
+  stopped = true;
+  server.join();
   EXPECT_EQ(counted.allocations, 0);
   EXPECT_EQ(counted.locks, 0);
 }

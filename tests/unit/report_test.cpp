@@ -50,12 +50,13 @@ TEST(HtmlPage, TextNeverBecomesMarkupAnywhere) {
   page.facts({{hostile, hostile}});
   page.figure(hostile_plot(), hostile);
   page.folded(hostile, hostile);
+  page.preformatted(hostile);
   const std::string text = page.text();
   EXPECT_EQ(occurrences(text, "<script"), 0u);
-  // 15 texts on the page, the title twice, as they were given; 5 in the drawing.
+  // 16 texts on the page, the title twice, as they were given; 5 in the drawing.
   EXPECT_EQ(
       occurrences(text, "&lt;script&gt;alert(1)&lt;/script&gt; &amp; &quot;it&#39;s&quot; `date` $(date) %s"),
-      16u);
+      17u);
   EXPECT_EQ(
       occurrences(text, "&#x3c;script&#x3e;alert(1)&#x3c;/script&#x3e; &#x26; &#x22;it&#x27;s&#x22; `date`"),
       5u);

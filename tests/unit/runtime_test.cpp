@@ -161,6 +161,9 @@ TEST(RunLog, CountsWhatTheQueueCouldNotHold) {
   EXPECT_EQ(pushed + log.rows_dropped(), 5000u);
   EXPECT_GT(log.rows_dropped(), 0u);
   EXPECT_EQ(log.rows_written(), pushed);
+  EXPECT_TRUE(log.failed());
+  EXPECT_NE(log.failure().find(std::to_string(log.rows_dropped()) + " rows were lost"), std::string::npos)
+      << log.failure();
 }
 
 TEST(ReadSamples, LeavesOutALastLineThatWasCutAndWhatAPowerCutLeaves) {
@@ -473,6 +476,29 @@ TEST(Session, AFullDiskStopsTheMotorAndKeepsTheRows) {
   EXPECT_GT(run.record.samples.rows.size(), 1000u);
   EXPECT_TRUE(run.record.outcome.has_value());
   EXPECT_FALSE(replay(run.record).first_mismatch.has_value());
+}
+
+TEST(Session, ALogThatLosesRowsStopsTheMotorAndSaysSo) {
+  TemporaryFolder folder;
+  const RunSetup setup = setup_for(simulated_file(), 20.0);
+  MonotonicClock clock;
+  const auto plain = make_simulated_rig(setup.rig, clock, {setup.seed, setup.theta0_rad});
+  TamperedRig rig(*plain);
+  rig.open();
+  const SignalFlag signal{0};
+  SessionOptions options;
+  options.out = folder.path();
+  options.log_queue_rows = 2;  // the writer comes every 10 ms
+  const SessionResult result = run_session(setup, rig, clock, signal, std::move(options));
+  EXPECT_EQ(result.outcome.reason, StopReason::log_failed);
+  EXPECT_LT(result.outcome.time_s, 1.0);
+  EXPECT_TRUE(rig.stopped);
+  EXPECT_EQ(rig.last_v, 0.0);
+  EXPECT_GT(result.log.rows_dropped, 0u);
+  const RunRecord record = read_run(result.directory);
+  ASSERT_TRUE(record.outcome.has_value());
+  EXPECT_EQ(record.outcome->text("reason"), "log_failed");
+  EXPECT_NE(record.outcome->text("log_failure").find("rows were lost"), std::string::npos);
 }
 
 TEST(RunDirectory, NeverReusesAName) {

@@ -10,8 +10,11 @@
 #include <random>
 #include <sstream>
 
+#include "upright/analysis/delay_margin.hpp"
 #include "upright/model/error.hpp"
 #include "upright/model/plant_file.hpp"
+#include "upright/sim/closed_loop.hpp"
+#include "upright/sim/event_engine.hpp"
 #include "upright/sim/fast_loop.hpp"
 #include "upright/sim/lanes.hpp"
 
@@ -66,7 +69,7 @@ TEST(Lanes, FunctionsAreThoseOfTheLibrary) {
       for (std::size_t i = 0; i < lane_count; ++i) {
         EXPECT_NEAR(s[i], std::sin(x[i]), 1e-11);
         EXPECT_NEAR(c[i], std::cos(x[i]), 1e-11);
-        EXPECT_NEAR(e[i] / std::exp(x[i]), 1.0, 1e-12);
+        EXPECT_NEAR(e[i] / std::exp(x[i]), 1.0, 2e-12);
         EXPECT_NEAR(t[i], std::tanh(x[i]), 1e-12);
         EXPECT_NEAR(q[i] * x[i], 1.0, 1e-12);
       }
@@ -110,6 +113,139 @@ TEST(FastLoop, LeavesToTheEventEngineWhatItCannotDo) {
   plant.set("pivot_coulomb_friction", {0.001});
   setup.model = make_model<double>(plant);
   EXPECT_FALSE(lanes_can_run(setup));
+  for (const auto& [kind, values] :
+       {std::pair<const char*, std::vector<double>>{"bristle_friction", {1e5, 70.0}},
+        {"stribeck_friction", {0.43, 1e-4, 2.0}}}) {
+    plant = read_plant_file(source + "/config/plants/exponential.yaml");
+    plant.set(effect_number(kind), values);
+    setup.model = make_model<double>(plant);
+    EXPECT_FALSE(lanes_can_run(setup)) << kind;
+  }
+}
+
+LoopSetup continuous(const std::string& plant, double smoothing = 0.0) {
+  LoopSetup setup = sampled(plant, smoothing);
+  setup.sampled = false;
+  setup.duration_s = 1.8;
+  return setup;
+}
+
+/// The event engine with steps so short that it is the truth.
+LoopResult tight_run(const LoopSetup& setup, const LoopCase& start) {
+  const Gains& g = setup.control.gains;
+  EngineOptions options;
+  options.max_step_s = 5e-5;
+  options.fall_angle_rad = setup.fell_above_rad;
+  ContinuousLoop<EventEngine<double>> loop(setup.model,
+                                           {g.cart_position_v_per_m, g.pendulum_angle_v_per_rad,
+                                            g.cart_velocity_v_per_mps, g.pendulum_rate_v_per_radps},
+                                           start.delay_s, options);
+  PlantState<double> state;
+  state.theta_rad = start.theta0_rad;
+  loop.start(state);
+  MotionRange range(setup.window_begin_s());
+  for (int i = 1; i <= static_cast<int>(std::lround(setup.duration_s * 2000.0)); ++i) {
+    loop.advance_to(i * 5e-4);
+    range.take(loop.engine().time_s(), loop.engine().state().theta_rad, loop.engine().state().cart_m);
+    if (loop.engine().halted()) break;
+  }
+  LoopResult result;
+  if (loop.engine().halted()) result.fall_time_s = loop.engine().time_s();
+  range.into(result);
+  result.end = loop.engine().state();
+  return result;
+}
+
+void expect_continuous_lanes_hold(const LoopSetup& setup, double tolerance) {
+  ASSERT_TRUE(lanes_can_run(setup));
+  std::vector<LoopCase> cases;
+  for (const double delay : {0.0, 0.0005, 0.0072, 0.0117, 0.045})
+    for (const double theta0 : {0.003, 0.05, -0.08, 0.12}) cases.push_back({theta0, delay});
+  std::vector<LoopResult> lanes(cases.size());
+  run_on_lanes(setup, cases, lanes);  // more than there are lanes
+  int up = 0;
+  for (std::size_t i = 0; i < cases.size(); ++i) {
+    SCOPED_TRACE(std::to_string(cases[i].theta0_rad) + " rad, " + std::to_string(cases[i].delay_s) + " s");
+    const LoopResult truth = tight_run(setup, cases[i]);
+    ASSERT_EQ(lanes[i].fell(), truth.fell());
+    if (truth.fell()) {
+      EXPECT_NEAR(lanes[i].fall_time_s, truth.fall_time_s, 1e-5);
+      EXPECT_NEAR(lanes[i].cart_amplitude_m, truth.cart_amplitude_m, 1e-4 * truth.cart_amplitude_m);
+      continue;
+    }
+    ++up;
+    EXPECT_NEAR(lanes[i].end.theta_rad, truth.end.theta_rad, tolerance);
+    EXPECT_NEAR(lanes[i].end.cart_m, truth.end.cart_m, tolerance);
+    EXPECT_NEAR(lanes[i].theta_amplitude_rad, truth.theta_amplitude_rad,
+                1e-6 + 2e-3 * truth.theta_amplitude_rad);
+  }
+  EXPECT_GE(up, 8);
+}
+
+TEST(ContinuousLanes, HoldToTheTruthOnViscousFriction) {
+  expect_continuous_lanes_hold(continuous("viscous"), 1e-6);
+}
+TEST(ContinuousLanes, HoldToTheTruthOnSmoothFriction) {
+  expect_continuous_lanes_hold(continuous("exponential", 100.0), 1e-6);
+}
+TEST(ContinuousLanes, HoldToTheTruthOnStickSlip) {
+  expect_continuous_lanes_hold(continuous("exponential"), 1e-6);
+}
+TEST(ContinuousLanes, HoldToTheTruthOnBristles) {
+  expect_continuous_lanes_hold(continuous("dynamic"), 1e-6);
+}
+
+TEST(ContinuousLanes, HoldToTheTruthWithCornersInTheActuatorAndAnInputDelay) {
+  for (const char* name : {"exponential", "dynamic"}) {
+    Plant plant = read_plant_file(source + "/config/plants/" + name + ".yaml");
+    plant.set("voltage_saturation", {8.0});
+    plant.set("voltage_dead_zone", {0.1});
+    plant.set("input_delay", {0.003});
+    plant.set("cable_spring", {2.0, 0.02});
+    LoopSetup setup = continuous("exponential");
+    setup.model = make_model<double>(plant);
+    setup.duration_s = 0.9;
+    expect_continuous_lanes_hold(setup, 3e-6);  // growing motions make their errors grow too
+  }
+}
+
+TEST(ContinuousLanes, AResultDoesNotDependOnTheRunsBesideIt) {
+  for (const LoopSetup& setup : {continuous("exponential"), continuous("dynamic")}) {
+    std::vector<LoopCase> cases;
+    for (int i = 0; i < 40; ++i) cases.push_back({0.002 * (i + 1), 0.0009 * (i % 30)});
+    std::vector<LoopResult> together(cases.size()), alone(1);
+    run_on_lanes(setup, cases, together);
+    for (std::size_t i = 0; i < cases.size(); i += 7) {
+      run_on_lanes(setup, std::span(cases).subspan(i, 1), alone);
+      EXPECT_EQ(alone[0].end.theta_rad, together[i].end.theta_rad) << i;
+      EXPECT_EQ(alone[0].theta_amplitude_rad, together[i].theta_amplitude_rad) << i;
+    }
+  }
+}
+
+/// Small motions decay just below the delay that `upright margin` gives, and grow just above it.
+TEST(ContinuousLanes, LoseStabilityAtTheCriticalDelayOfTheMargin) {
+  const std::tuple<const char*, const char*, double> loops[] = {{"exponential", "exponential", 100.0},
+                                                                {"viscous", "exponential", 0.0},
+                                                                {"viscous", "viscous", 0.0},
+                                                                {"dynamic", "dynamic", 0.0}};
+  for (const auto& [plant, gains, smoothing] : loops) {
+    SCOPED_TRACE(std::string(plant) + " with gains " + gains);
+    LoopSetup setup = continuous(plant, smoothing);
+    setup.control.gains = read_gain_file(source + "/config/gains/" + gains + ".yaml").gains;
+    const double critical_s = continuous_margin(read_plant_file(source + "/config/plants/" + plant + ".yaml"),
+                                                setup.control.gains, 100.0)
+                                  .critical_delay_s;
+    // So small that tanh and the bristles are in their linear part.
+    const std::vector<LoopCase> cases = {{2e-5, 0.99 * critical_s}, {2e-5, 1.01 * critical_s}};
+    std::vector<LoopResult> early(2), late(2);
+    setup.duration_s = 15.0;
+    run_on_lanes(setup, cases, early);
+    setup.duration_s = 30.0;
+    run_on_lanes(setup, cases, late);
+    EXPECT_LT(late[0].theta_amplitude_rad, 0.9 * early[0].theta_amplitude_rad);
+    EXPECT_TRUE(late[1].fell() || late[1].theta_amplitude_rad > 1.1 * early[1].theta_amplitude_rad);
+  }
 }
 
 /// A folder that is gone afterwards.

@@ -36,20 +36,29 @@ struct CandidateScore {
   double evidence = 0.0;  ///< fall of minus twice the log likelihood, training runs
 };
 
+/// One effect fitted in one round of the search, and why it was taken or not.
+struct Trial {
+  std::size_t round = 0;
+  std::size_t effect = 0;
+  double evidence = 0.0;   ///< fall of minus twice the log likelihood, training runs
+  double held = 0.0;       ///< the same on held-out runs
+  double t_value = 0.0;    ///< of the fall per quarter of a second
+  double certainty = 0.0;  ///< standard errors of its size from nothing
+  Noise noise;             ///< as estimated with it
+  std::vector<ParameterEstimate> parameters;
+  bool taken = false;
+};
+
 /// Residual force and torque along a run, smoothed, with what they are seen against. For the report.
 struct ResidualTrace {
   std::size_t run = 0;
   std::vector<double> time_s, force_n, torque_nm, cart_m, cart_mps, voltage_v;
 };
 
-struct StructureTest {
-  bool structured = false;
-  std::string description;  ///< a sentence: what the remaining residual looks like
-};
-
 struct NextExperiment {
   std::string name;
   std::string description;
+  std::string file;       ///< of the experiment, for `upright experiment`
   double distance = 0.0;  ///< smallest separation of the surviving explanations [noise standard deviations]
 };
 
@@ -58,6 +67,7 @@ struct Diagnosis {
   double gap_before = 0.0, gap_after = 0.0;
   std::vector<FoundEffect> effects;        ///< in the order found
   std::vector<CandidateScore> candidates;  ///< of the first round, best first
+  std::vector<Trial> trials;               ///< every whole fit of the search, in order
   std::optional<NextExperiment> next_experiment;
   Plant model;  ///< the plant with the effects added
   Noise noise;

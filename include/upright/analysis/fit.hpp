@@ -11,6 +11,7 @@
 
 #include <Eigen/Dense>
 #include <cstddef>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -54,6 +55,9 @@ std::vector<Segment> cut_segments(const std::vector<Measurement>& runs, double l
 std::vector<PlantState<double>> guess_starts(const std::vector<Measurement>& runs,
                                              const std::vector<Segment>& segments, const Plant& plant);
 
+/// Moves starts with the sensors, where one plant shows the same motion otherwise than another.
+void follow_sensors(std::vector<PlantState<double>>& starts, const Plant& from, const Plant& to);
+
 /// One sample of a followed segment, linearised along the filtered trajectory. State order: x, theta, v,
 /// omega, bristle.
 struct LinearStep {
@@ -63,6 +67,7 @@ struct LinearStep {
   double residual[2];                 ///< measured minus predicted from the samples before: cart, pendulum
   double update[2][states];           ///< Kalman gain of each channel, taken in turn
   double variance[2];                 ///< of each innovation
+  double weight[2];                   ///< how much of a measurement each is
   double gain[2];                     ///< d output / d state of the sensors
   double rate[2];                     ///< velocities, for jitter
   double period_s;
@@ -82,21 +87,23 @@ struct FitPoint {
 
 struct FitResult {
   FitPoint point;
-  double objective = 0.0;                    ///< minus twice the log of likelihood and priors
-  std::vector<double> segment_objective;     ///< the likelihood part, by segment
-  std::vector<double> segment_chi_square;    ///< sum of squared whitened residuals, by segment
-  std::vector<std::size_t> segment_samples;  ///< how many numbers that sums
-  Eigen::MatrixXd covariance;                ///< of the free parameters, robust to noise that is not white
-  Eigen::MatrixXd information;               ///< of the free parameters, initial states eliminated
+  double objective = 0.0;                  ///< minus twice the log of likelihood and priors
+  std::vector<double> segment_objective;   ///< the likelihood part, by segment
+  std::vector<double> block_objective;     ///< the same by blocks of a quarter of a second, in order
+  std::vector<double> segment_chi_square;  ///< sum of squared whitened residuals, by segment
+  std::vector<double> segment_samples;     ///< how many numbers that sums, by their weight
+  Eigen::MatrixXd covariance;              ///< of the free parameters, robust to noise that is not white
+  Eigen::MatrixXd information;             ///< of the free parameters, initial states eliminated
   bool converged = false;
 };
 
 struct FitOptions {
   int most_iterations = 12;
-  int noise_rounds = 2;      ///< how often the noise is estimated anew; 0: as given
-  bool noise_last = false;   ///< with no rounds: estimate the noise once, roughly, after the descent
-  bool starts_only = false;  ///< the plant is held: only initial states follow (held-out data)
-  double tolerance = 1e-4;   ///< relative fall of the objective per sample at which to stop
+  int noise_rounds = 2;           ///< how often the noise is estimated anew; 0: as given
+  std::optional<Noise> or_noise;  ///< another place from which to search for the noise, if it is the better
+  bool noise_last = false;        ///< with no rounds: estimate the noise once, roughly, after the descent
+  bool starts_only = false;       ///< the plant is held: only initial states follow (held-out data)
+  double tolerance = 1e-4;        ///< relative fall of the objective per sample at which to stop
 };
 
 /// Fits. A fit that fails returns an infinite objective; it does not throw.

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "upright/analysis/controllable_part.hpp"
+#include "upright/control/velocity_estimator.hpp"
 #include "upright/model/plant.hpp"
 
 namespace upright {
@@ -36,15 +37,16 @@ struct SampledDesign {
   GainDesign design;  ///< gains on the state at the time the voltage acts, as the predictor gives it
   int delay_periods = 0;
   double prediction_s = 0.0;  ///< how far the predictor looks ahead: loop delay and the plant's input delay
-  double delay_line_residual = 0.0;    ///< of the Riccati equation with the delay line as states
+  double delay_line_residual =
+      0.0;  ///< of the Riccati equation with delay line and velocity filter as states
   double delay_line_difference = 0.0;  ///< gains from that equation against `design.gains`, relative
 };
 
 /// The same cost for a loop that samples at `rate_hz`, holds its voltage, and acts `delay_s` late: a discrete
-/// equation with every voltage on its way as a state. Its optimum feeds back the predicted state (so the
-/// gains do not depend on the delay, and the poles are those without it); it needs `delay_compensation:
-/// {kind: predictor}`. Throws ConfigError.
+/// equation with every voltage on its way and the velocity estimator as states. Its optimum feeds back the
+/// predicted state and leaves the estimator alone (so the gains do not depend on the delay, and the poles are
+/// those without it); it needs `delay_compensation: {kind: predictor}`. Throws ConfigError.
 SampledDesign design_sampled_gains(const Plant& plant, const DesignWeights& weights, double smoothing,
-                                   double rate_hz, double delay_s);
+                                   double rate_hz, double delay_s, const EstimatorConfig& estimator = {});
 
 }  // namespace upright

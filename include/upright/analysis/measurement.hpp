@@ -18,7 +18,10 @@ struct Measurement {
   bool cart_locked = false;
   double cart_resolution_m = 0.0;     ///< 0: no steps are visible
   double theta_resolution_rad = 0.0;  ///< 0: no steps are visible
-  std::vector<std::string> notes;     ///< what was found and assumed while reading
+  /// How much of a measurement each sample is: quantised values that stay the same are not new each time.
+  /// Empty: all whole.
+  std::vector<double> cart_weight, theta_weight;
+  std::vector<std::string> notes;  ///< what was found and assumed while reading
 
   std::size_t size() const { return time_s.size(); }
   bool has_cart() const { return !cart_m.empty(); }
@@ -37,6 +40,11 @@ Measurement read_measurement(const std::filesystem::path& path);
 /// The step of quantised values: the largest number of which all differences are multiples; 0 when there is
 /// none.
 double find_resolution(const std::vector<double>& values);
+
+/// The weight of each sample of quantised values. The error of a quantised value is as good as new whenever
+/// the signal has crossed a step. While it dwells in one it stays: where the signal turns around, all samples
+/// of the dwell count as one; where it lingers, as many as it would have had at the speed before and after.
+std::vector<double> dwell_weights(const std::vector<double>& values);
 
 /// Standard deviation of white noise under a smooth signal, from fourth differences.
 double find_noise(const std::vector<double>& values);

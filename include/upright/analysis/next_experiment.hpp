@@ -1,5 +1,5 @@
-// The next safe run: of a library of experiments, the one that best tells the explanations apart that the
-// data leave open.
+// The next safe run: of the experiment files in config/experiments/diagnosis, the one that best tells the
+// explanations apart that the data leave open.
 #pragma once
 
 #include <optional>
@@ -7,8 +7,17 @@
 #include <vector>
 
 #include "upright/analysis/diagnosis.hpp"
+#include "upright/runtime/experiment_file.hpp"
 
 namespace upright {
+
+/// The library: the files of config/experiments/diagnosis, carried by the program, each with its path in the
+/// repository.
+struct LibraryExperiment {
+  std::string file;
+  Experiment experiment;
+};
+std::vector<LibraryExperiment> experiment_library();
 
 /// `chosen` is the plant that was found, `rivals` those that explain the data as well, each with the effect
 /// it has instead.

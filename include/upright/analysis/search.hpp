@@ -19,13 +19,12 @@ struct Hypothesis {
   bool valid = false;               ///< fitted, and no parameter at a bound that makes it another effect
 };
 
-/// How much better one hypothesis is than another, robust to residuals that are not white: sums over
-/// segments.
+/// How much better one hypothesis is than another, robust to residuals that are not white: sums over blocks
+/// of a quarter of a second.
 struct Improvement {
   double train = 0.0;    ///< fall of the objective on training data
   double held = 0.0;     ///< on held-out data
-  double t_value = 0.0;  ///< of the mean fall per segment, training and held-out together
-  double held_t = 0.0;
+  double t_value = 0.0;  ///< of the mean fall per quarter of a second, training and held-out together
 };
 
 Improvement compare(const Hypothesis& simpler, const Hypothesis& richer);
@@ -54,6 +53,11 @@ class Search {
   /// `settled`: within what is believed of it.
   Hypothesis only(const std::vector<std::size_t>& effects, const Hypothesis& from, const Noise* fixed_noise,
                   bool settled = false);
+  /// The same point with one effect more left open, with nothing believed of it and where it does nothing:
+  /// what the data then still say of the others.
+  Hypothesis opened(const Hypothesis& h, std::size_t effect) const;
+  /// The same effects fitted to all runs, held-out ones too: what is known once the choice is made.
+  Hypothesis on_all(const Hypothesis& h) const;
   /// Adds two effects at once to a hypothesis and fits to convergence.
   Hypothesis with_pair(const Hypothesis& base, const Hypothesis& first, const Hypothesis& second);
   void judge(Hypothesis& hypothesis, const Noise* noise = nullptr);

@@ -1,12 +1,12 @@
 // Is what is left noise, or something that is not in the model? Noise that no model needs to explain is the
-// same all along (stationary) and has nothing to do with the state. Two tests on held-in and held-out data
-// together:
-// - dispersion: the whitened innovations of short blocks are as large everywhere as chance allows, and the
-// residual force
-//   has no heavier tails than chance gives it;
-// - dependence: a ridge regression of the residual force and torque on velocity, its sign, position, voltage,
-// time and the
-//   time since the last reversals predicts nothing on segments it has not seen.
+// same all along and goes with nothing. The tests are on the innovations of the filter, which are white under
+// the right model in open and in closed loop alike (a residual force is not: the loop answers it, so that it
+// goes with the voltage whatever it is):
+// - dispersion: the whitened innovations of short blocks are as large everywhere as chance allows;
+// - tails: short pulses of force or torque, fitted block by block, have no heavier tails than a Gaussian;
+// - dependence: forces that no effect of the registry has (that drift with time, friction that changes with
+// time,
+//   what fades after a reversal) do not show.
 #pragma once
 
 #include <string>
@@ -17,17 +17,27 @@
 namespace upright {
 
 struct ResidualStructure {
-  double noise_ratio = 1.0;      ///< rms of a plain simulation's residual over the sensors' noise
-  double dispersion = 1.0;       ///< 95th percentile of block rms over its median
-  double force_tails = 3.0;      ///< kurtosis of the residual force while the cart moves
-  double force_explained = 0.0;  ///< cross-validated share of the residual force's variance
-  double torque_explained = 0.0;
-  std::string force_feature, torque_feature;  ///< what it goes with most
+  double noise_ratio = 1.0;  ///< rms of a plain simulation's residual over the sensors' noise
+  double excess = 1.0;       ///< the same over what noise like what is left would make of it
+  double dispersion = 1.0;   ///< 95th percentile of block rms over its median
+  double tails = 3.0;        ///< kurtosis of the pulses
+  double certainty = 0.0;    ///< of the dependence that shows most [standard errors]
+  std::string goes_with;     ///< that dependence
+  bool in_pendulum = false;  ///< it is a torque, not a force
   bool structured = false;
   std::string sentence;
 };
 
 /// Examines what a fit leaves at `point`.
 ResidualStructure examine_residuals(const FitData& data, const FitPoint& point);
+
+/// In which equation the residual is and what it goes with most: a ridge regression of the smoothed residual
+/// force and torque on velocity, direction, position, voltage, time, ..., judged on segments it has not seen.
+struct ResidualPlace {
+  bool in_pendulum = false;
+  double share = 0.0;  ///< of its variance that can be predicted
+  std::string goes_with;
+};
+ResidualPlace locate_residual(const FitData& data, const FitPoint& point);
 
 }  // namespace upright

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "upright/model/plant.hpp"
 #include "upright/sim/loop_run.hpp"
 
 namespace upright {
@@ -17,6 +18,8 @@ enum class SweepEngine : std::uint8_t { fast, reference };
 /// A sweep file (interface: "Sweep file") with the files it names read.
 struct SweepConfig {
   LoopSetup setup;
+  std::filesystem::path plant_file;
+  Plant plant;  ///< what `setup.model` was made of, for the linear margins
   SweepEngine engine = SweepEngine::fast;
   std::vector<double> theta0_rad;
   std::vector<double> delay_s;  ///< increasing
@@ -48,6 +51,16 @@ struct Transition {
   double falls_from_s = 0.0;
 };
 inline constexpr double transition_tolerance_s = 1e-4;
+
+/// A critical delay of the linear analysis, to be drawn beside what the runs did.
+struct LinearMargin {
+  std::string model;              ///< "near rest" (dry friction smoothed) or "sliding" (without dry friction)
+  double critical_delay_s = 0.0;  ///< 0: unstable without delay; infinite: stable under any
+  double crossing_radps = 0.0;
+};
+/// Of the sweep's own loop, continuous or sampled. None for a loop with a predictor: that has another gain at
+/// every delay.
+std::vector<LinearMargin> linear_margins(const SweepConfig& config);
 
 struct SweepOptions {
   unsigned threads = 0;  ///< 0: one per processor
@@ -88,9 +101,10 @@ std::size_t sweep_group_size(const SweepConfig& config);
 /// The transitions alone, by bisection over the list of delays, nothing written.
 std::vector<Transition> find_transitions(const SweepConfig& config, SweepTeam& team);
 
-/// Runs the sweep and writes `sweep.csv`, `transitions.csv` and `sweep.yaml` into `folder`. While it goes on,
-/// `sweep.partial` there keeps what is done; a later call with the same sweep goes on from it. Throws
-/// ConfigError where the folder holds results already (unless `overwrite`) or those of another sweep.
+/// Runs the sweep and writes `sweep.csv`, `transitions.csv`, `margins.csv` and `sweep.yaml` into `folder`.
+/// While it goes on, `sweep.partial` there keeps what is done; a later call with the same sweep goes on from
+/// it. Throws ConfigError where the gains hold the plant neither near rest nor sliding even without delay,
+/// where the folder holds results already (unless `overwrite`) or those of another sweep.
 SweepResult run_sweep(const SweepConfig& config, const std::filesystem::path& folder,
                       const SweepOptions& options, SweepTeam& team);
 

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <memory>
 
+#include "upright/control/command_source.hpp"
 #include "upright/control/delay_line.hpp"
 #include "upright/control/gain_file.hpp"
 #include "upright/control/limiter.hpp"
@@ -40,6 +41,8 @@ struct ControlOutput {
   double voltage_v = 0.0;  ///< after the limiter; zero when the request was not finite
   bool saturated = false;
   bool finite = true;
+  Demand demand;          ///< what was asked for
+  double lean_rad = 0.0;  ///< theta from the upright pose that is balanced about
 };
 
 class Controller {
@@ -48,6 +51,10 @@ class Controller {
   /// compensation other than none needs a `compensator`.
   Controller(const ControlConfig& config, double amplifier_limit_v,
              std::unique_ptr<DelayCompensator> compensator = nullptr);
+
+  /// From now on `source` says what to do; null: balance about zero. It must outlive the controller.
+  void follow(CommandSource* source) noexcept { source_ = source; }
+  bool is_scripted() const noexcept { return source_ != nullptr; }
 
   /// Forgets what came before: the next step begins from rest there.
   void reset() noexcept { started_ = false; }
@@ -65,6 +72,7 @@ class Controller {
 
  private:
   void begin(const ControlInput& input) noexcept;
+  double feedback(const Demand& demand) const noexcept;
   void advance(double cart_m, double theta_rad) noexcept;
 
   ControlConfig config_;
@@ -72,6 +80,7 @@ class Controller {
   VelocityEstimator cart_, pendulum_;
   DelayLine delay_;
   std::unique_ptr<DelayCompensator> compensator_;
+  CommandSource* source_ = nullptr;
   ControlState state_, acting_;
   std::uint64_t tick_ = 0;
   double voltage_v_ = 0.0;

@@ -39,6 +39,8 @@ struct VirtualRigOptions {
   bool pace = true;         ///< a pseudo-terminal takes as long as its baud rate says
   double theta0_rad = 0.0;
   double cart0_m = 0.0;
+  /// The pendulum hangs this long after the first request, until the operator lifts it to its initial pose.
+  double hang_s = 0.0;
   std::filesystem::path
       trace;  ///< CSV of the plant's side: monotonic_s,voltage_v,cart_m,theta_rad,held; empty: none
   double duration_s = 0.0;  ///< 0: until stopped

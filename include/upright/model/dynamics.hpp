@@ -306,6 +306,8 @@ class Dynamics {
         }
     });
     if (bristles_ && !slaved) rate += bristle_relaxation_radps(state);
+    if (cart_dry_ && model_.smoothing > 0.0 && std::abs(v) * model_.smoothing < 3.0)
+      rate += model_.smoothing * value_of(cart_dry_level(state.cart_m, S(0.0), S(1.0))) / mass;
     return rate;
   }
 

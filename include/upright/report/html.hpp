@@ -41,6 +41,8 @@ class HtmlPage {
   void figure(const Plot& plot, const std::string& caption);
   /// Two figures beside each other where the window is wide enough.
   void figures(const std::vector<Plot>& plots, const std::string& caption);
+  /// Text as it is, in a fixed pitch.
+  void preformatted(const std::string& text);
   /// Text as it is (a configuration file, say), folded away under its heading.
   void folded(const std::string& heading, const std::string& text);
 

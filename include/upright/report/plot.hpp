@@ -68,6 +68,9 @@ struct Plot {
 /// Throws Error when gnuplot is missing or fails, and when x and y of a series differ in length.
 std::string svg_of(const Plot& plot, const std::string& id);
 
+/// The same as a file of its own, which a browser shows and a Markdown page includes.
+std::string svg_file_of(const Plot& plot);
+
 /// Thins a line to at most about two points per column over `columns` columns; keeps each column's extremes.
 /// x must not decrease. Returned as indices into x and y. Values that are not finite are kept as gaps.
 std::vector<std::size_t> thinned(const std::vector<double>& x, const std::vector<double>& y,

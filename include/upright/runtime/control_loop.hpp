@@ -29,6 +29,7 @@ enum class StopReason : std::uint8_t {
   overrun,
   emergency_stop,
   log_failed,
+  not_ready,  ///< an experiment did not come to where it starts
 };
 
 /// "duration", "signal", "not_finite", ...
@@ -48,6 +49,7 @@ struct LoopLimits {
 struct LiveStatus {
   std::atomic<double> time_s{0.0}, cart_m{0.0}, theta_rad{0.0}, voltage_v{0.0}, worst_late_us{0.0};
   std::atomic<bool> running{false};
+  std::atomic<bool> balancing{false};  ///< the state feedback acts
 };
 
 struct LoopCounts {
@@ -62,6 +64,7 @@ struct LoopOutcome {
   StopReason reason = StopReason::duration;
   RigFault fault = RigFault::none;  ///< behind a stop by the rig or the link
   int signal = 0;
+  std::int64_t start_ns = 0;         ///< on the loop's clock: time zero of the samples
   std::uint64_t tick = 0;            ///< cycle in which the run ended
   std::uint64_t first_bad_tick = 0;  ///< of the trouble that ended it
   double time_s = 0.0;               ///< at the end
@@ -83,7 +86,7 @@ using SignalFlag = std::atomic<int>;
 /// log.
 class ControlLoop {
  public:
-  ControlLoop(Rig& rig, Clock& clock, Controller& controller, PoseScaler& scaler, RunLog& log,
+  ControlLoop(Rig& rig, Clock& clock, Controller& controller, PoseScaler& scaler, RowSink& log,
               const LoopLimits& limits, const SignalFlag& signal, LiveStatus& live);
 
   /// `outcome` is filled in while the loop runs.
@@ -102,7 +105,7 @@ class ControlLoop {
   Clock& clock_;
   Controller& controller_;
   PoseScaler& scaler_;
-  RunLog& log_;
+  RowSink& log_;
   LoopLimits limits_;
   const SignalFlag& signal_;
   LiveStatus& live_;
@@ -112,7 +115,7 @@ class ControlLoop {
   std::int64_t watchdog_ns_ = 0, last_fresh_ns_ = 0, last_write_ns_ = 0, read_done_ns_ = 0;
   std::uint64_t first_held_tick_ = 0, first_unwritten_tick_ = 0, first_late_tick_ = 0, periods_late_ = 0;
   RigFault last_fault_ = RigFault::none;
-  bool held_ = false, unwritten_ = false, begun_ = false, stopped_ = false;
+  bool held_ = false, unwritten_ = false, begun_ = false, stopped_ = false, over_ = false, scripted_ = false;
 };
 
 }  // namespace upright

@@ -18,6 +18,8 @@ inline constexpr std::uint32_t overrun_write = 1u << 6;
 inline constexpr std::uint32_t missed = 1u << 7;  ///< at least one period passed without a row before this
 inline constexpr std::uint32_t write_failed = 1u << 8;  ///< the voltage may not have arrived
 inline constexpr std::uint32_t stopped = 1u << 9;       ///< the safety stop's row: zero volts from here on
+/// Experiments only: the state feedback acts. Without it the voltage is the script's.
+inline constexpr std::uint32_t feedback = 1u << 10;
 inline constexpr std::uint32_t overrun = overrun_wake | overrun_read | overrun_compute | overrun_write;
 /// Rows with these did not go through the controller: the voltage was held.
 inline constexpr std::uint32_t held = stale | fault;

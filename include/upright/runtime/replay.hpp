@@ -23,7 +23,8 @@ struct ReplayResult {
 };
 
 /// Every voltage, requested and applied, must come out bit for bit. A `compensator` is needed when the run
-/// had one.
-ReplayResult replay(const RunRecord& run, std::unique_ptr<DelayCompensator> compensator = nullptr);
+/// had one, and so is a `source`.
+ReplayResult replay(const RunRecord& run, std::unique_ptr<DelayCompensator> compensator = nullptr,
+                    CommandSource* source = nullptr);
 
 }  // namespace upright

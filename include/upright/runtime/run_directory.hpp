@@ -27,6 +27,7 @@ struct RunSetup {
   std::optional<Plant> plant;
   LoopLimits limits;
   RealtimeGrant scheduling;
+  std::string experiment_text;  ///< the section `experiment` of run.yaml; empty: none
 };
 
 /// What the log made of the rows it was given.

@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include "upright/runtime/log_record.hpp"
 
@@ -19,9 +20,36 @@ inline constexpr std::size_t longest_row = 512;
 /// Writes a row as text that reads back to the same bits; returns its length (at most `longest_row`).
 std::size_t format_row(const LogRecord& record, char* out) noexcept;
 
+/// Where the loop's rows go.
+class RowSink {
+ public:
+  virtual ~RowSink() = default;
+  /// From the loop: false, and counted, when there is no room.
+  virtual bool push(const LogRecord& record) noexcept = 0;
+  /// From a loop in virtual time: waits for room, so that no row is dropped.
+  virtual void push_waiting(const LogRecord& record) noexcept = 0;
+  /// True once no further row will be kept.
+  virtual bool failed() const noexcept = 0;
+};
+
+/// Keeps rows in memory, for rehearsals in virtual time: it grows.
+class RowMemory final : public RowSink {
+ public:
+  bool push(const LogRecord& record) noexcept override {
+    rows_.push_back(record);
+    return true;
+  }
+  void push_waiting(const LogRecord& record) noexcept override { push(record); }
+  bool failed() const noexcept override { return false; }
+  std::vector<LogRecord> take() { return std::move(rows_); }
+
+ private:
+  std::vector<LogRecord> rows_;
+};
+
 /// Owns samples.csv. A row is in the kernel within about 20 ms of `push` and asked onto the disk every 50 ms,
 /// each by its own thread, so that a slow disk delays neither the loop nor the writing.
-class RunLog {
+class RunLog final : public RowSink {
  public:
   struct Options {
     std::size_t queue_rows = 16384;
@@ -31,16 +59,17 @@ class RunLog {
 
   /// Creates the file with its header line. Throws Error when that fails.
   RunLog(const std::filesystem::path& file, const Options& options);
-  ~RunLog();
+  ~RunLog() override;
   RunLog(const RunLog&) = delete;
   RunLog& operator=(const RunLog&) = delete;
 
-  /// From the loop: false, and counted, when the queue is full.
-  bool push(const LogRecord& record) noexcept;
+  /// From the loop: false, counted, and a failure of the log when the queue is full.
+  bool push(const LogRecord& record) noexcept override;
   /// From a loop in virtual time: waits for room, so that no row is dropped.
-  void push_waiting(const LogRecord& record) noexcept;
-  /// True once a write failed: no further row will arrive. `failure` says why.
-  bool failed() const noexcept { return error_.load(std::memory_order_relaxed) != 0; }
+  void push_waiting(const LogRecord& record) noexcept override;
+  /// True once rows are missing: a write failed, so that no further row will arrive, or the queue was full.
+  /// `failure` says why.
+  bool failed() const noexcept override { return cannot_write() || rows_dropped() != 0; }
 
   /// Writes what is queued, syncs and closes. Safe to call twice.
   void close() noexcept;
@@ -50,6 +79,7 @@ class RunLog {
   std::string failure() const;
 
  private:
+  bool cannot_write() const noexcept { return error_.load(std::memory_order_relaxed) != 0; }
   void write_loop() noexcept;
   void sync_loop() noexcept;
   /// Writes text that ends with a whole row; on failure cuts the file back to whole rows.

@@ -21,6 +21,8 @@ struct SessionOptions {
   std::filesystem::path out = "runs";  ///< the folder that run directories go to
   RealtimeRequest realtime;            ///< not asked for in virtual time
   std::unique_ptr<DelayCompensator> compensator;
+  std::size_t log_queue_rows = RunLog::Options{}.queue_rows;
+  CommandSource* source = nullptr;  ///< null: balance. It must outlive the session.
   /// Called about five times per second from the calling thread while the loop runs; may be empty.
   std::function<void(const LiveStatus&)> show;
 };

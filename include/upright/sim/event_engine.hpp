@@ -12,6 +12,7 @@
 
 #include "upright/model/dynamics.hpp"
 #include "upright/sim/contacts.hpp"
+#include "upright/sim/runge_kutta.hpp"
 
 namespace upright {
 
@@ -254,31 +255,6 @@ class EventEngine {
     return even_step(remaining, rate_step(rate));
   }
 
-  template <class T>
-  static PlantState<T> shifted(const PlantState<T>& s, const PlantState<T>& rate, const T& h) {
-    return {s.cart_m + h * rate.cart_m,
-            s.theta_rad + h * rate.theta_rad,
-            s.cart_mps + h * rate.cart_mps,
-            s.theta_radps + h * rate.theta_radps,
-            s.motor_v,
-            s.bristle_m + h * rate.bristle_m};
-  }
-
-  template <class T>
-  static PlantState<T> combined(const PlantState<T>& s, const PlantState<T>& k1, const PlantState<T>& k2,
-                                const PlantState<T>& k3, const PlantState<T>& k4, const T& h) {
-    const T sixth = h / T(6.0);
-    const auto mean = [](const T& a, const T& b, const T& c, const T& d) { return a + T(2.0) * (b + c) + d; };
-    PlantState<T> end;
-    end.cart_m = s.cart_m + sixth * mean(k1.cart_m, k2.cart_m, k3.cart_m, k4.cart_m);
-    end.theta_rad = s.theta_rad + sixth * mean(k1.theta_rad, k2.theta_rad, k3.theta_rad, k4.theta_rad);
-    end.cart_mps = s.cart_mps + sixth * mean(k1.cart_mps, k2.cart_mps, k3.cart_mps, k4.cart_mps);
-    end.theta_radps =
-        s.theta_radps + sixth * mean(k1.theta_radps, k2.theta_radps, k3.theta_radps, k4.theta_radps);
-    end.bristle_m = s.bristle_m + sixth * mean(k1.bristle_m, k2.bristle_m, k3.bristle_m, k4.bristle_m);
-    return end;
-  }
-
   /// The motor's lag over a step of length h from `motor_v`.
   template <class T>
   static LaggedMotor<T> lagged_motor(const Dynamics<T>& dynamics, const T& motor_v, const T& drive,
@@ -311,13 +287,12 @@ class EventEngine {
     const T& begin_v = lagged ? lagged->begin_v : drive;
     const T& middle_v = lagged ? lagged->middle_v : drive;
     const T& end_v = lagged ? lagged->end_v : drive;
-    const T half = T(0.5) * h;
+    const auto rate = [&](const PlantState<T>& at, Stage stage) {
+      return motion(dynamics, at, stage == Stage::middle ? middle_v : end_v);
+    };
     const PlantState<T> k1 = motion(dynamics, s, begin_v);
-    const PlantState<T> k2 = motion(dynamics, shifted(s, k1, half), middle_v);
-    const PlantState<T> k3 = motion(dynamics, shifted(s, k2, half), middle_v);
-    const PlantState<T> k4 = motion(dynamics, shifted(s, k3, h), end_v);
     if (first != nullptr) *first = {value_of(k1.cart_mps), value_of(k1.theta_radps)};
-    PlantState<T> end = combined(s, k1, k2, k3, k4, h);
+    PlantState<T> end = runge_kutta_4(rate, s, k1, h);
     end.motor_v = lagged ? lagged->after_v : drive;
     return end;
   }
@@ -344,20 +319,13 @@ class EventEngine {
 
   template <class Command>
   DrivenStep driven_rk4(const Command& command, bool lag, double h) const {
-    const double half = 0.5 * h;
-    const auto stage = [](const PlantState<double>& s, const PlantState<double>& rate, double t) {
-      PlantState<double> at = shifted(s, rate, t);
-      at.motor_v = s.motor_v + t * rate.motor_v;
-      return at;
+    const auto rate = [&](const PlantState<double>& at, Stage stage) {
+      return driven_rate(command, lag, time_s_ + (stage == Stage::middle ? 0.5 * h : h), at);
     };
     const PlantState<double> s = plain_state(state_);
-    const PlantState<double> k1 = driven_rate(command, lag, time_s_, s);
-    const PlantState<double> k2 = driven_rate(command, lag, time_s_ + half, stage(s, k1, half));
-    const PlantState<double> k3 = driven_rate(command, lag, time_s_ + half, stage(s, k2, half));
-    const PlantState<double> k4 = driven_rate(command, lag, time_s_ + h, stage(s, k3, h));
-    DrivenStep step{k1, combined(s, k1, k2, k3, k4, h)};
-    step.end.motor_v = lag ? s.motor_v + h / 6.0 * (k1.motor_v + 2.0 * (k2.motor_v + k3.motor_v) + k4.motor_v)
-                           : plain_.actuate(command(time_s_ + h, step.end));
+    DrivenStep step{driven_rate(command, lag, time_s_, s), {}};
+    step.end = runge_kutta_4<MotorVoltage::moves>(rate, s, step.first, h);
+    if (!lag) step.end.motor_v = plain_.actuate(command(time_s_ + h, step.end));
     if (slaved_) let_bristles_follow(plain_, step.end, step.end.motor_v);
     return step;
   }
@@ -434,7 +402,7 @@ class EventEngine {
       const double slope = indicator_slope(found);
       constexpr double flattest = 1e-9;  // a grazing event has no derivative; keep it finite
       const S shift = (S(value_of(g)) - g) / S(std::max(slope, flattest));
-      at = shifted(at, motion(dynamics_, at, at.motor_v), shift);
+      at = moved(at, motion(dynamics_, at, at.motor_v), shift);
       if (dynamics_.has_motor_lag())
         at.motor_v = at.motor_v + shift * (drive_ - at.motor_v) / dynamics_.motor_time_constant_s();
       taken = taken + shift;

@@ -1,0 +1,14 @@
+// How far a plain simulation of a right model would be from the measurement, for the noise alone.
+#pragma once
+
+#include "upright/analysis/fit.hpp"
+
+namespace upright {
+
+/// Root mean square of what disturbances and sensors make of a plain simulation with fitted initial states,
+/// in units of the sensors' noise: 1 without disturbances. `point` holds the plant, starts for the segments
+/// and the noise; disturbances are drawn from it (always the same ones) and carried along the linearised
+/// motion.
+double simulation_floor(const FitData& data, const FitPoint& point);
+
+}  // namespace upright

@@ -1,0 +1,419 @@
+#include "upright/analysis/identification.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <limits>
+
+#include "upright/analysis/candidates.hpp"
+#include "upright/model/error.hpp"
+
+namespace upright {
+
+namespace {
+
+/// Minus twice the log likelihood that a transition effect must save before it is part of the model.
+constexpr double least_evidence = 25.0;
+/// And its size, in standard errors.
+constexpr double least_certainty = 4.0;
+constexpr double most_samples = 120000.0;
+constexpr double trial_samples = 20000.0;
+
+constexpr std::string_view frictions[] = {"viscous_friction",
+                                          "coulomb_friction",
+                                          "friction_asymmetry",
+                                          "viscous_asymmetry",
+                                          "stribeck_friction",
+                                          "bristle_friction",
+                                          "quadratic_drag",
+                                          "constant_force",
+                                          "pivot_viscous_friction",
+                                          "pivot_coulomb_friction",
+                                          "position_dependent_friction",
+                                          "cart_mass",
+                                          "pendulum_length"};
+
+std::size_t number_of(std::string_view kind) {
+  return effect_number(kind);
+}
+
+std::string text(const char* format, double a, double b = 0.0) {
+  char buffer[160];
+  std::snprintf(buffer, sizeof buffer, format, a, b);
+  return buffer;
+}
+
+/// Segments in which something moves; those that rest say nothing more than that they rest.
+std::vector<Segment> moving_segments(const std::vector<Measurement>& runs) {
+  std::vector<Segment> kept;
+  for (const Segment& s : cut_segments(runs)) {
+    const Measurement& run = runs[s.run];
+    const auto range = [&](const std::vector<double>& values) {
+      const auto [low, high] = std::minmax_element(values.begin() + static_cast<std::ptrdiff_t>(s.first),
+                                                   values.begin() + static_cast<std::ptrdiff_t>(s.last) + 1);
+      return *high - *low;
+    };
+    const bool cart = run.has_cart() && range(run.cart_m) > 6.0 * std::max(run.cart_resolution_m, 1e-9);
+    const bool decay = run.cart_locked && run.has_theta();
+    if (cart || decay) kept.push_back(s);
+  }
+  return kept;
+}
+
+std::size_t samples_in(const std::vector<Segment>& segments) {
+  std::size_t count = 0;
+  for (const Segment& s : segments) count += s.last - s.first + 1;
+  return count;
+}
+
+/// Every n-th segment, so that about `most` samples are left and every run keeps its share.
+std::vector<Segment> thinned(const std::vector<Segment>& segments, double most) {
+  const double part = most / static_cast<double>(samples_in(segments));
+  if (part >= 1.0) return segments;
+  std::vector<Segment> kept;
+  double owed = 0.5;
+  for (const Segment& s : segments) {
+    owed += part;
+    if (owed < 1.0) continue;
+    owed -= 1.0;
+    kept.push_back(s);
+  }
+  return kept;
+}
+
+/// A model under way: the plant with its free effects, and the fit of it.
+struct Model {
+  Plant plant;
+  std::vector<std::size_t> free;
+  FitResult fit;
+};
+
+class Identifier {
+ public:
+  Identifier(const Plant& base, const std::vector<Measurement>& runs, const IdentificationOptions& options)
+      : base_(base), runs_(runs), options_(options), range_(range_of(runs, base)) {}
+
+  Identification run() {
+    result_.breakaways = find_breakaways(runs_, base_);
+    result_.steady_points = find_steady_points(runs_, base_);
+    result_.balance = balance_forces(runs_, base_);
+    const std::vector<Segment> segments = moving_segments(runs_);
+    if (segments.empty()) throw ConfigError("record runs in which the cart or the pendulum moves");
+    whole_ = {&runs_, thinned(segments, most_samples)};
+    trial_ = {&runs_, thinned(segments, trial_samples)};
+    tell(0.05, "balance of forces");
+    Model model = start();
+    model = fitted(model, trial_, 8, 1);
+    const bool transition = range_.cart_moves && starts_from_rest() && grow(model);
+    tell(0.6, "fitting everything");
+    model = fitted(model, whole_, 12, 2);
+    report(model);
+    if (!transition && result_.balance) prefer_balance();
+    return std::move(result_);
+  }
+
+ private:
+  void tell(double done, const std::string& what) const {
+    if (options_.progress) options_.progress(done, what);
+  }
+
+  /// The effects every cart has, from the readings.
+  Model start() const {
+    Model model;
+    model.plant = base_;
+    for (const std::string_view kind : frictions) model.plant.remove(number_of(kind));
+    const auto add = [&](std::string_view kind, std::vector<double> values) {
+      model.plant.set(number_of(kind), values);
+      model.free.push_back(number_of(kind));
+    };
+    if (range_.cart_moves) {
+      ForceBalance b;
+      if (result_.balance) {
+        b = *result_.balance;
+      } else {
+        b.mass_kg = base_.cart_mass_kg;
+        b.coulomb_n = 0.05 * range_.largest_force_n;
+      }
+      add("viscous_friction", {std::max(b.damping_n_per_mps - base_.motor.back_emf_n_per_mps, 1e-3)});
+      add("coulomb_friction", {std::max(b.coulomb_n, 1e-3 * range_.largest_force_n)});
+      add("constant_force", {b.constant_n});
+      add("cart_mass", {std::clamp(b.mass_kg / base_.cart_mass_kg, 0.35, 2.9)});
+    }
+    const bool decays =
+        std::any_of(runs_.begin(), runs_.end(), [](const Measurement& run) { return run.cart_locked; });
+    if (base_.pendulum && decays) {
+      add("pivot_viscous_friction", {1e-4});
+      add("pivot_coulomb_friction", {1e-4});
+      add("pendulum_length", {1.0});
+    }
+    return model;
+  }
+
+  std::vector<FreeParameter> parameters_of(const Model& model) const {
+    std::vector<FreeParameter> free;
+    for (const std::size_t effect : model.free)
+      for (FreeParameter p : free_parameters(effect, range_)) {
+        // Nothing is believed beforehand, except that a shape without data stays near 2.
+        if (p.prior_sigma > 0.0) p.prior_sigma *= 4.0;
+        free.push_back(p);
+      }
+    return free;
+  }
+
+  Model fitted(Model model, const FitData& data, int iterations, int noise_rounds) const {
+    FitPoint point;
+    point.plant = model.plant;
+    point.noise = model.fit.covariance.size() > 0 ? model.fit.point.noise : Noise{};
+    if (model.fit.covariance.size() == 0) point.noise.force = 0.01 * range_.largest_force_n;
+    point.starts = guess_starts(runs_, data.segments, model.plant);
+    FitOptions fit_options;
+    fit_options.most_iterations = iterations;
+    fit_options.noise_rounds = noise_rounds;
+    model.fit = fit(data, point, parameters_of(model), fit_options);
+    if (std::isfinite(model.fit.objective)) model.plant = model.fit.point.plant;
+    return model;
+  }
+
+  /// How friction changes between rest and sliding shows only where the cart rested and then went.
+  bool starts_from_rest() {
+    constexpr double rest_s = 0.1;
+    constexpr int fewest = 3;
+    int starts = 0;
+    for (const Measurement& run : runs_) {
+      if (!run.has_cart()) continue;
+      const double step = 1.5 * std::max(run.cart_resolution_m, 4.0 * run.cart_noise_m());
+      const auto rest = static_cast<std::size_t>(rest_s / run.median_period_s());
+      std::size_t since = 0;
+      for (std::size_t k = 1; k < run.size(); ++k) {
+        if (std::abs(run.cart_m[k] - run.cart_m[since]) <= step) continue;
+        if (k - since > rest) ++starts;
+        since = k;
+      }
+    }
+    if (starts < fewest)
+      result_.notes.push_back(
+          "the cart never goes from rest in these data: nothing is said of the Stribeck rise and of "
+          "bristles");
+    return starts >= fewest;
+  }
+
+  struct Addition {
+    std::string_view kind;
+    std::vector<double> values;
+  };
+
+  /// Adds effects from the best of several starts; keeps them when the data ask for them.
+  bool try_effects(Model& model, const Model& base, const std::vector<std::vector<Addition>>& starts) {
+    Model best = base;
+    double least = std::numeric_limits<double>::infinity();
+    for (const std::vector<Addition>& start : starts) {
+      Model richer = base;
+      for (const Addition& addition : start) {
+        richer.plant.set(number_of(addition.kind), addition.values);
+        richer.free.push_back(number_of(addition.kind));
+      }
+      richer = fitted(richer, trial_, 8, 1);
+      if (richer.fit.objective >= least) continue;
+      least = richer.fit.objective;
+      best = richer;
+    }
+    if (!std::isfinite(least)) return false;
+    best = fitted(best, trial_, 12, 2);
+    const double evidence = model.fit.objective - best.fit.objective;
+    bool sized = true;
+    std::string names;
+    for (const Addition& addition : starts.front()) {
+      names += (names.empty() ? "" : " and ") + std::string(addition.kind);
+      const std::size_t effect = number_of(addition.kind);
+      sized = sized && best.plant.find(effect)->values[0] > least_certainty * sigma_of(best, effect, 0);
+    }
+    const bool kept = evidence > least_evidence && sized;
+    result_.notes.push_back(names +
+                            text(": %.4g is what it saves of minus twice the log likelihood", evidence) +
+                            (kept    ? ""
+                             : sized ? ", too little to believe it"
+                                     : ", but its size is not certain"));
+    if (kept) model = best;
+    return kept;
+  }
+
+  /// True when the data show how friction changes between rest and sliding.
+  bool grow(Model& model) {
+    const Model plain = model;
+    const double sliding = model.plant.find("coulomb_friction")->values[0];
+    double breakaway = 0.0;
+    for (const Breakaway& b : result_.breakaways)
+      breakaway += std::abs(b.force_n) / static_cast<double>(result_.breakaways.size());
+    const double extra = std::max(breakaway - sliding, 0.3 * std::max(sliding, 0.03));
+    const double fast = range_.largest_speed_mps;
+    tell(0.15, "Stribeck rise");
+    bool found = try_effects(model, plain,
+                             {{{"stribeck_friction", {extra, 0.05 * fast, 1.5}}},
+                              {{"stribeck_friction", {extra, 0.15 * fast, 2.0}}},
+                              {{"stribeck_friction", {0.5 * extra, 0.3 * fast, 2.0}}}});
+    std::vector<std::vector<Addition>> bristles, both;
+    for (const double stiffness : {100.0, 1000.0, 10000.0}) {
+      const Addition bristle{"bristle_friction",
+                             {stiffness, std::sqrt(stiffness * model.plant.cart_mass_kg)}};
+      bristles.push_back({bristle});
+      both.push_back({{"stribeck_friction", {extra, 0.15 * fast, 2.0}}, bristle});
+    }
+    tell(0.3, "bristles");
+    found = try_effects(model, plain, bristles) || found;
+    // Each may hide behind the other: a rise that is seen through bristles, and bristles through a rise.
+    tell(0.45, "both");
+    return try_effects(model, plain, both) || found;
+  }
+
+  double sigma_of(const Model& model, std::size_t effect, std::size_t index) const {
+    const std::vector<FreeParameter> free = parameters_of(model);
+    for (std::size_t j = 0; j < free.size(); ++j)
+      if (free[j].effect == effect && free[j].index == index) {
+        const auto at = static_cast<Eigen::Index>(j);
+        return std::sqrt(std::max(model.fit.covariance(at, at), 0.0));
+      }
+    return 0.0;
+  }
+
+  void add(const std::string& name, std::string_view unit, double value, double sigma,
+           const std::string& source) {
+    IdentifiedParameter p;
+    p.name = name;
+    p.unit = unit;
+    p.value = value;
+    p.low = value - 1.96 * sigma;
+    p.high = value + 1.96 * sigma;
+    p.source = source;
+    p.goodness = value != 0.0 ? text("known to %.2g %%", 196.0 * sigma / std::abs(value)) : "";
+    result_.parameters.push_back(p);
+  }
+
+  static const char* source_of(std::string_view kind) {
+    if (kind == "viscous_friction") return "speeds at constant voltages; the back-EMF is the plant file's";
+    if (kind == "coulomb_friction") return "speeds at constant voltages, coasts";
+    if (kind == "stribeck_friction") return "breakaway from ramps, slow motion";
+    if (kind == "bristle_friction") return "transitions from rest";
+    if (kind == "constant_force") return "difference between the two directions";
+    return "decay of the pendulum";
+  }
+
+  void report(const Model& model) {
+    result_.plant = model.fit.point.plant;
+    result_.noise = model.fit.point.noise;
+    result_.rms = whitened_rms(model.fit);
+    for (const std::size_t effect : model.free) {
+      const EffectInfo& info = effect_registry()[effect];
+      if (info.enters == Enters::parameter) continue;
+      for (std::size_t i = 0; i < info.parameters.size(); ++i)
+        add(std::string(info.kind) + "." + std::string(info.parameters[i].name), info.parameters[i].unit,
+            result_.plant.find(effect)->values[i], sigma_of(model, effect, i), source_of(info.kind));
+    }
+    fold_scale(model, "cart_mass", "cart_mass_kg", base_.cart_mass_kg);
+    if (base_.pendulum)
+      fold_scale(model, "pendulum_length", "pendulum.length_to_com_m", base_.pendulum->length_to_com_m);
+    add_breakaway(model);
+    drop_zero(model, "constant_force");
+  }
+
+  /// Where friction is viscous and Coulomb only, the balance of forces is the better witness: what no model
+  /// explains (an asymmetry, a flexibility) stays in the force where it is and does not drift the simulation.
+  void prefer_balance() {
+    const ForceBalance& b = *result_.balance;
+    const auto take = [&](const char* name, double value, double sigma) {
+      for (IdentifiedParameter& p : result_.parameters) {
+        if (p.name != name) continue;
+        p.goodness = text("balance of forces, %.2g %% of the force is left; the fit of the whole says %.5g",
+                          100.0 * b.relative_error, p.value);
+        p.value = value;
+        p.low = value - 1.96 * sigma;
+        p.high = value + 1.96 * sigma;
+      }
+    };
+    const double viscous = b.damping_n_per_mps - base_.motor.back_emf_n_per_mps;
+    if (!(b.mass_kg > 0.0) || viscous < 0.0 || b.coulomb_n < 0.0) return;
+    take("cart_mass_kg", b.mass_kg, b.mass_sigma);
+    take("viscous_friction.coefficient_n_per_mps", viscous, b.damping_sigma);
+    take("coulomb_friction.force_n", b.coulomb_n, b.coulomb_sigma);
+    take("breakaway_n", b.coulomb_n, b.coulomb_sigma);
+    take("constant_force.force_n", b.constant_n, b.constant_sigma);
+    const double motor = base_.motor.force_per_volt_n * base_.cart_mass_kg / b.mass_kg;
+    take("force_per_volt_n_if_the_mass_is_known", motor, motor * b.mass_sigma / b.mass_kg);
+    result_.plant.cart_mass_kg = b.mass_kg;
+    result_.plant.set("viscous_friction", {viscous});
+    result_.plant.set("coulomb_friction", {b.coulomb_n});
+    if (std::abs(b.constant_n) > 1.96 * b.constant_sigma) result_.plant.set("constant_force", {b.constant_n});
+  }
+
+  /// A scale of the plant file's own number becomes the number.
+  void fold_scale(const Model& model, std::string_view kind, const char* name, double given) {
+    const std::size_t effect = number_of(kind);
+    const PlantEffect* scale = result_.plant.find(effect);
+    if (scale == nullptr) return;
+    const double value = scale->values[0], sigma = sigma_of(model, effect, 0);
+    const bool mass = kind == "cart_mass";
+    add(name, mass ? "kg" : "m", given * value, given * sigma,
+        mass ? "accelerations; the motor's force per volt is the plant file's" : "period of the decay");
+    if (mass) {
+      result_.plant.cart_mass_kg *= value;
+      // Forces are known up to one scale: believing the mass instead of the motor turns it round.
+      const double motor = base_.motor.force_per_volt_n / value;
+      add("force_per_volt_n_if_the_mass_is_known", "N/V", motor, motor * sigma / value,
+          "accelerations; every force scales with it");
+    } else {
+      Pendulum& pendulum = *result_.plant.pendulum;
+      pendulum.length_to_com_m *= value;
+      if (pendulum.given_inertia_kgm2) *pendulum.given_inertia_kgm2 *= value * value;
+    }
+    result_.plant.remove(effect);
+  }
+
+  /// What must be overcome at rest: Coulomb and Stribeck together.
+  void add_breakaway(const Model& model) {
+    const PlantEffect* coulomb = result_.plant.find("coulomb_friction");
+    const PlantEffect* stribeck = result_.plant.find("stribeck_friction");
+    if (coulomb == nullptr) return;
+    double value = coulomb->values[0];
+    double variance = std::pow(sigma_of(model, coulomb->number, 0), 2);
+    if (stribeck != nullptr) {
+      value += stribeck->values[0];
+      variance += std::pow(sigma_of(model, stribeck->number, 0), 2);
+      const std::vector<FreeParameter> free = parameters_of(model);
+      for (std::size_t i = 0; i < free.size(); ++i)
+        for (std::size_t j = 0; j < free.size(); ++j)
+          if (free[i].effect == coulomb->number && free[j].effect == stribeck->number && free[j].index == 0)
+            variance +=
+                2.0 * model.fit.covariance(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j));
+    }
+    double read = 0.0;
+    for (const Breakaway& b : result_.breakaways)
+      read += std::abs(b.force_n) / static_cast<double>(result_.breakaways.size());
+    add("breakaway_n", "N", value, std::sqrt(std::max(variance, 0.0)), "breakaway from ramps");
+    if (!result_.breakaways.empty())
+      result_.parameters.back().goodness +=
+          text("; %.0f ramps read %.4g N", static_cast<double>(result_.breakaways.size()), read);
+  }
+
+  /// A bias whose interval holds zero is not in the plant.
+  void drop_zero(const Model& model, std::string_view kind) {
+    const std::size_t effect = number_of(kind);
+    const PlantEffect* have = result_.plant.find(effect);
+    if (have != nullptr && std::abs(have->values[0]) < 1.96 * sigma_of(model, effect, 0))
+      result_.plant.remove(effect);
+  }
+
+  Plant base_;
+  const std::vector<Measurement>& runs_;
+  const IdentificationOptions& options_;
+  DataRange range_;
+  FitData whole_, trial_;
+  Identification result_;
+};
+
+}  // namespace
+
+Identification identify(const Plant& base, const std::vector<Measurement>& runs,
+                        const IdentificationOptions& options) {
+  return Identifier(base, runs, options).run();
+}
+
+}  // namespace upright

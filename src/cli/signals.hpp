@@ -1,0 +1,19 @@
+// What commands that drive a rig share: signals that end a run at zero volts, and how the command was typed.
+#pragma once
+
+#include <string>
+
+#include "upright/hal/rig_file.hpp"
+#include "upright/runtime/control_loop.hpp"
+
+namespace upright::cli {
+
+/// SIGINT, SIGTERM and SIGHUP from now on set the flag that is returned, and end nothing by themselves.
+const SignalFlag& catch_signals();
+
+/// The command as it was typed.
+std::string command_line();
+
+bool is_simulated(const RigFile& rig);
+
+}  // namespace upright::cli

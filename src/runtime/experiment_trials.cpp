@@ -1,0 +1,247 @@
+// Which run comes next, how a run went, and the record of both that survives an interruption.
+#include "experiment_trials.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <limits>
+#include <sstream>
+
+#include "upright/model/error.hpp"
+
+namespace upright {
+
+namespace {
+
+constexpr double not_a_number = std::numeric_limits<double>::quiet_NaN();
+
+int severity(const TrialResult& result) {
+  return result.outcome == "fell" ? 2 : result.outcome == "oscillating" ? 1 : 0;
+}
+
+bool same_delay(double a, double b) {
+  return std::abs(a - b) < 1e-12;
+}
+
+/// The results of one repeat of a sweep, by delay.
+std::vector<TrialResult> of_repeat(const std::vector<TrialResult>& done, std::size_t piece, int repeat) {
+  std::vector<TrialResult> results;
+  for (const TrialResult& r : done)
+    if (r.trial.piece == piece && r.trial.repeat == repeat) results.push_back(r);
+  std::sort(results.begin(), results.end(),
+            [](const TrialResult& a, const TrialResult& b) { return a.trial.delay_s < b.trial.delay_s; });
+  return results;
+}
+
+/// The next delay of the file's list: in order, up to the first fall.
+std::optional<double> next_listed(const Piece& piece, const std::vector<TrialResult>& results) {
+  for (const double delay : piece.delays_s) {
+    const auto at = std::find_if(results.begin(), results.end(),
+                                 [&](const TrialResult& r) { return same_delay(r.trial.delay_s, delay); });
+    if (at == results.end()) return delay;
+    if (severity(*at) == 2) return std::nullopt;
+  }
+  return std::nullopt;
+}
+
+/// The middle of the gap in which the outcome becomes `from` or worse, while it is wider than asked for.
+std::optional<double> next_bisected(const Piece& piece, const std::vector<TrialResult>& results, int from) {
+  if (piece.bisect_to_s <= 0.0) return std::nullopt;
+  for (std::size_t i = 0; i < results.size(); ++i) {
+    if (severity(results[i]) < from) continue;
+    if (i == 0) return std::nullopt;
+    const double low = results[i - 1].trial.delay_s, high = results[i].trial.delay_s;
+    if (high - low <= piece.bisect_to_s * (1.0 + 1e-9)) return std::nullopt;
+    return 0.5 * (low + high);
+  }
+  return std::nullopt;
+}
+
+std::optional<ExperimentTrial> next_of_sweep(std::size_t index, const Piece& piece,
+                                             const std::vector<TrialResult>& done) {
+  const auto over_repeats = [&](const auto& next) -> std::optional<ExperimentTrial> {
+    for (int repeat = 0; repeat < piece.repeats; ++repeat)
+      if (const auto delay = next(of_repeat(done, index, repeat)))
+        return ExperimentTrial{index, repeat, *delay};
+    return std::nullopt;
+  };
+  // All repeats of a delay before the next one.
+  std::optional<ExperimentTrial> first;
+  for (int repeat = 0; repeat < piece.repeats; ++repeat)
+    if (const auto delay = next_listed(piece, of_repeat(done, index, repeat));
+        delay && (!first || *delay < first->delay_s))
+      first = ExperimentTrial{index, repeat, *delay};
+  if (first) return first;
+  for (const int from : {1, 2})
+    if (const auto trial = over_repeats(
+            [&](const std::vector<TrialResult>& results) { return next_bisected(piece, results, from); }))
+      return trial;
+  return std::nullopt;
+}
+
+constexpr const char* journal_name = "trials.csv";
+constexpr const char* journal_columns =
+    "piece,label,repeat,delay_s,run_directory,reason,outcome,theta0_rad,theta_amplitude_rad,cart_amplitude_m,"
+    "fall_time_s";
+
+std::vector<std::string> cells_of(const std::string& line) {
+  std::vector<std::string> cells;
+  std::stringstream in(line);
+  for (std::string cell; std::getline(in, cell, ',');) cells.push_back(cell);
+  return cells;
+}
+
+void write_whole(const std::filesystem::path& file, const std::string& text) {
+  const std::filesystem::path partial = file.string() + ".partial";
+  std::ofstream out(partial, std::ios::binary);
+  out << text;
+  out.close();
+  std::error_code problem;
+  if (out) std::filesystem::rename(partial, file, problem);
+  if (!out || problem)
+    throw Error(ExitCode::stopped, "free space where the experiment goes: cannot write " + file.string());
+}
+
+/// The shortest delay of one repeat whose outcome is `from` or worse; not a number where there is none.
+double first_delay(const std::vector<TrialResult>& results, int from) {
+  for (const TrialResult& r : results)
+    if (severity(r) >= from) return r.trial.delay_s;
+  return not_a_number;
+}
+
+}  // namespace
+
+std::optional<ExperimentTrial> next_trial(const std::vector<Piece>& pieces,
+                                          const std::vector<TrialResult>& done) {
+  for (std::size_t i = 0; i < pieces.size(); ++i) {
+    if (pieces[i].kind == PieceKind::delay_sweep) {
+      if (const auto trial = next_of_sweep(i, pieces[i], done)) return trial;
+      continue;
+    }
+    const bool is_done =
+        std::any_of(done.begin(), done.end(), [&](const TrialResult& r) { return r.trial.piece == i; });
+    if (!is_done) return ExperimentTrial{i, 0, pieces[i].delay_s};
+  }
+  return std::nullopt;
+}
+
+TrialResult judge_trial(const ExperimentTrial& trial, const Piece& piece, const std::vector<LogRecord>& rows,
+                        StopReason reason) {
+  TrialResult result;
+  result.trial = trial;
+  result.reason = name_of(reason);
+  result.outcome = "done";
+  result.fall_time_s = not_a_number;
+  const auto balanced = [](const LogRecord& row) { return (row.flags & row_flag::feedback) != 0; };
+  const auto first = std::find_if(rows.begin(), rows.end(), balanced);
+  if (!balances(piece) || first == rows.end()) return result;
+  auto last = first;
+  for (auto at = first; at != rows.end(); ++at)
+    if (balanced(*at)) last = at;
+  const double turn = 2.0 * 3.14159265358979323846;
+  const double upright = turn * std::round(first->theta_rad / turn);
+  result.theta0_rad = first->theta_rad - upright;
+  const bool fell = reason == StopReason::fell || reason == StopReason::track_limit;
+  // After a fall the extremes, otherwise half the width over the last third.
+  const std::int64_t from_ns = fell ? first->time_ns : last->time_ns - (last->time_ns - first->time_ns) / 3;
+  double theta_low = 1e9, theta_high = -1e9, cart_low = 1e9, cart_high = -1e9;
+  for (auto at = first; at <= last; ++at) {
+    if (at->time_ns < from_ns) continue;
+    theta_low = std::min(theta_low, at->theta_rad - upright);
+    theta_high = std::max(theta_high, at->theta_rad - upright);
+    cart_low = std::min(cart_low, at->cart_m);
+    cart_high = std::max(cart_high, at->cart_m);
+  }
+  result.theta_amplitude_rad = fell ? std::max(-theta_low, theta_high) : 0.5 * (theta_high - theta_low);
+  result.cart_amplitude_m = fell ? std::max(-cart_low, cart_high) : 0.5 * (cart_high - cart_low);
+  if (fell) result.fall_time_s = static_cast<double>(last->time_ns - first->time_ns) / 1e9;
+  if (piece.kind == PieceKind::delay_sweep)
+    result.outcome = fell                                                  ? "fell"
+                     : result.theta_amplitude_rad < piece.stable_below_rad ? "stable"
+                                                                           : "oscillating";
+  return result;
+}
+
+std::string experiment_record(const ExperimentSetup& setup, const std::vector<Piece>& pieces) {
+  std::string text =
+      "# The experiment as it is run; trials.csv says how far it is.\nname: " + setup.experiment.name +
+      "\nrig: " + std::filesystem::absolute(setup.rig.file).string() + "\npieces:\n";
+  for (const Piece& piece : pieces) text += "  - " + piece_text(piece) + "\n";
+  return text;
+}
+
+std::vector<TrialResult> read_trials(const std::filesystem::path& folder, const ExperimentSetup& setup,
+                                     const std::vector<Piece>& pieces) {
+  std::ifstream record(folder / "experiment.yaml", std::ios::binary);
+  if (!record) return {};
+  std::stringstream text;
+  text << record.rdbuf();
+  if (text.str() != experiment_record(setup, pieces))
+    throw ConfigError("choose another folder with --out: " + folder.string() +
+                      " holds another experiment, or another rig's");
+  return read_trials(folder);
+}
+
+std::vector<TrialResult> read_trials(const std::filesystem::path& folder) {
+  std::vector<TrialResult> results;
+  std::ifstream in(folder / journal_name, std::ios::binary);
+  std::string line;
+  std::getline(in, line);
+  while (std::getline(in, line)) {
+    const std::vector<std::string> cells = cells_of(line);
+    // A line that was being written when the power went has no end.
+    if (in.eof() || cells.size() != 11) break;
+    TrialResult r;
+    r.trial = {static_cast<std::size_t>(std::stoul(cells[0])), std::stoi(cells[2]), std::stod(cells[3])};
+    r.run_directory = cells[4];
+    r.reason = cells[5];
+    r.outcome = cells[6];
+    r.theta0_rad = std::stod(cells[7]);
+    r.theta_amplitude_rad = std::stod(cells[8]);
+    r.cart_amplitude_m = std::stod(cells[9]);
+    r.fall_time_s = std::stod(cells[10]);
+    results.push_back(std::move(r));
+  }
+  return results;
+}
+
+void write_sweep_tables(const std::filesystem::path& folder, const std::vector<Piece>& pieces,
+                        const std::vector<TrialResult>& results) {
+  const auto sweeps = std::count_if(pieces.begin(), pieces.end(),
+                                    [](const Piece& piece) { return piece.kind == PieceKind::delay_sweep; });
+  for (std::size_t i = 0; i < pieces.size(); ++i) {
+    if (pieces[i].kind != PieceKind::delay_sweep) continue;
+    std::string runs = "theta0_rad,delay_s,outcome,theta_amplitude_rad,cart_amplitude_m,fall_time_s\n";
+    std::string transitions = "theta0_rad,oscillates_from_s,falls_from_s\n";
+    for (int repeat = 0; repeat < pieces[i].repeats; ++repeat) {
+      const std::vector<TrialResult> of_this = of_repeat(results, i, repeat);
+      if (of_this.empty()) continue;
+      double theta0 = 0.0;
+      for (const TrialResult& r : of_this) {
+        runs += exact_text(r.theta0_rad) + "," + exact_text(r.trial.delay_s) + "," + r.outcome + "," +
+                exact_text(r.theta_amplitude_rad) + "," + exact_text(r.cart_amplitude_m) + "," +
+                exact_text(r.fall_time_s) + "\n";
+        theta0 += std::abs(r.theta0_rad) / static_cast<double>(of_this.size());
+      }
+      transitions += exact_text(theta0) + "," + exact_text(first_delay(of_this, 1)) + "," +
+                     exact_text(first_delay(of_this, 2)) + "\n";
+    }
+    const std::string before = sweeps > 1 ? pieces[i].label + "-" : "";
+    write_whole(folder / (before + "sweep.csv"), runs);
+    write_whole(folder / (before + "transitions.csv"), transitions);
+  }
+}
+
+void write_trials(const std::filesystem::path& folder, const std::vector<Piece>& pieces,
+                  const std::vector<TrialResult>& results) {
+  std::string text = std::string(journal_columns) + "\n";
+  for (const TrialResult& r : results)
+    text += std::to_string(r.trial.piece) + "," + pieces[r.trial.piece].label + "," +
+            std::to_string(r.trial.repeat) + "," + exact_text(r.trial.delay_s) + "," + r.run_directory + "," +
+            r.reason + "," + r.outcome + "," + exact_text(r.theta0_rad) + "," +
+            exact_text(r.theta_amplitude_rad) + "," + exact_text(r.cart_amplitude_m) + "," +
+            exact_text(r.fall_time_s) + "\n";
+  write_whole(folder / journal_name, text);
+}
+
+}  // namespace upright

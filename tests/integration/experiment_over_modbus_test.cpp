@@ -1,0 +1,77 @@
+// `upright experiment` over a real link against the virtual rig: refused without a sign check, which is done
+// once, notices a wrong sign, and opens the way to the others.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "virtual_rig_process.hpp"
+
+namespace upright::test {
+namespace {
+
+const std::string config = UPRIGHT_SOURCE_DIR "/config/";
+
+struct Said {
+  int exit_code = -1;
+  std::string out;
+};
+
+class ExperimentOverModbus : public ::testing::Test {
+ protected:
+  ExperimentOverModbus()
+      : rig_text_(text_of(config + "rigs/modbus-tcp.yaml")),
+        server_(folder_, rig_text_, false, {"--theta0-deg", "180"}) {
+    rig_text_ = replaced(rig_text_, "port: 1502", "port: " + std::to_string(server_.port()));
+    std::ofstream(folder_ / "rig.yaml") << rig_text_;
+  }
+
+  Said experiment(const std::string& file, const std::string& rig, const std::string& out) {
+    Process client({UPRIGHT_BINARY, "experiment", file, "--rig", folder_ / rig, "--rate", "500", "--out",
+                    folder_ / out});
+    Said said;
+    said.out = client.rest();
+    said.exit_code = client.wait();
+    return said;
+  }
+  std::string ramp() {
+    const std::string file = folder_ / "ramp.yaml";
+    std::ofstream(file) << "experiment:\n  name: ramp\n  why: a test\n  plant: " << config
+                        << "plants/exponential.yaml\n  travel_m: 0.3\n  voltage_limit_v: 10\n"
+                        << "  pieces:\n    - {kind: ramp, rate_v_per_s: 0.4}\n";
+    return file;
+  }
+
+  Folder folder_;
+  std::string rig_text_;
+  VirtualRigProcess server_;
+};
+
+TEST_F(ExperimentOverModbus, AsksForASignCheckOnceAndThenRuns) {
+  EXPECT_EQ(experiment(ramp(), "rig.yaml", "out").exit_code, 2);
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "out"));
+  const Said check = experiment(config + "experiments/sign-check.yaml", "rig.yaml", "signs");
+  EXPECT_EQ(check.exit_code, 0) << check.out;
+  EXPECT_NE(check.out.find("signs agree"), std::string::npos);
+  EXPECT_TRUE(std::filesystem::exists(folder_ / "rig.yaml.signs"));
+  const Said ramps = experiment(ramp(), "rig.yaml", "out");
+  EXPECT_EQ(ramps.exit_code, 0) << ramps.out;
+  double farthest = 0.0;
+  for (const TraceRow& row : server_.trace()) farthest = std::max(farthest, std::abs(row.cart_m));
+  EXPECT_LT(farthest, 0.3);
+  // A sign that was turned after the check is a rig that nobody checked.
+  std::ofstream(folder_ / "rig.yaml") << replaced(rig_text_, "sign: 1", "sign: -1");
+  EXPECT_EQ(experiment(ramp(), "rig.yaml", "out2").exit_code, 2);
+}
+
+TEST_F(ExperimentOverModbus, ASignCheckNoticesAWrongSign) {
+  std::ofstream(folder_ / "wrong.yaml")
+      << replaced(rig_text_, "pendulum: {counts_per_revolution: 4096, sign: 1",
+                  "pendulum: {counts_per_revolution: 4096, sign: -1");
+  const Said check = experiment(config + "experiments/sign-check.yaml", "wrong.yaml", "signs");
+  EXPECT_EQ(check.exit_code, 3) << check.out;
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "wrong.yaml.signs"));
+}
+
+}  // namespace
+}  // namespace upright::test

@@ -1,0 +1,112 @@
+// Simulation of measured segments, and the rig that makes blind data: both against each other, since one
+// follows the event engine and the other the CVODE reference.
+#include "upright/analysis/trace.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "blind_case.hpp"
+
+namespace upright {
+namespace {
+
+Plant rig_plant() {
+  Plant plant;
+  plant.cart_mass_kg = 0.8;
+  plant.pendulum = Pendulum{0.2, 0.3, {}};
+  plant.motor = {1.7, 7.7};
+  plant.set("viscous_friction", {3.0});
+  plant.set("coulomb_friction", {0.4});
+  plant.set("input_delay", {0.003});
+  return plant;
+}
+
+blind::Plan short_plan(blind::Experiment experiment) {
+  blind::Plan plan;
+  plan.experiment = experiment;
+  plan.rate_hz = 250.0;
+  plan.duration_s = 3.0;
+  plan.seed = 7;
+  return plan;
+}
+
+double rms_of_difference(const std::vector<double>& a, const std::vector<double>& b) {
+  double sum = 0.0;
+  for (std::size_t k = 0; k < a.size(); ++k) sum += (a[k] - b[k]) * (a[k] - b[k]);
+  return std::sqrt(sum / static_cast<double>(a.size()));
+}
+
+TEST(SimulateSegments, OfTheTruePlantLeavesTheEncodersSteps) {
+  const blind::Rig rig{.plant = rig_plant()};
+  for (const blind::Experiment experiment : {blind::Experiment::multisine, blind::Experiment::square}) {
+    const std::vector<Measurement> runs = {measure(rig, short_plan(experiment), "run")};
+    const auto traces = simulate_segments(rig.plant, runs, cut_segments(runs));
+    ASSERT_FALSE(traces.empty());
+    for (const SimulatedTrace& trace : traces) {
+      EXPECT_LT(rms_of_difference(trace.cart_m, trace.simulated_cart_m), 0.5 * rig.cart_step_m);
+      EXPECT_LT(rms_of_difference(trace.theta_rad, trace.simulated_theta_rad), 0.5 * rig.theta_step_rad);
+    }
+  }
+}
+
+TEST(SimulateSegments, OfAnotherPlantIsOff) {
+  const blind::Rig rig{.plant = rig_plant()};
+  const std::vector<Measurement> runs = {measure(rig, short_plan(blind::Experiment::square), "run")};
+  Plant other = rig.plant;
+  other.remove(effect_number("coulomb_friction"));
+  double largest = 0.0;
+  for (const SimulatedTrace& trace : simulate_segments(other, runs, cut_segments(runs)))
+    largest = std::max(largest, rms_of_difference(trace.cart_m, trace.simulated_cart_m));
+  EXPECT_GT(largest, 20.0 * rig.cart_step_m);
+}
+
+TEST(SimulateSegments, LeavesEmptyWhatIsNotMeasured) {
+  const blind::Rig rig{.plant = rig_plant()};
+  const std::vector<Measurement> runs = {measure(rig, short_plan(blind::Experiment::locked_swing), "run")};
+  for (const SimulatedTrace& trace : simulate_segments(rig.plant, runs, cut_segments(runs))) {
+    EXPECT_TRUE(trace.cart_m.empty());
+    EXPECT_TRUE(trace.simulated_cart_m.empty());
+    EXPECT_EQ(trace.theta_rad.size(), trace.time_s.size());
+  }
+}
+
+TEST(BlindRun, IsTheSameForTheSameSeed) {
+  const blind::Rig rig{.plant = rig_plant(), .disturbance_n = 0.05, .jitter_s = 1e-4};
+  const blind::Plan plan = short_plan(blind::Experiment::multisine);
+  const Measurement once = measure(rig, plan, "run"), again = measure(rig, plan, "run");
+  EXPECT_EQ(once.cart_m, again.cart_m);
+  EXPECT_EQ(once.voltage_v, again.voltage_v);
+}
+
+TEST(BlindRun, BacklashHidesHalfThePlayEitherWay) {
+  blind::Rig rig{.plant = rig_plant()};
+  rig.plant.remove(effect_number("coulomb_friction"));
+  blind::Plan plan = short_plan(blind::Experiment::multisine);
+  plan.centring_v_per_m = 0.0;  // so that what the encoder shows does not come back into the voltages
+  const Measurement plain = measure(rig, plan, "run");
+  rig.unknown = blind::Unknown::backlash;
+  rig.backlash_m = 2e-3;
+  const Measurement loose = measure(rig, plan, "run");
+  double largest = 0.0;
+  for (std::size_t k = 0; k < plain.size(); ++k)
+    largest = std::max(largest, std::abs(plain.cart_m[k] - loose.cart_m[k]));
+  EXPECT_NEAR(largest, 1e-3, 2.0 * rig.cart_step_m);
+}
+
+TEST(BlindCase, HidesWhatWasAskedForAndLeavesOutTheUnknownInTheTwin) {
+  for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+    const blind::Case blind =
+        blind::make_case({.hidden = {"gusts"}, .seed = seed, .runs = 1, .most_samples = 1500.0});
+    EXPECT_EQ(blind.rig.unknown, blind::Unknown::gusts);
+    const auto with = measure_all(blind), without = measure_all(blind, true);
+    EXPECT_NE(with[0].cart_m, without[0].cart_m);
+  }
+  const blind::Case hidden =
+      blind::make_case({.hidden = {"cable_spring"}, .seed = 4, .runs = 1, .most_samples = 1500.0});
+  EXPECT_EQ(hidden.believed.find("cable_spring"), nullptr);
+  EXPECT_NE(hidden.rig.plant.find("cable_spring"), nullptr);
+}
+
+}  // namespace
+}  // namespace upright
