@@ -6,6 +6,6 @@ cd "$(dirname "$0")/.."
 
 preset=${1:-release}
 shift || true
-scripts/install-deps.sh
+scripts/install-deps.sh --test
 scripts/build.sh "$preset"
 ctest --preset "$preset" "$@"

@@ -13,9 +13,11 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "commands.hpp"
+#include "live.hpp"
 #include "options.hpp"
 #include "signals.hpp"
 #include "upright/hal/rig_factory.hpp"
@@ -32,7 +34,7 @@ using Json = nlohmann::ordered_json;
 constexpr double degrees_per_rad = 180.0 / std::numbers::pi;
 
 struct Arguments {
-  std::string file, rig, plant, out;
+  std::string file, rig, plant, out, live_port;
   std::optional<double> rate_hz;
   std::optional<std::uint64_t> seed;
   int priority = RealtimeRequest{}.priority, cpu = RealtimeRequest{}.cpu;
@@ -133,7 +135,7 @@ Json json_of(const std::vector<PlanLine>& lines) {
 Json json_of(const ExperimentResult& result, const std::vector<Piece>& pieces, const fs::path& folder) {
   Json trials = Json::array();
   for (const TrialResult& r : result.trials) {
-    const bool up = std::isnan(r.fall_time_s);
+    const auto or_null = [](double value) { return std::isnan(value) ? Json(nullptr) : Json(value); };
     trials.push_back({{"piece", pieces[r.trial.piece].label},
                       {"repeat", r.trial.repeat},
                       {"delay_s", r.trial.delay_s},
@@ -143,7 +145,8 @@ Json json_of(const ExperimentResult& result, const std::vector<Piece>& pieces, c
                       {"theta0_rad", r.theta0_rad},
                       {"theta_amplitude_rad", r.theta_amplitude_rad},
                       {"cart_amplitude_m", r.cart_amplitude_m},
-                      {"fall_time_s", up ? Json(nullptr) : Json(r.fall_time_s)}});
+                      {"frequency_hz", or_null(r.frequency_hz)},
+                      {"fall_time_s", or_null(r.fall_time_s)}});
   }
   return {{"folder", folder.string()},
           {"complete", result.complete},
@@ -162,17 +165,24 @@ const char* lifting_words(const Piece& piece) {
   return "";
 }
 
-void announce(const Piece& piece, const ExperimentTrial& trial, bool simulated, bool ready, bool quiet) {
+/// The trial in a few words.
+std::string words_for(const Piece& piece, const ExperimentTrial& trial) {
+  if (piece.kind != PieceKind::delay_sweep) return piece.label;
+  char text[64];
+  std::snprintf(text, sizeof text, ": delay %.3f ms, repeat %d", trial.delay_s * 1e3, trial.repeat + 1);
+  return piece.label + text;
+}
+
+void announce(const Piece& piece, const ExperimentTrial& trial, bool simulated, bool ready, bool quiet,
+              LiveView* view) {
   std::FILE* out = quiet ? stderr : stdout;
-  if (piece.kind == PieceKind::delay_sweep)
-    std::fprintf(out, "%s: delay %.3f ms, repeat %d\n", piece.label.c_str(), trial.delay_s * 1e3,
-                 trial.repeat + 1);
-  else
-    std::fprintf(out, "%s\n", piece.label.c_str());
+  std::fprintf(out, "%s\n", words_for(piece, trial).c_str());
   std::fflush(out);
   if (simulated) return;
   if (const char* words = lifting_words(piece); *words != '\0') std::fprintf(stderr, "  %s\n", words);
   if (!needs_hands(piece) || ready) return;
+  if (view != nullptr)
+    view->say({LiveState::Kind::waiting, piece.operator_does + ", then press Enter in the terminal"});
   std::fprintf(stderr, "  %s, then press Enter: ", piece.operator_does.c_str());
   std::string line;
   if (!std::getline(std::cin, line))
@@ -185,6 +195,13 @@ void show_live(const LiveStatus& live, ScriptPhase phase) {
                live.voltage_v.load());
 }
 
+/// What the page says while a trial runs.
+LiveState state_of(const Piece& piece, const ExperimentTrial& trial, ScriptPhase phase, bool simulated) {
+  if (phase != ScriptPhase::waiting || simulated)
+    return {LiveState::Kind::running, words_for(piece, trial) + ": " + words_for(phase)};
+  return {LiveState::Kind::waiting, lifting_words(piece)};
+}
+
 /// A sign check's verdict: kept beside the rig file, or the end of the experiment.
 void judge_sign_check(const ExperimentSetup& setup, const fs::path& run, bool quiet) {
   const SignFinding finding =
@@ -194,6 +211,70 @@ void judge_sign_check(const ExperimentSetup& setup, const fs::path& run, bool qu
   if (is_simulated(setup.rig)) return;
   // The record is of the rig as its file has it, not of the limits of this experiment.
   write_sign_record(read_rig_file(setup.rig.file), finding.sentence);
+}
+
+/// The page that --live asks for.
+std::unique_ptr<LiveView> open_live(const Arguments& arguments, const ExperimentSetup& setup) {
+  LiveSubject subject;
+  subject.title = setup.experiment.name + " on " + setup.rig.file.filename().string();
+  subject.rig = &setup.rig;
+  subject.plant = &setup.plant;
+  subject.period_s = setup.control.period_s();
+  subject.realtime = {arguments.priority, arguments.cpu};
+  subject.fast = arguments.fast;
+  return open_live(arguments.live_port, subject, arguments.as_json ? stderr : stdout);
+}
+
+/// Runs the pieces that were planned.
+ExperimentResult perform(const Arguments& arguments, const ExperimentSetup& setup,
+                         const std::vector<Piece>& pieces, const fs::path& folder, const SignalFlag& signal,
+                         LiveView* view) {
+  const bool simulated = is_simulated(setup.rig);
+  MonotonicClock real_clock;
+  VirtualClock virtual_clock;
+  Clock& clock = arguments.fast ? static_cast<Clock&>(virtual_clock) : real_clock;
+  std::unique_ptr<SimulatedRigWithHand> hand;
+  std::unique_ptr<Rig> link;
+  if (simulated)
+    hand = make_simulated_rig(setup.rig, clock, {arguments.seed.value_or(1), {}});
+  else
+    link = make_rig(setup.rig, {setup.control.period_s()});
+  Rig& rig = simulated ? static_cast<Rig&>(*hand) : *link;
+
+  ExperimentOptions options;
+  options.folder = folder;
+  options.command = command_line();
+  options.seed = arguments.seed.value_or(1);
+  options.realtime = {arguments.priority, arguments.cpu};
+  options.watcher = view;
+  std::pair<Piece, ExperimentTrial> current;
+  const bool on_terminal = ::isatty(STDERR_FILENO) != 0 && !arguments.fast;
+  options.announce = [&](const Piece& piece, const ExperimentTrial& trial) {
+    current = {piece, trial};
+    announce(piece, trial, simulated, arguments.ready, arguments.as_json, view);
+  };
+  options.finished = [&](const TrialResult& r) {
+    if (on_terminal) std::fputs("\n", stderr);
+    if (pieces[r.trial.piece].kind == PieceKind::sign_check)
+      judge_sign_check(setup, options.folder / r.run_directory, arguments.as_json);
+    if (arguments.as_json || r.outcome == "done") return;
+    std::printf("  %s, angle +-%.3f deg, cart +-%.1f mm", r.outcome.c_str(),
+                r.theta_amplitude_rad * degrees_per_rad, r.cart_amplitude_m * 1e3);
+    if (std::isfinite(r.frequency_hz)) std::printf(", %.2f Hz", r.frequency_hz);
+    std::printf("\n");
+    std::fflush(stdout);
+  };
+  if (on_terminal || view != nullptr)
+    options.show = [&](const LiveStatus& live, ScriptPhase phase) {
+      if (on_terminal) show_live(live, phase);
+      if (view != nullptr) view->say(state_of(current.first, current.second, phase, simulated));
+    };
+  ExperimentResult result = run_experiment(setup, pieces, rig, hand.get(), clock, signal, options);
+  if (view != nullptr)
+    view->end({result.complete ? LiveState::Kind::completed : LiveState::Kind::stopped,
+               (result.complete ? "every piece is done" : result.sentence) + ". The runs are in " +
+                   folder.string()});
+  return result;
 }
 
 ExitCode run(const Arguments& arguments) {
@@ -217,42 +298,14 @@ ExitCode run(const Arguments& arguments) {
   refuse_unchecked_signs(setup, pieces);
   refuse_without_hands(setup, pieces, arguments.ready);
   const SignalFlag& signal = catch_signals();
-  MonotonicClock real_clock;
-  VirtualClock virtual_clock;
-  Clock& clock = arguments.fast ? static_cast<Clock&>(virtual_clock) : real_clock;
-  std::unique_ptr<SimulatedRigWithHand> hand;
-  std::unique_ptr<Rig> link;
-  if (simulated)
-    hand = make_simulated_rig(setup.rig, clock, {arguments.seed.value_or(1), {}});
-  else
-    link = make_rig(setup.rig, {setup.control.period_s()});
-  Rig& rig = simulated ? static_cast<Rig&>(*hand) : *link;
-
-  ExperimentOptions options;
-  options.folder = folder_of(arguments, setup, pieces);
-  options.command = command_line();
-  options.seed = arguments.seed.value_or(1);
-  options.realtime = {arguments.priority, arguments.cpu};
-  const bool on_terminal = ::isatty(STDERR_FILENO) != 0 && !arguments.fast;
-  options.announce = [&](const Piece& piece, const ExperimentTrial& trial) {
-    announce(piece, trial, simulated, arguments.ready, arguments.as_json);
-  };
-  options.finished = [&](const TrialResult& r) {
-    if (on_terminal) std::fputs("\n", stderr);
-    if (pieces[r.trial.piece].kind == PieceKind::sign_check)
-      judge_sign_check(setup, options.folder / r.run_directory, arguments.as_json);
-    if (arguments.as_json || r.outcome == "done") return;
-    std::printf("  %s, angle +-%.3f deg, cart +-%.1f mm\n", r.outcome.c_str(),
-                r.theta_amplitude_rad * degrees_per_rad, r.cart_amplitude_m * 1e3);
-    std::fflush(stdout);
-  };
-  if (on_terminal) options.show = show_live;
-  const ExperimentResult result = run_experiment(setup, pieces, rig, hand.get(), clock, signal, options);
+  const fs::path folder = folder_of(arguments, setup, pieces);
+  const std::unique_ptr<LiveView> view = open_live(arguments, setup);
+  const ExperimentResult result =
+      shown_by(view.get(), [&] { return perform(arguments, setup, pieces, folder, signal, view.get()); });
   if (arguments.as_json)
-    std::cout << json_of(result, pieces, options.folder).dump(2, ' ', false, Json::error_handler_t::replace)
-              << "\n";
+    std::cout << json_of(result, pieces, folder).dump(2, ' ', false, Json::error_handler_t::replace) << "\n";
   else
-    std::cout << options.folder.string() << std::endl;
+    std::cout << folder.string() << std::endl;
   if (result.complete) return ExitCode::done;
   std::cerr << "upright: " << result.sentence << "\n";
   return ExitCode::stopped;
@@ -281,6 +334,7 @@ void add_experiment(CLI::App& app, int& exit_code) {
   command->add_option("--priority", a->priority, "Real-time priority to ask for (80)")
       ->check(CLI::Range(1, 99));
   command->add_option("--cpu", a->cpu, "Processor to stay on (the last one)")->check(CLI::Range(0, 1023));
+  add_live(*command, a->live_port);
   command->add_flag("--json", a->as_json, "One JSON document");
   command->callback([a, &exit_code] { exit_code = static_cast<int>(run(*a)); });
 }

@@ -11,6 +11,7 @@
 #include <string>
 
 #include "commands.hpp"
+#include "live.hpp"
 #include "options.hpp"
 #include "signals.hpp"
 #include "upright/analysis/delay_margin.hpp"
@@ -29,7 +30,7 @@ namespace {
 constexpr double degrees_per_rad = 180.0 / std::numbers::pi;
 
 struct Arguments {
-  std::string rig, gains, plant, out = "runs", label = "run";
+  std::string rig, gains, plant, out = "runs", label = "run", live_port;
   std::optional<double> delay_s, theta0_deg;
   double duration_s = 10.0, wait_s = WaitOptions{}.patience_s;
   std::optional<std::uint64_t> seed;
@@ -133,11 +134,15 @@ void show_wait(const WaitStatus& wait, bool on_terminal, bool first) {
 
 /// On a real rig the operator lifts the pendulum first.
 void wait_for_operator(const Arguments& arguments, Rig& rig, Clock& clock, const RigFile& file,
-                       const SignalFlag& caught_signal, bool on_terminal) {
+                       const SignalFlag& caught_signal, bool on_terminal, LiveView* view) {
   if (is_simulated(file) || arguments.wait_s <= 0.0) return;
   bool asked = false;
   wait_upright(rig, clock, file, caught_signal, {arguments.wait_s, [&](const WaitStatus& wait) {
                                                    show_wait(wait, on_terminal, !asked);
+                                                   if (view != nullptr)
+                                                     view->show_waiting(
+                                                         "lift the pendulum upright and hold it still",
+                                                         arguments.wait_s - wait.left_s, wait.pose);
                                                    asked = true;
                                                  }});
   if (asked && on_terminal) std::fputs("\n", stderr);
@@ -235,13 +240,26 @@ void print_summary(const SessionResult& result, const LoopLimits& limits, bool f
   std::fflush(stdout);
 }
 
-ExitCode run(const Arguments& arguments) {
-  RunSetup setup = make_setup(arguments);
-  const std::optional<OverrunTolerance> tolerance = tolerance_of(arguments, setup);
-  if (tolerance) setup.limits.most_periods_late = periods_late(*tolerance, setup.control.period_s());
-  if (!arguments.as_json)
-    std::cout << delay_line(setup.control) << ".\n" << tolerance_line(tolerance, setup.limits) << std::endl;
-  const SignalFlag& caught_signal = catch_signals();
+/// The page that --live asks for.
+std::unique_ptr<LiveView> open_live(const Arguments& arguments, const RunSetup& setup) {
+  LiveSubject subject;
+  subject.title = setup.label + " on " + setup.rig.file.filename().string();
+  subject.rig = &setup.rig;
+  subject.plant = setup.plant ? &*setup.plant : nullptr;
+  subject.period_s = setup.control.period_s();
+  subject.realtime = {arguments.priority, arguments.cpu};
+  subject.fast = arguments.fast;
+  return open_live(arguments.live_port, subject, arguments.as_json ? stderr : stdout);
+}
+
+LiveState end_of(const SessionResult& result, const LoopLimits& limits) {
+  const bool completed = result.outcome.reason == StopReason::duration;
+  return {completed ? LiveState::Kind::completed : LiveState::Kind::stopped,
+          sentence_of(result.outcome, limits) + ". The run is in " + result.directory.string()};
+}
+
+SessionResult balance(const Arguments& arguments, RunSetup setup, const SignalFlag& caught_signal,
+                      LiveView* view) {
   MonotonicClock real_clock;
   VirtualClock virtual_clock;
   Clock& clock = arguments.fast ? static_cast<Clock&>(virtual_clock) : real_clock;
@@ -250,16 +268,33 @@ ExitCode run(const Arguments& arguments) {
   constexpr double patience_s = 2.0;
   find_zero(*rig, clock, setup.rig, patience_s);
   const bool on_terminal = ::isatty(STDERR_FILENO) != 0;
-  wait_for_operator(arguments, *rig, clock, setup.rig, caught_signal, on_terminal);
+  wait_for_operator(arguments, *rig, clock, setup.rig, caught_signal, on_terminal, view);
 
   SessionOptions options;
   options.out = arguments.out;
   options.realtime = {arguments.priority, arguments.cpu};
   options.compensator = make_compensator(setup.control);
+  options.watcher = view;
   if (on_terminal && !arguments.fast) options.show = show_live;
   const LoopLimits limits = setup.limits;
-  const SessionResult result = run_session(std::move(setup), *rig, clock, caught_signal, std::move(options));
+  if (view != nullptr) view->say({LiveState::Kind::running, "balancing"});
+  SessionResult result = run_session(std::move(setup), *rig, clock, caught_signal, std::move(options));
   if (on_terminal && !arguments.fast) std::fputs("\n", stderr);
+  if (view != nullptr) view->end(end_of(result, limits));
+  return result;
+}
+
+ExitCode run(const Arguments& arguments) {
+  RunSetup setup = make_setup(arguments);
+  const std::optional<OverrunTolerance> tolerance = tolerance_of(arguments, setup);
+  if (tolerance) setup.limits.most_periods_late = periods_late(*tolerance, setup.control.period_s());
+  if (!arguments.as_json)
+    std::cout << delay_line(setup.control) << ".\n" << tolerance_line(tolerance, setup.limits) << std::endl;
+  const LoopLimits limits = setup.limits;
+  const SignalFlag& caught_signal = catch_signals();
+  const std::unique_ptr<LiveView> view = open_live(arguments, setup);
+  const SessionResult result =
+      shown_by(view.get(), [&] { return balance(arguments, std::move(setup), caught_signal, view.get()); });
 
   if (arguments.as_json)
     std::cout << json_of(result, limits, tolerance).dump(2, ' ', false, Json::error_handler_t::replace)
@@ -305,6 +340,7 @@ void add_run(CLI::App& app, int& exit_code) {
   command->add_option("--priority", a->priority, "Real-time priority to ask for (80)")
       ->check(CLI::Range(1, 99));
   command->add_option("--cpu", a->cpu, "Processor to stay on (the last one)")->check(CLI::Range(0, 1023));
+  add_live(*command, a->live_port);
   command->add_flag("--json", a->as_json, "One JSON document");
   command->callback([a, &exit_code] { exit_code = static_cast<int>(run(*a)); });
 }

@@ -1,5 +1,6 @@
 #include "signals.hpp"
 
+#include <pthread.h>
 #include <signal.h>
 
 #include <algorithm>
@@ -13,13 +14,18 @@ namespace {
 SignalFlag caught_signal{0};
 static_assert(SignalFlag::is_always_lock_free);
 
+/// The first of several keeps its name.
 void note_signal(int number) {
-  caught_signal.store(number, std::memory_order_relaxed);
+  int nothing = 0;
+  caught_signal.compare_exchange_strong(nothing, number, std::memory_order_relaxed);
 }
+
+pthread_t main_thread;
 
 }  // namespace
 
 const SignalFlag& catch_signals() {
+  main_thread = pthread_self();
   struct sigaction action {};
   action.sa_handler = note_signal;
   for (const int number : {SIGINT, SIGTERM, SIGHUP}) sigaction(number, &action, nullptr);
@@ -27,6 +33,12 @@ const SignalFlag& catch_signals() {
   action.sa_handler = SIG_IGN;
   sigaction(SIGXFSZ, &action, nullptr);
   return caught_signal;
+}
+
+void press_stop_button() noexcept {
+  note_signal(stop_button_pressed);
+  // The main thread may wait for a key: a signal wakes it.
+  pthread_kill(main_thread, SIGINT);
 }
 
 std::string command_line() {

@@ -11,6 +11,10 @@ namespace upright::cli {
 /// SIGINT, SIGTERM and SIGHUP from now on set the flag that is returned, and end nothing by themselves.
 const SignalFlag& catch_signals();
 
+/// Ends a run as a signal does: what the live page's stop button calls, from any thread.
+/// Only after `catch_signals`.
+void press_stop_button() noexcept;
+
 /// The command as it was typed.
 std::string command_line();
 

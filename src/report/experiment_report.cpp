@@ -184,13 +184,15 @@ std::filesystem::path write_experiment_report(const std::filesystem::path& folde
       add_sweep(page, folder, record.pieces[i], trials);
   }
   page.section("Runs");
-  HtmlTable table{{"run directory", "delay [ms]", "outcome", "start [degree]", "angle [degree]", "cart [mm]"},
+  HtmlTable table{{"run directory", "delay [ms]", "outcome", "start [degree]", "angle [degree]", "cart [mm]",
+                   "frequency [Hz]"},
                   {},
                   "Each replays and has a report of its own."};
   for (const TrialResult& r : record.trials)
     table.rows.push_back(
         {r.run_directory, milliseconds(r.trial.delay_s), r.outcome, number_text(r.theta0_rad * per_degree, 3),
-         number_text(r.theta_amplitude_rad * per_degree, 3), number_text(1e3 * r.cart_amplitude_m, 3)});
+         number_text(r.theta_amplitude_rad * per_degree, 3), number_text(1e3 * r.cart_amplitude_m, 3),
+         std::isfinite(r.frequency_hz) ? number_text(r.frequency_hz, 3) : "-"});
   page.table(table);
   const std::filesystem::path file = folder / "report.html";
   page.write(file);

@@ -115,7 +115,9 @@ void add_series(const Plot& plot, Curves& curves) {
         how = "with steps" + line;
         break;
       case Series::Style::points:
-        how = "with points pt 7 ps 0.35 lc rgb '" + color + "'";
+        // Few points are seen one by one; many are a cloud.
+        how = std::string("with points pt 7 ps ") + (series.x.size() < 200 ? "0.8" : "0.35") + " lc rgb '" +
+              color + "'";
         break;
       case Series::Style::bars:
         how = "with boxes fs solid 1.0 noborder lc rgb '" + color + "'";

@@ -13,6 +13,8 @@ const char* name_of(StopReason reason) noexcept {
       return "duration";
     case StopReason::signal:
       return "signal";
+    case StopReason::stop_button:
+      return "stop_button";
     case StopReason::not_finite:
       return "not_finite";
     case StopReason::stale_encoder:
@@ -112,6 +114,8 @@ std::string sentence_of(const LoopOutcome& o, const LoopLimits& limits) {
               : o.signal == 15 ? "SIGTERM"
                                : "signal " + std::to_string(o.signal)) +
              when;
+    case StopReason::stop_button:
+      return "start again when ready: stopped from the live page" + when;
     case StopReason::not_finite:
       return "check the gains and the sensors: a value was not a finite number" + when;
     case StopReason::stale_encoder:
@@ -335,8 +339,9 @@ void ControlLoop::run(LoopOutcome& outcome) noexcept {
     clock_.sleep_until(phase_.due_ns(phase_.next_tick));
     const std::int64_t woke_ns = clock_.now_ns();
     if (const int signal = signal_.load(std::memory_order_relaxed); signal != 0) {
-      stop(outcome, StopReason::signal, phase_.next_tick);
-      outcome.signal = signal;
+      const bool button = signal == stop_button_pressed;
+      stop(outcome, button ? StopReason::stop_button : StopReason::signal, phase_.next_tick);
+      if (!button) outcome.signal = signal;
       break;
     }
     if (log_.failed()) {

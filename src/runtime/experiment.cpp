@@ -95,7 +95,7 @@ ExperimentResult run_experiment(const ExperimentSetup& setup, const std::vector<
     const Piece piece = piece_of(*trial, pieces);
     if (options.announce) options.announce(piece, *trial);
     if (signal.load() != 0) {
-      result.sentence = "start the same command again to go on: stopped by a signal";
+      result.sentence = "start the same command again to go on: it was stopped";
       return result;
     }
     // Hardware may have been switched off meanwhile; a simulated rig goes on from where it is.
@@ -121,6 +121,7 @@ ExperimentResult run_experiment(const ExperimentSetup& setup, const std::vector<
     session.realtime = options.realtime;
     session.compensator = make_compensator(run.control);
     session.source = &script;
+    session.watcher = options.watcher;
     if (options.show) session.show = [&](const LiveStatus& live) { options.show(live, script.phase()); };
     const LoopLimits limits = run.limits;
     const SessionResult done = run_session(std::move(run), rig, clock, signal, std::move(session));

@@ -82,7 +82,7 @@ std::optional<ExperimentTrial> next_of_sweep(std::size_t index, const Piece& pie
 constexpr const char* journal_name = "trials.csv";
 constexpr const char* journal_columns =
     "piece,label,repeat,delay_s,run_directory,reason,outcome,theta0_rad,theta_amplitude_rad,cart_amplitude_m,"
-    "fall_time_s";
+    "fall_time_s,frequency_hz";
 
 std::vector<std::string> cells_of(const std::string& line) {
   std::vector<std::string> cells;
@@ -100,6 +100,29 @@ void write_whole(const std::filesystem::path& file, const std::string& text) {
   if (out) std::filesystem::rename(partial, file, problem);
   if (!out || problem)
     throw Error(ExitCode::stopped, "free space where the experiment goes: cannot write " + file.string());
+}
+
+using RowIterator = std::vector<LogRecord>::const_iterator;
+
+/// Whole turns of the angle about its middle per second, from `from_ns` on. Where it crosses the middle
+/// counts once it has come a quarter of the amplitude beyond, so that encoders' steps do not. Not a number:
+/// less than one turn.
+double frequency_of(RowIterator first, RowIterator last, std::int64_t from_ns, double middle_rad,
+                    double amplitude_rad) {
+  const double beyond = 0.25 * amplitude_rad;
+  bool below = false;
+  int turns = -1;
+  std::int64_t begun_ns = 0, ended_ns = 0;
+  for (RowIterator at = first; at != last; ++at) {
+    if (at->time_ns < from_ns) continue;
+    const double lean = at->theta_rad - middle_rad;
+    if (lean < -beyond) below = true;
+    if (!below || lean < beyond) continue;
+    below = false;
+    if (++turns == 0) begun_ns = at->time_ns;
+    ended_ns = at->time_ns;
+  }
+  return turns > 0 ? turns / (static_cast<double>(ended_ns - begun_ns) * 1e-9) : not_a_number;
 }
 
 /// The shortest delay of one repeat whose outcome is `from` or worse; not a number where there is none.
@@ -131,7 +154,7 @@ TrialResult judge_trial(const ExperimentTrial& trial, const Piece& piece, const 
   result.trial = trial;
   result.reason = name_of(reason);
   result.outcome = "done";
-  result.fall_time_s = not_a_number;
+  result.fall_time_s = result.frequency_hz = not_a_number;
   const auto balanced = [](const LogRecord& row) { return (row.flags & row_flag::feedback) != 0; };
   const auto first = std::find_if(rows.begin(), rows.end(), balanced);
   if (!balances(piece) || first == rows.end()) return result;
@@ -159,6 +182,9 @@ TrialResult judge_trial(const ExperimentTrial& trial, const Piece& piece, const 
     result.outcome = fell                                                  ? "fell"
                      : result.theta_amplitude_rad < piece.stable_below_rad ? "stable"
                                                                            : "oscillating";
+  if (result.outcome == "oscillating")
+    result.frequency_hz = frequency_of(first, last + 1, from_ns, upright + 0.5 * (theta_low + theta_high),
+                                       result.theta_amplitude_rad);
   return result;
 }
 
@@ -190,7 +216,7 @@ std::vector<TrialResult> read_trials(const std::filesystem::path& folder) {
   while (std::getline(in, line)) {
     const std::vector<std::string> cells = cells_of(line);
     // A line that was being written when the power went has no end.
-    if (in.eof() || cells.size() != 11) break;
+    if (in.eof() || cells.size() != 12) break;
     TrialResult r;
     r.trial = {static_cast<std::size_t>(std::stoul(cells[0])), std::stoi(cells[2]), std::stod(cells[3])};
     r.run_directory = cells[4];
@@ -200,6 +226,7 @@ std::vector<TrialResult> read_trials(const std::filesystem::path& folder) {
     r.theta_amplitude_rad = std::stod(cells[8]);
     r.cart_amplitude_m = std::stod(cells[9]);
     r.fall_time_s = std::stod(cells[10]);
+    r.frequency_hz = std::stod(cells[11]);
     results.push_back(std::move(r));
   }
   return results;
@@ -240,7 +267,7 @@ void write_trials(const std::filesystem::path& folder, const std::vector<Piece>&
             std::to_string(r.trial.repeat) + "," + exact_text(r.trial.delay_s) + "," + r.run_directory + "," +
             r.reason + "," + r.outcome + "," + exact_text(r.theta0_rad) + "," +
             exact_text(r.theta_amplitude_rad) + "," + exact_text(r.cart_amplitude_m) + "," +
-            exact_text(r.fall_time_s) + "\n";
+            exact_text(r.fall_time_s) + "," + exact_text(r.frequency_hz) + "\n";
   write_whole(folder / journal_name, text);
 }
 

@@ -3,6 +3,8 @@
 #include <pthread.h>
 #include <sched.h>
 #include <sys/mman.h>
+#include <sys/resource.h>
+#include <unistd.h>
 
 #include <cerrno>
 #include <cstring>
@@ -45,6 +47,22 @@ const char* policy_name(int policy) {
 
 }  // namespace
 
+int loop_cpu(const RealtimeRequest& request) {
+  return request.cpu >= 0 ? request.cpu : last_allowed_cpu();
+}
+
+void make_way(int cpu) {
+  cpu_set_t allowed;
+  CPU_ZERO(&allowed);
+  if (cpu >= 0 && sched_getaffinity(0, sizeof allowed, &allowed) == 0 && CPU_ISSET(cpu, &allowed)) {
+    CPU_CLR(cpu, &allowed);
+    // With no other processor left this fails, and the thread stays where it may be.
+    pthread_setaffinity_np(pthread_self(), sizeof allowed, &allowed);
+  }
+  constexpr int behind = 5;
+  setpriority(PRIO_PROCESS, static_cast<id_t>(gettid()), behind);
+}
+
 RealtimeGrant enter_realtime(const RealtimeRequest& request) {
   RealtimeGrant grant;
   const bool locked = mlockall(MCL_CURRENT | MCL_FUTURE) == 0;
@@ -60,7 +78,7 @@ RealtimeGrant enter_realtime(const RealtimeRequest& request) {
   grant.policy = policy_name(policy);
   grant.priority = got.sched_priority;
   // Bound to one processor a thread without priority only waits longer for it.
-  if (policy == SCHED_FIFO) grant.cpu = pin_to(request.cpu >= 0 ? request.cpu : last_allowed_cpu());
+  if (policy == SCHED_FIFO) grant.cpu = pin_to(loop_cpu(request));
   if (policy == SCHED_FIFO)
     grant.note = "SCHED_FIFO priority " + std::to_string(grant.priority) + " granted";
   else

@@ -170,7 +170,10 @@ void RunLog::write_loop() noexcept {
         used += format_row(records[i], buffer.data() + used);
         ++rows;
       }
-    if (count > 0) continue;
+    if (count > 0) {
+      if (options_.watcher != nullptr) options_.watcher->see({records.data(), count});
+      continue;
+    }
     flush();
     if (last_round) return;
     std::this_thread::sleep_for(writer_pause);

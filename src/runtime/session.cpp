@@ -78,6 +78,7 @@ SessionResult run_session(RunSetup setup, Rig& rig, Clock& clock, const SignalFl
   RunLog::Options log_options;
   log_options.sync_while_running = !clock.is_virtual();
   log_options.queue_rows = options.log_queue_rows;
+  log_options.watcher = options.watcher;
   RunLog log(directory.samples(), log_options);
   LiveStatus live;
   ControlLoop loop(rig, clock, controller, scaler, log, setup.limits, signal, live);

@@ -174,6 +174,36 @@ TEST(DelaySweep, OrdersDelaysSoThatFallsComeLateAndFindsBothTransitions) {
     }
 }
 
+/// A run that balances: the angle swings with an amplitude and a frequency, read by an encoder of 4096
+/// counts.
+std::vector<LogRecord> swinging(double amplitude_rad, double frequency_hz) {
+  constexpr double step_rad = 2.0 * std::numbers::pi / 4096.0;
+  std::vector<LogRecord> rows(30'000);
+  for (std::size_t k = 0; k < rows.size(); ++k) {
+    LogRecord& row = rows[k];
+    row.tick = k;
+    row.time_ns = static_cast<std::int64_t>(k) * 1'000'000;
+    const double angle = 0.01 + amplitude_rad * std::sin(2.0 * std::numbers::pi * frequency_hz * 1e-3 *
+                                                         static_cast<double>(k));
+    row.theta_rad = step_rad * std::round(angle / step_rad);
+    row.flags = row_flag::feedback;
+  }
+  return rows;
+}
+
+TEST(DelaySweep, MeasuresAmplitudeAndFrequencyOfAnOscillation) {
+  Piece piece = sweep_piece();
+  piece.stable_below_rad = 0.0061;
+  for (const double frequency_hz : {0.4, 1.63, 4.0}) {
+    const TrialResult r = judge_trial({}, piece, swinging(0.05, frequency_hz), StopReason::duration);
+    EXPECT_EQ(r.outcome, "oscillating");
+    EXPECT_NEAR(r.theta_amplitude_rad, 0.05, 0.0016);
+    EXPECT_NEAR(r.frequency_hz, frequency_hz, 0.01 * frequency_hz);
+  }
+  EXPECT_TRUE(std::isnan(judge_trial({}, piece, swinging(0.003, 2.0), StopReason::duration).frequency_hz));
+  EXPECT_TRUE(std::isnan(judge_trial({}, piece, swinging(0.05, 2.0), StopReason::fell).frequency_hz));
+}
+
 TEST(SignCheck, FindsEveryWrongSign) {
   ExperimentSetup setup = setup_with("{kind: sign_check, largest_v: 4}");
   const std::vector<LogRecord> rows = rehearse(setup.experiment.pieces.front(), setup).rows;

@@ -20,6 +20,7 @@ namespace upright {
 enum class StopReason : std::uint8_t {
   duration,  ///< the asked-for time is over
   signal,
+  stop_button,  ///< of the live page
   not_finite,
   stale_encoder,
   link_lost,
@@ -78,8 +79,10 @@ struct LoopOutcome {
 /// One sentence: what ended the run, the first bad cycle and what to do.
 std::string sentence_of(const LoopOutcome& outcome, const LoopLimits& limits);
 
-/// Set by a signal handler: the signal's number, or 0.
+/// Set by a signal handler: the signal's number, or 0. The live page's stop button sets
+/// `stop_button_pressed`.
 using SignalFlag = std::atomic<int>;
+inline constexpr int stop_button_pressed = -1;
 
 /// Runs until the periods are over or a safety stop. The rig is open; when this returns it has been stopped.
 /// Neither allocates, locks nor throws from the first cycle on, except that in virtual time it waits for the

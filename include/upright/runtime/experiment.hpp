@@ -65,7 +65,8 @@ struct TrialResult {
   std::string reason;         ///< of the loop's end
   std::string outcome;
   double theta0_rad = 0.0, theta_amplitude_rad = 0.0, cart_amplitude_m = 0.0;
-  double fall_time_s = 0.0;  ///< not a number: it did not fall
+  double fall_time_s = 0.0;   ///< not a number: it did not fall
+  double frequency_hz = 0.0;  ///< of the angle; not a number where it does not oscillate
 };
 
 /// The next trial, given those that were done; none: all is done. Delays grow, so that falls come late; what
@@ -73,7 +74,7 @@ struct TrialResult {
 std::optional<ExperimentTrial> next_trial(const std::vector<Piece>& pieces,
                                           const std::vector<TrialResult>& done);
 
-/// Judges the balancing part of a run: amplitudes over its last third.
+/// Judges the balancing part of a run: amplitudes and frequency over its last third.
 TrialResult judge_trial(const ExperimentTrial& trial, const Piece& piece, const std::vector<LogRecord>& rows,
                         StopReason reason);
 
@@ -82,6 +83,7 @@ struct ExperimentOptions {
   std::string command;
   std::uint64_t seed = 1;
   RealtimeRequest realtime;
+  RowWatcher* watcher = nullptr;  ///< of every trial's rows; null: nobody
   /// Before each trial. May wait for somebody, and may throw.
   std::function<void(const Piece&, const ExperimentTrial&)> announce;
   std::function<void(const TrialResult&)> finished;

@@ -22,4 +22,12 @@ struct RealtimeGrant {
 /// plainly what was not granted. Never fails.
 RealtimeGrant enter_realtime(const RealtimeRequest& request);
 
+/// The processor that enter_realtime would stay on, asked for from a thread that is not bound yet; -1: none.
+int loop_cpu(const RealtimeRequest& request);
+
+/// Keeps the calling thread, and threads it will start, off a processor where there is another one, and
+/// behind all other work without real-time priority: what merely shows a run must not delay it. -1: no
+/// processor.
+void make_way(int cpu);
+
 }  // namespace upright

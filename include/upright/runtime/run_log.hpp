@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <span>
 #include <string>
 #include <thread>
 #include <vector>
@@ -47,6 +48,14 @@ class RowMemory final : public RowSink {
   std::vector<LogRecord> rows_;
 };
 
+/// Sees the rows on their way to the file. It is called by the thread that writes, which it must not hold up:
+/// no lock, no waiting.
+class RowWatcher {
+ public:
+  virtual ~RowWatcher() = default;
+  virtual void see(std::span<const LogRecord> rows) noexcept = 0;
+};
+
 /// Owns samples.csv. A row is in the kernel within about 20 ms of `push` and asked onto the disk every 50 ms,
 /// each by its own thread, so that a slow disk delays neither the loop nor the writing.
 class RunLog final : public RowSink {
@@ -55,6 +64,7 @@ class RunLog final : public RowSink {
     std::size_t queue_rows = 16384;
     /// False: only once at the end (virtual time, where nothing but the simulation is lost).
     bool sync_while_running = true;
+    RowWatcher* watcher = nullptr;  ///< null: nobody. It must outlive the log.
   };
 
   /// Creates the file with its header line. Throws Error when that fails.

@@ -23,6 +23,7 @@ struct SessionOptions {
   std::unique_ptr<DelayCompensator> compensator;
   std::size_t log_queue_rows = RunLog::Options{}.queue_rows;
   CommandSource* source = nullptr;  ///< null: balance. It must outlive the session.
+  RowWatcher* watcher = nullptr;    ///< of the log's rows; null: nobody. It must outlive the session.
   /// Called about five times per second from the calling thread while the loop runs; may be empty.
   std::function<void(const LiveStatus&)> show;
 };

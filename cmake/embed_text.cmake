@@ -1,0 +1,13 @@
+# Writes a text file as a C++ string, in parts short enough for every compiler. Arguments: SOURCE, OUTPUT.
+file(READ ${SOURCE} content)
+string(LENGTH "${content}" length)
+set(part_length 8000)
+set(text "")
+set(at 0)
+while(at LESS length)
+  string(SUBSTRING "${content}" ${at} ${part_length} part)
+  string(APPEND text "R\"embed(${part})embed\"\n")
+  math(EXPR at "${at} + ${part_length}")
+endwhile()
+file(WRITE ${OUTPUT}.new "${text}")
+file(COPY_FILE ${OUTPUT}.new ${OUTPUT} ONLY_IF_DIFFERENT)

@@ -1,0 +1,292 @@
+// `--live` as a teacher uses it: the page in a real browser, its drawing that moves, its stop button; and the
+// same over plain HTTP. Pictures of the page stay in the test's run folder.
+#include <gtest/gtest.h>
+#include <httplib.h>
+#include <time.h>
+
+#include <chrono>
+#include <cstdlib>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <regex>
+#include <set>
+#include <thread>
+
+#include "../integration/virtual_rig_process.hpp"
+#include "command.hpp"
+
+namespace upright::testing {
+namespace {
+
+using namespace std::chrono_literals;
+namespace fs = std::filesystem;
+using Json = nlohmann::json;
+using test::Process;
+
+const std::string config = UPRIGHT_SOURCE_DIR "/config/";
+const std::string rig = config + "rigs/simulated.yaml";
+const std::string gains = config + "gains/exponential.yaml";
+
+/// The page's address, from the line that says it.
+int port_said_by(Process& program) {
+  for (int lines = 0; lines < 10; ++lines) {
+    std::smatch found;
+    const std::string line = program.line();
+    if (std::regex_search(line, found, std::regex("^Live view: http://127\\.0\\.0\\.1:([0-9]+)/$")))
+      return std::stoi(found[1]);
+  }
+  throw std::runtime_error("the program said no address");
+}
+
+/// With a delay of 16 ms the loop keeps swinging by a few degrees: something to look at.
+std::vector<std::string> run_command(const fs::path& out) {
+  return {UPRIGHT_BINARY, "run",   "--rig",      rig,   "--gains",  gains,   "--theta0-deg", "3",
+          "--delay",      "0.016", "--duration", "120", "--live=0", "--out", out.string()};
+}
+
+fs::path only_run_in(const fs::path& folder) {
+  const fs::directory_iterator first(folder);
+  return first->path();
+}
+
+double monotonic_s() {
+  timespec now{};
+  clock_gettime(CLOCK_MONOTONIC, &now);
+  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+}
+
+double outcome_number(const std::string& yaml, const std::string& key) {
+  const std::size_t at = yaml.find("  " + key + ": ", yaml.find("\noutcome:"));
+  return std::stod(yaml.substr(at + key.size() + 4));
+}
+
+TEST(Live, AStopOverHttpEndsARunAsASignalDoes) {
+  const TemporaryFolder folder;
+  const fs::path out = folder.path() / "runs";
+  Process program(run_command(out));
+  httplib::Client page("127.0.0.1", port_said_by(program));
+  const std::string text = page.Get("/")->body;
+  std::smatch token;
+  ASSERT_TRUE(std::regex_search(text, token, std::regex("'X-Upright-Token': '([0-9a-f]{32})'")));
+  std::this_thread::sleep_for(1500ms);
+  const double pressed_s = monotonic_s();
+  const auto answer = page.Post("/stop", {{"X-Upright-Token", token[1].str()}}, "", "text/plain");
+  ASSERT_TRUE(answer);
+  EXPECT_EQ(answer->status, 200);
+  const std::string said = program.rest();
+  EXPECT_EQ(program.wait(), 3) << said;
+  EXPECT_NE(said.find("stopped from the live page"), std::string::npos) << said;
+  const fs::path run = only_run_in(out);
+  const std::string yaml = read_text(run / "run.yaml");
+  EXPECT_NE(yaml.find("reason: stop_button"), std::string::npos);
+  // The loop ended in the period after the button; the rest is what a busy machine takes to bring it there.
+  const double ended_s = outcome_number(yaml, "started_monotonic_s") + outcome_number(yaml, "time_s");
+  EXPECT_LT(ended_s - pressed_s, 0.5);
+  EXPECT_EQ(run_upright("replay " + run.string()).exit_code, 0);
+  EXPECT_EQ(run_upright("report " + run.string()).exit_code, 0);
+}
+
+TEST(Live, IsRefusedBeforeAnythingMoves) {
+  const TemporaryFolder folder;
+  const std::string out = " --out " + (folder.path() / "out").string();
+  const std::string run = "run --rig " + rig + " --gains " + gains + out;
+  for (const char* flags : {" --live --fast", " --live=99999", " --live=http"}) {
+    const CommandResult refused = run_upright(run + flags);
+    EXPECT_EQ(refused.exit_code, 2) << flags;
+    EXPECT_NE(refused.err.find("--live"), std::string::npos) << refused.err;
+  }
+  const CommandResult experiment =
+      run_upright("experiment " + config + "experiments/pivot.yaml --rig " + rig + " --live --fast" + out);
+  EXPECT_EQ(experiment.exit_code, 2) << experiment.err;
+  httplib::Server other;
+  const int taken = other.bind_to_any_port("127.0.0.1");
+  const CommandResult refused = run_upright(run + " --live=" + std::to_string(taken));
+  EXPECT_EQ(refused.exit_code, 2);
+  EXPECT_NE(refused.err.find("choose another port"), std::string::npos) << refused.err;
+  EXPECT_FALSE(fs::exists(folder.path() / "out"));
+}
+
+std::string from_base64(const std::string& text) {
+  std::string bytes;
+  unsigned bits = 0;
+  int count = 0;
+  for (const char c : text) {
+    static const std::string digits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+    const std::size_t digit = digits.find(c);
+    if (digit == std::string::npos) break;
+    bits = bits << 6 | static_cast<unsigned>(digit);
+    if ((count += 6) < 8) continue;
+    count -= 8;
+    bytes += static_cast<char>(bits >> count & 0xffu);
+  }
+  return bytes;
+}
+
+/// Chromium without a window, over the W3C WebDriver protocol.
+class Browser {
+ public:
+  explicit Browser(const fs::path& profile) : driver_({"chromedriver", "--port=0"}) {
+    std::smatch found;
+    for (int lines = 0; lines < 20 && client_ == nullptr; ++lines) {
+      const std::string line = driver_.line();
+      if (std::regex_search(line, found, std::regex("started successfully on port ([0-9]+)")))
+        client_ = std::make_unique<httplib::Client>("127.0.0.1", std::stoi(found[1]));
+    }
+    if (client_ == nullptr) throw std::runtime_error("chromedriver did not start");
+    client_->set_read_timeout(60s);
+    const Json options = {{"binary", "/usr/bin/chromium"},
+                          {"args",
+                           {"--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run",
+                            "--disable-background-networking", "--disable-component-update", "--disable-sync",
+                            "--disable-dev-shm-usage", "--hide-scrollbars", "--window-size=1440,900",
+                            "--user-data-dir=" + profile.string()}}};
+    const Json answer =
+        post("/session", {{"capabilities", {{"alwaysMatch", {{"goog:chromeOptions", options}}}}}});
+    session_ = "/session/" + answer.at("sessionId").get<std::string>();
+  }
+  ~Browser() {
+    if (!session_.empty()) client_->Delete(session_);
+    driver_.end(SIGTERM);
+  }
+  Browser(const Browser&) = delete;
+  Browser& operator=(const Browser&) = delete;
+
+  void open(const std::string& url) { post(session_ + "/url", {{"url", url}}); }
+  Json value_of(const std::string& script) {
+    return post(session_ + "/execute/sync", {{"script", "return " + script}, {"args", Json::array()}});
+  }
+  std::string text_of(const std::string& id) {
+    return value_of("document.getElementById('" + id + "').textContent").get<std::string>();
+  }
+  void click(const std::string& id) {
+    const Json element = post(session_ + "/element", {{"using", "css selector"}, {"value", "#" + id}});
+    post(session_ + "/element/" + element.begin().value().get<std::string>() + "/click", Json::object());
+  }
+  std::string picture() {
+    const auto answer = client_->Get(session_ + "/screenshot");
+    return from_base64(Json::parse(answer->body).at("value").get<std::string>());
+  }
+
+ private:
+  Json post(const std::string& path, const Json& body) {
+    const auto answer = client_->Post(path, body.dump(), "application/json");
+    if (!answer) throw std::runtime_error("chromedriver does not answer: " + path);
+    const Json document = Json::parse(answer->body);
+    if (answer->status != 200) throw std::runtime_error(document.dump());
+    return document.at("value");
+  }
+
+  Process driver_;
+  std::unique_ptr<httplib::Client> client_;
+  std::string session_;
+};
+
+/// Where pictures stay.
+fs::path picture_folder() {
+  const fs::path folder = UPRIGHT_PICTURES;
+  fs::create_directories(folder);
+  return folder;
+}
+
+void keep_picture(Browser& browser, const std::string& name) {
+  const std::string bytes = browser.picture();
+  EXPECT_TRUE(bytes.starts_with("\x89PNG")) << name;
+  std::ofstream(picture_folder() / name, std::ios::binary) << bytes;
+}
+
+/// Pixels of a plot that are drawn in a colour.
+int coloured(Browser& browser, const std::string& canvas, int red, int green, int blue) {
+  std::ostringstream script;
+  script << "(() => { const c = document.getElementById('" << canvas
+         << "'), d = c.getContext('2d').getImageData(0, 0, c.width, c.height).data; let n = 0;"
+         << "for (let i = 0; i < d.length; i += 4) if (Math.abs(d[i] - " << red << ") + Math.abs(d[i+1] - "
+         << green << ") + Math.abs(d[i+2] - " << blue << ") < 60 && d[i+3] > 150) ++n; return n; })()";
+  return browser.value_of(script.str()).get<int>();
+}
+
+bool is_installed(const char* program) {
+  return run_shell(std::string("command -v ") + program).exit_code == 0;
+}
+
+template <class Condition>
+bool comes_true(Condition&& condition) {
+  for (int i = 0; i < 200; ++i) {
+    if (condition()) return true;
+    std::this_thread::sleep_for(100ms);
+  }
+  return false;
+}
+
+class LivePage : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    if (!is_installed("chromedriver") || !is_installed("chromium"))
+      GTEST_SKIP() << "NOT TESTED: the live page in a browser. Install chromium and chromium-driver "
+                      "(scripts/install-deps.sh --test)";
+  }
+  TemporaryFolder folder_;
+};
+
+TEST_F(LivePage, ShowsARunThatMovesAndStopsIt) {
+  Process program(run_command(folder_.path() / "runs"));
+  const int port = port_said_by(program);
+  Browser browser(folder_.path() / "profile");
+  browser.open("http://127.0.0.1:" + std::to_string(port) + "/");
+  ASSERT_TRUE(comes_true([&] { return browser.text_of("state") == "balancing"; }));
+  std::set<std::string> carts, pendulums, clocks;
+  for (int i = 0; i < 30; ++i) {
+    carts.insert(browser.value_of("document.getElementById('cart').getAttribute('transform')"));
+    pendulums.insert(browser.value_of("document.getElementById('pendulum').getAttribute('transform')"));
+    clocks.insert(browser.text_of("clock"));
+    std::this_thread::sleep_for(100ms);
+  }
+  // A busy machine may show fewer pictures.
+  EXPECT_GT(carts.size(), 5u);
+  EXPECT_GT(pendulums.size(), 5u);
+  EXPECT_GT(clocks.size(), 5u);
+  for (const char* id : {"theta", "x", "volts"})
+    EXPECT_TRUE(std::regex_match(browser.text_of(id), std::regex("(\u2212)?[0-9]+\\.[0-9]+")))
+        << id << " " << browser.text_of(id);
+  EXPECT_TRUE(std::regex_match(browser.text_of("worst"), std::regex("[0-9.]+ (\u00b5s|ms)")))
+      << browser.text_of("worst");
+  EXPECT_GT(coloured(browser, "theta-plot", 0xc2, 0x41, 0x0c), 100);
+  EXPECT_GT(coloured(browser, "x-plot", 0x0b, 0x62, 0xc4), 100);
+  EXPECT_GT(coloured(browser, "v-plot", 0x6d, 0x28, 0xd9), 100);
+  EXPECT_GT(coloured(browser, "lateness", 0x00, 0x79, 0x5a), 100);
+  const Json fetched =
+      browser.value_of("performance.getEntriesByType('resource').map(e => new URL(e.name).host)");
+  for (const Json& host : fetched) EXPECT_EQ(host, "127.0.0.1:" + std::to_string(port));
+  keep_picture(browser, "running.png");
+
+  browser.click("stop");
+  EXPECT_TRUE(comes_true([&] { return browser.text_of("state") == "stopped"; }));
+  EXPECT_NE(browser.text_of("message").find("stopped from the live page"), std::string::npos)
+      << browser.text_of("message");
+  keep_picture(browser, "stopped.png");
+  const std::string said = program.rest();
+  EXPECT_EQ(program.wait(), 3) << said;
+}
+
+TEST_F(LivePage, ShowsEachPieceOfAnExperiment) {
+  const fs::path file = folder_.write(
+      "test.yaml", "experiment:\n  name: class\n  why: a test\n  plant: " + config +
+                       "plants/exponential.yaml\n  travel_m: 0.3\n  voltage_limit_v: 10\n  pieces:\n"
+                       "    - {kind: observe, label: first, duration_s: 1}\n"
+                       "    - {kind: multisine, label: second, amplitude_v: 4, lowest_hz: 0.3, "
+                       "highest_hz: 4, lines: 8, duration_s: 6, fit_to_travel: true}\n");
+  Process program({UPRIGHT_BINARY, "experiment", file.string(), "--rig", rig, "--live=0", "--out",
+                   (folder_.path() / "out").string()});
+  const int port = port_said_by(program);
+  Browser browser(folder_.path() / "profile");
+  browser.open("http://127.0.0.1:" + std::to_string(port) + "/");
+  EXPECT_TRUE(comes_true([&] { return browser.text_of("state").starts_with("second: "); }));
+  EXPECT_TRUE(comes_true([&] { return browser.text_of("state") == "second: measuring"; }));
+  std::this_thread::sleep_for(3s);
+  keep_picture(browser, "experiment.png");
+  EXPECT_TRUE(comes_true([&] { return browser.text_of("state") == "completed"; }));
+  const std::string said = program.rest();
+  EXPECT_EQ(program.wait(), 0) << said;
+}
+
+}  // namespace
+}  // namespace upright::testing
