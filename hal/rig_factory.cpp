@@ -1,6 +1,7 @@
 #include "upright/hal/rig_factory.hpp"
 
 #include "modbus/modbus_rig.hpp"
+#include "upright/hal/guarded_rig.hpp"
 #include "upright/model/error.hpp"
 
 namespace upright {
@@ -20,7 +21,7 @@ std::unique_ptr<Rig> make_rig(const RigFile& rig, const RigOptions& options) {
                       exact_text(options.period_s) +
                       " s, or lower sample_rate_hz in the gain file: " + rig.file.string() +
                       ":1: modbus.response_timeout_s is " + exact_text(rig.modbus->response_timeout_s));
-  return std::make_unique<ModbusTransport>(rig, options.period_s);
+  return guarded(std::make_unique<ModbusTransport>(rig, options.period_s), rig.calibration);
 }
 
 }  // namespace upright

@@ -370,6 +370,7 @@ RigFile read_rig(const YamlMap& document) {
   amplifier.finish();
   const YamlMap track = document.map("track");
   rig.track_limit_m = track.number("limit_m", Range{0, 100, true});
+  rig.coast_s = track.number_or("coast_s", 0.0, Range::within(0, 10));
   track.finish();
   rig.fall_angle_rad = document.number("fall_angle_rad", Range{0, std::numbers::pi, true});
   rig.watchdog_s = document.number("watchdog_s", Range{0, longest_watchdog_s, true});
@@ -394,7 +395,7 @@ std::string rig_text(const RigFile& rig) {
   text += calibration_text(rig.calibration);
   text += "amplifier: {limit_v: " + exact_text(rig.amplifier.limit_v) +
           ", sign: " + std::to_string(rig.amplifier.sign) +
-          "}\ntrack: {limit_m: " + exact_text(rig.track_limit_m) +
+          "}\ntrack: {limit_m: " + exact_text(rig.track_limit_m) + ", coast_s: " + exact_text(rig.coast_s) +
           "}\nfall_angle_rad: " + exact_text(rig.fall_angle_rad) +
           "\nwatchdog_s: " + exact_text(rig.watchdog_s) + "\n";
   if (rig.simulated) text += simulated_text(*rig.simulated);

@@ -11,6 +11,7 @@
 #include <algorithm>
 #include <cerrno>
 #include <cmath>
+#include <filesystem>
 #include <span>
 
 #include "upright/model/error.hpp"
@@ -33,10 +34,17 @@ std::string address_of(const std::string& host) {
   return text;
 }
 
-modbus_t* new_context(const ModbusRig& rig, bool serial) {
-  if (!serial) return modbus_new_tcp(address_of(rig.host).c_str(), rig.port);
+modbus_t* new_context(const ModbusRig& rig, const std::string& address) {
+  if (!address.empty()) return modbus_new_tcp(address.c_str(), rig.port);
   const char parity = rig.parity == Parity::none ? 'N' : rig.parity == Parity::even ? 'E' : 'O';
   return modbus_new_rtu(rig.device.c_str(), rig.baud, parity, 8, rig.stop_bits);
+}
+
+std::string name_of(const ModbusRig& rig, const std::string& address) {
+  if (!address.empty()) return address + ":" + std::to_string(rig.port);
+  std::error_code unresolved;
+  const std::filesystem::path line = std::filesystem::canonical(rig.device, unresolved);
+  return unresolved ? rig.device : line.string();
 }
 
 RigFault fault_of_errno(int error) noexcept {
@@ -67,7 +75,9 @@ ModbusLink::ModbusLink(const RigFile& rig)
     : config_(*rig.modbus),
       amplifier_sign_(rig.amplifier.sign),
       serial_(rig.encoders == Backend::modbus_rtu || rig.output == Backend::modbus_rtu),
-      context_(new_context(config_, serial_)) {
+      address_(serial_ ? std::string() : address_of(config_.host)),
+      name_(name_of(config_, address_)),
+      context_(new_context(config_, address_)) {
   if (!context_) throw DeviceError(std::string("check the link's settings: ") + modbus_strerror(errno));
   first_ = std::min(config_.cart_address, config_.pendulum_address);
   int end = std::max(config_.cart_address, config_.pendulum_address) + config_.counter.registers;

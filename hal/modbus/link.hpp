@@ -6,6 +6,7 @@
 
 #include <array>
 #include <memory>
+#include <string>
 
 #include "upright/hal/rig.hpp"
 #include "upright/hal/rig_file.hpp"
@@ -24,6 +25,8 @@ class ModbusLink {
   /// Throws DeviceError when the host has no address, or out of memory.
   explicit ModbusLink(const RigFile& rig);
 
+  /// What the device is reached by, the same for everybody who means it: "ADDRESS:PORT", or the line's file.
+  const std::string& name() const noexcept { return name_; }
   /// One attempt, at most `patience_s` long.
   RigFault connect(double patience_s) noexcept;
   void close() noexcept;
@@ -52,6 +55,8 @@ class ModbusLink {
   ModbusRig config_;
   int amplifier_sign_;
   bool serial_;
+  std::string address_;  // of a TCP device, as a number
+  std::string name_;
   bool connected_ = false;
   bool in_step_ = false;
   int first_ = 0;

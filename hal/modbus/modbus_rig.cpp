@@ -22,7 +22,7 @@ constexpr std::int64_t longest_pause_ns = 100'000'000;
 constexpr double connect_patience_s = 0.02;
 constexpr double open_patience_s = 1.0;
 constexpr double share_of_period = 0.75;  // the rest is for computing and writing
-constexpr int implausible_until_restart = 3;
+constexpr int other_boots_until_restart = 3;
 constexpr int io_priority = 70;
 
 std::int64_t now_ns() noexcept {
@@ -79,22 +79,21 @@ void ModbusTransport::end_thread() noexcept {
 
 void ModbusTransport::fail(RigFault fault, const std::string& doing) {
   link_.close();
-  const ModbusRig& modbus = *rig_.modbus;
-  const std::string where =
-      modbus.device.empty() ? modbus.host + ":" + std::to_string(modbus.port) : modbus.device;
-  throw DeviceError("check that the device at " + where + " is on, wired and configured as " +
+  throw DeviceError("check that the device at " + link_.name() + " is on, wired and configured as " +
                     rig_.file.string() + " says: " + words_for(fault) + " while " + doing);
 }
 
 void ModbusTransport::open() {
+  lock_.take(link_.name());
   end_thread();
   const auto must = [&](RigFault fault, const std::string& doing) {
     if (fault != RigFault::none) fail(fault, doing);
   };
   must(link_.connect(open_patience_s), "connecting");
-  // A device that has just been switched on, or a line with old bytes on it, gets a few attempts.
+  // A device that has just been switched on, or a line with old bytes on it, gets a second.
   RigFault fault = RigFault::link_timeout;
-  for (int attempt = 0; attempt < 10 && fault != RigFault::none; ++attempt) {
+  const std::int64_t until_ns = now_ns() + static_cast<std::int64_t>(1e9 * open_patience_s);
+  while (fault != RigFault::none && now_ns() < until_ns) {
     if (!link_.connected()) link_.connect(open_patience_s);
     fault = link_.resynchronise(0.0);
   }
@@ -129,9 +128,9 @@ void ModbusTransport::open() {
   voltage_v_ = 0.0;
   write_fault_ = RigFault::none;
   stopping_ = ending_ = false;
-  stop_served_ = enabled_ = restarted_ = have_last_ = false;
+  stop_served_ = enabled_ = restarted_ = false;
   verified_ = true;
-  implausible_in_a_row_ = 0;
+  other_boots_in_a_row_ = 0;
   pause_ns_ = first_pause_ns;
   next_attempt_ns_ = 0;
   thread_ = std::thread([this] { serve(); });
@@ -225,28 +224,15 @@ RigFault ModbusTransport::verify() noexcept {
   return fault;
 }
 
-/// Counts that no motion explains are a corrupt reply; when they stay so, the counters were reset.
-RigFault ModbusTransport::plausible(const DeviceReading& reading, std::int64_t time_ns) noexcept {
-  if (reading.boot_count != boot_count_) {
-    if (++implausible_in_a_row_ < implausible_until_restart) return RigFault::corrupt_reply;
-    restarted_ = true;
-    return RigFault::device_restarted;
+/// A device with another boot count restarted; a single one is a corrupt reply.
+RigFault ModbusTransport::same_device(const DeviceReading& reading) noexcept {
+  if (reading.boot_count == boot_count_) {
+    other_boots_in_a_row_ = 0;
+    return RigFault::none;
   }
-  if (have_last_) {
-    const double elapsed_s = static_cast<double>(time_ns - last_ns_) * 1e-9;
-    if (implausible_step(last_.cart_counts, reading.cart_counts, elapsed_s, rig_.calibration.cart) ||
-        implausible_step(last_.pendulum_counts, reading.pendulum_counts, elapsed_s,
-                         rig_.calibration.pendulum)) {
-      if (++implausible_in_a_row_ < implausible_until_restart) return RigFault::corrupt_reply;
-      restarted_ = true;
-      return RigFault::device_restarted;
-    }
-  }
-  implausible_in_a_row_ = 0;
-  have_last_ = true;
-  last_ = reading;
-  last_ns_ = time_ns;
-  return RigFault::none;
+  if (++other_boots_in_a_row_ < other_boots_until_restart) return RigFault::corrupt_reply;
+  restarted_ = true;
+  return RigFault::device_restarted;
 }
 
 void ModbusTransport::serve_read(std::uint32_t number) noexcept {
@@ -257,7 +243,7 @@ void ModbusTransport::serve_read(std::uint32_t number) noexcept {
     const std::int64_t asked_ns = now_ns();
     answer.fault = link_.read(voltage_v_.load(), reading);
     answer.time_ns = asked_ns + (now_ns() - asked_ns) / 2;
-    if (answer.fault == RigFault::none) answer.fault = plausible(reading, answer.time_ns);
+    if (answer.fault == RigFault::none) answer.fault = same_device(reading);
     if (answer.fault == RigFault::none) {
       answer.cart_counts = signed_counts(reading.cart_counts, rig_.calibration.cart.width_bits);
       answer.pendulum_counts = signed_counts(reading.pendulum_counts, rig_.calibration.pendulum.width_bits);

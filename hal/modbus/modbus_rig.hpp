@@ -11,6 +11,7 @@
 #include <atomic>
 #include <thread>
 
+#include "../rig_lock.hpp"
 #include "link.hpp"
 #include "upright/hal/rig.hpp"
 
@@ -36,11 +37,12 @@ class ModbusTransport final : public Rig {
   void serve_stop() noexcept;
   RigFault ready() noexcept;
   RigFault verify() noexcept;
-  RigFault plausible(const DeviceReading& reading, std::int64_t time_ns) noexcept;
+  RigFault same_device(const DeviceReading& reading) noexcept;
   void ring() noexcept;
   [[noreturn]] void fail(RigFault fault, const std::string& doing);
 
   RigFile rig_;
+  RigLock lock_;
   std::int64_t patience_ns_;  // how long read() waits at most
   ModbusLink link_;
   std::thread thread_;
@@ -65,10 +67,7 @@ class ModbusTransport final : public Rig {
   bool restarted_ = false;
   bool verified_ = false;
   int boot_count_ = 0;
-  int implausible_in_a_row_ = 0;
-  bool have_last_ = false;
-  DeviceReading last_;
-  std::int64_t last_ns_ = 0;
+  int other_boots_in_a_row_ = 0;
   std::uint64_t sequence_ = 0;
   std::int64_t pause_ns_ = 0;
   std::int64_t next_attempt_ns_ = 0;

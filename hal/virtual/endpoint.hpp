@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <deque>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -36,6 +37,7 @@ struct Reply {
 struct Peer {
   Descriptor descriptor;
   std::deque<Reply> replies;
+  std::optional<Reply> withheld;  ///< leaves after the next one
   bool gone = false;
 };
 

@@ -11,6 +11,7 @@
 #include <array>
 #include <cerrno>
 #include <cmath>
+#include <optional>
 #include <random>
 #include <span>
 #include <vector>
@@ -124,6 +125,7 @@ class Server {
       send_due();
       std::erase_if(endpoint_.peers(), [](const Peer& peer) { return peer.gone; });
       maybe_restart();
+      maybe_cut();
       if (duration_ns > 0 && now_ns() - started_ns > duration_ns) break;
     }
     advance();
@@ -149,6 +151,21 @@ class Server {
     plant_.advance_to(now_ns());
     if (was_on && plant_.voltage_v() == 0.0) registers_.clear_voltage();  // the watchdog's doing
     plant_.trace(false);
+  }
+
+  static bool is_due(double after_s, double free_s) { return after_s > 0.0 && free_s >= after_s; }
+
+  /// What the encoders show, right or wrong.
+  EncoderCounts shown_counts() {
+    const InjectedFaults& faults = options_.faults;
+    EncoderCounts counts = plant_.counts();
+    if (is_due(faults.stick_after_s, plant_.free_s())) {
+      if (!stuck_) stuck_ = counts;
+      (faults.stick_cart ? counts.cart : counts.pendulum) =
+          faults.stick_cart ? stuck_->cart : stuck_->pendulum;
+    }
+    if (is_due(faults.jump_after_s, plant_.free_s())) counts.cart += faults.jump_counts;
+    return counts;
   }
 
   bool master_away() const { return now_ns() - plant_.fed_ns() > away_ns; }
@@ -186,7 +203,7 @@ class Server {
 
   void answer(Peer& peer, const std::array<std::uint8_t, MODBUS_TCP_MAX_ADU_LENGTH>& request, int length) {
     if (!plant_.held() && motor_off() && master_away()) plant_.put_back();
-    registers_.show(plant_.counts(), boot_count_);
+    registers_.show(shown_counts(), boot_count_);
     modbus_t* context = endpoint_.context();
     modbus_set_socket(context, reply_in_.get());
     modbus_reply(context, request.data(), length, registers_.mapping());
@@ -226,7 +243,16 @@ class Server {
       std::uniform_int_distribution<> bit(0, 7);
       reply.bytes[byte(random_)] ^= static_cast<std::uint8_t>(1 << bit(random_));
     }
-    if (!hits(faults.drop_every)) peer.replies.push_back(std::move(reply));
+    if (hits(faults.stale_every) && !last_reply_.empty()) reply.bytes = last_reply_;
+    last_reply_ = reply.bytes;
+    if (cut_ || hits(faults.drop_every)) return;
+    if (!peer.withheld && hits(faults.reorder_every)) {
+      peer.withheld = std::move(reply);
+      return;
+    }
+    peer.replies.push_back(std::move(reply));
+    if (peer.withheld) peer.replies.push_back(std::move(*peer.withheld));
+    peer.withheld.reset();
   }
 
   void send_due() {
@@ -242,10 +268,15 @@ class Server {
     }
   }
 
+  /// From then on no connection lasts and no reply leaves.
+  void maybe_cut() {
+    if (!cut_ && !is_due(options_.faults.cut_after_s, plant_.free_s())) return;
+    cut_ = true;
+    if (!endpoint_.serial()) endpoint_.peers().clear();
+  }
+
   void maybe_restart() {
-    if (restarted_ || options_.faults.restart_after_s <= 0.0 ||
-        plant_.free_s() < options_.faults.restart_after_s)
-      return;
+    if (restarted_ || !is_due(options_.faults.restart_after_s, plant_.free_s())) return;
     restarted_ = true;
     boot_count_ = (boot_count_ + 1) & 0xffff;
     registers_.reset();
@@ -264,7 +295,9 @@ class Server {
   VirtualPlant plant_;
   std::mt19937_64 random_;
   int boot_count_;
-  bool restarted_ = false;
+  bool restarted_ = false, cut_ = false;
+  std::optional<EncoderCounts> stuck_;  // the counts an encoder stopped at
+  std::vector<std::uint8_t> last_reply_;
   Descriptor reply_in_, reply_out_;  // libmodbus writes its reply into one, we take it from the other
 };
 

@@ -16,6 +16,7 @@
 #include "signals.hpp"
 #include "upright/analysis/delay_margin.hpp"
 #include "upright/control/predictor.hpp"
+#include "upright/hal/guarded_rig.hpp"
 #include "upright/hal/rig_factory.hpp"
 #include "upright/hal/simulated_rig.hpp"
 #include "upright/model/error.hpp"
@@ -63,6 +64,7 @@ RunSetup make_setup(const Arguments& arguments) {
   setup.limits.periods =
       static_cast<std::uint64_t>(std::llround(arguments.duration_s * setup.control.sample_rate_hz));
   setup.limits.track_limit_m = setup.rig.track_limit_m;
+  setup.limits.coast_s = setup.rig.coast_s;
   setup.limits.fall_angle_rad = setup.rig.fall_angle_rad;
   setup.limits.watchdog_s = setup.rig.watchdog_s;
   setup.limits.most_periods_late = default_periods_late(setup.control.period_s());
@@ -112,7 +114,9 @@ std::string delay_line(const ControlConfig& control) {
 }
 
 std::unique_ptr<Rig> make(const RunSetup& setup, Clock& clock) {
-  if (is_simulated(setup.rig)) return make_simulated_rig(setup.rig, clock, {setup.seed, setup.theta0_rad});
+  if (is_simulated(setup.rig))
+    return guarded(make_simulated_rig(setup.rig, clock, {setup.seed, setup.theta0_rad}),
+                   calibration_in_use(setup.rig));
   return make_rig(setup.rig, {setup.control.period_s()});
 }
 

@@ -16,7 +16,7 @@ namespace upright::cli {
 namespace {
 
 struct Flags {
-  std::string rig, tcp, rtu, plant, trace;
+  std::string rig, tcp, rtu, plant, trace, stuck_encoder = "cart";
   double theta0_deg = 0.0, hang_s = 0.0, duration_s = 0.0, late_ms = 0.0;
   bool theta0_given = false;
   bool no_pace = false;
@@ -68,6 +68,7 @@ void serve(const Flags& flags) {
   options.duration_s = flags.duration_s;
   options.faults = flags.faults;
   options.faults.late_s = flags.late_ms * 1e-3;
+  options.faults.stick_cart = flags.stuck_encoder == "cart";
   options.listening = [](const std::string& name) { std::cout << "listening on " << name << std::endl; };
   const Plant plant = plant_for(flags, rig);
   std::signal(SIGINT, stop_on_signal);
@@ -109,10 +110,23 @@ void add_virtual_rig(CLI::App& app, int& exit_code) {
       ->check(every);
   command->add_option("--inject-corrupt-every", flags->faults.corrupt_every, "One reply in N has a wrong bit")
       ->check(every);
+  command->add_option("--inject-stale-every", flags->faults.stale_every, "One reply in N is the one before")
+      ->check(every);
   command
-      ->add_option("--inject-restart-after", flags->faults.restart_after_s,
-                   "Restart the device once, this many seconds after the controller took over")
-      ->check(CLI::Range(0.0, 1e6));
+      ->add_option("--inject-reorder-every", flags->faults.reorder_every,
+                   "One reply in N leaves after the next")
+      ->check(every);
+  const auto once = [command](const char* name, double& after_s, const std::string& what) {
+    command->add_option(name, after_s, what + " once, this many seconds after the controller took over")
+        ->check(CLI::Range(0.0, 1e6));
+  };
+  once("--inject-restart-after", flags->faults.restart_after_s, "Restart the device");
+  once("--inject-cut-after", flags->faults.cut_after_s, "Cut the link");
+  once("--inject-stick-after", flags->faults.stick_after_s, "Stop an encoder");
+  once("--inject-jump-after", flags->faults.jump_after_s, "Let the cart's counts jump");
+  command->add_option("--inject-stick", flags->stuck_encoder, "Which encoder stops (cart)")
+      ->check(CLI::IsMember({"cart", "pendulum"}));
+  command->add_option("--inject-jump-counts", flags->faults.jump_counts, "How far the cart's counts jump");
   command->callback([flags, theta0, &exit_code] {
     flags->theta0_given = theta0->count() > 0;
     serve(*flags);

@@ -19,6 +19,8 @@ const char* name_of(StopReason reason) noexcept {
       return "not_finite";
     case StopReason::stale_encoder:
       return "stale_encoder";
+    case StopReason::stuck_encoder:
+      return "stuck_encoder";
     case StopReason::link_lost:
       return "link_lost";
     case StopReason::rig_fault:
@@ -52,6 +54,7 @@ StopReason reason_for(RigFault fault) {
     case RigFault::not_finite:
       return StopReason::not_finite;
     case RigFault::device_restarted:
+    case RigFault::counts_jumped:
     case RigFault::device_refused:
       return StopReason::rig_fault;
     case RigFault::link_timeout:
@@ -80,6 +83,8 @@ const char* words_for(RigFault fault) {
       return "corrupt replies";
     case RigFault::device_restarted:
       return "the device restarted, its counts begin anew";
+    case RigFault::counts_jumped:
+      return "the counts jumped by more than any motion explains";
     case RigFault::device_refused:
       return "the device refused the request";
     case RigFault::not_finite:
@@ -92,6 +97,12 @@ const char* words_for(RigFault fault) {
       return "limit switch";
   }
   return "unknown fault";
+}
+
+/// A run that ends as soon as it began has most often a sign wrong.
+std::string first_check(double time_s) {
+  constexpr double soon_s = 1.5;
+  return time_s < soon_s ? "check the signs of encoders and amplifier with the motor off, then " : "";
 }
 
 std::string brief(double value) {
@@ -121,6 +132,11 @@ std::string sentence_of(const LoopOutcome& o, const LoopLimits& limits) {
     case StopReason::stale_encoder:
       return "check the encoders' link: no new counts for more than the watchdog's " +
              brief(limits.watchdog_s * 1e3) + " ms, first" + when;
+    case StopReason::stuck_encoder:
+      return std::string("check the ") + (o.stuck == StuckEncoder::cart ? "cart's" : "pendulum's") +
+             " encoder and its cable, and that the amplifier is on and the cart free: it does not count "
+             "although the motor is balancing, first" +
+             when;
     case StopReason::link_lost:
       return "check cable, address and device: the link failed for more than the watchdog's " +
              brief(limits.watchdog_s * 1e3) + " ms (" + words_for(o.fault) + "), first" + when;
@@ -129,10 +145,12 @@ std::string sentence_of(const LoopOutcome& o, const LoopLimits& limits) {
     case StopReason::track_limit:
       return o.fault == RigFault::limit_switch
                  ? "bring the cart back to the middle: a limit switch was hit" + when
-                 : "bring the cart back to the middle: it reached the track limit of " +
-                       brief(limits.track_limit_m) + " m at x = " + brief(o.last_cart_m) + " m" + when;
+                 : first_check(o.time_s) +
+                       "bring the cart back to the middle: it reached the track limit of " +
+                       brief(limits.track_limit_m) +
+                       " m, or rolled towards it, at x = " + brief(o.last_cart_m) + " m" + when;
     case StopReason::fell:
-      return "lift the pendulum again: it fell, |theta| reached the limit of " +
+      return first_check(o.time_s) + "lift the pendulum again: it fell, |theta| reached the limit of " +
              brief(limits.fall_angle_rad * degrees) + " degrees" + when;
     case StopReason::overrun:
       return "free the processor, grant real-time scheduling or lower the sample rate: more than " +
@@ -221,13 +239,33 @@ void ControlLoop::compute(const Wake& wake, LoopOutcome& outcome) noexcept {
     stop(outcome, StopReason::not_finite, wake.tick);
   else if (balancing && std::abs(output.lean_rad) >= limits_.fall_angle_rad)
     stop(outcome, StopReason::fell, wake.tick);
-  else if (std::abs(pose.cart_m) >= limits_.track_limit_m)
+  else if (beyond_track(balancing))
     stop(outcome, StopReason::track_limit, wake.tick);
   else if (output.demand.gave_up)
     stop(outcome, StopReason::not_ready, wake.tick);
+  if (!stopped_) watch_encoders(wake, balancing, outcome);
   over_ = output.demand.over;
   if (scripted_ && balancing) row_.flags |= row_flag::feedback;
   live_.balancing.store(balancing, std::memory_order_relaxed);
+}
+
+/// At the track limit; or, while it balances, where a cart without voltage would roll to it. A script's
+/// voltages are planned to end within the track.
+bool ControlLoop::beyond_track(bool balancing) const noexcept {
+  const double outward_mps = std::copysign(1.0, row_.cart_m) * row_.cart_velocity_mps;
+  const double rolls_m = balancing ? limits_.coast_s * std::max(0.0, outward_mps) : 0.0;
+  return std::abs(row_.cart_m) + rolls_m >= limits_.track_limit_m;
+}
+
+void ControlLoop::watch_encoders(const Wake& wake, bool balancing, LoopOutcome& outcome) noexcept {
+  if (!balancing) {
+    watch_.reset();
+    return;
+  }
+  outcome.stuck = watch_.step({wake.tick, static_cast<double>(row_.time_ns) * 1e-9, row_.cart_counts,
+                               row_.pendulum_counts, row_.cart_velocity_mps, row_.voltage_v});
+  if (outcome.stuck != StuckEncoder::none)
+    stop(outcome, StopReason::stuck_encoder, watch_.silent_since(outcome.stuck));
 }
 
 void ControlLoop::write(const Wake& wake, LoopOutcome& outcome) noexcept {
@@ -248,39 +286,53 @@ void ControlLoop::write(const Wake& wake, LoopOutcome& outcome) noexcept {
     stop(outcome, StopReason::link_lost, first_unwritten_tick_);
 }
 
+/// Counts the periods that passed without a cycle. Too many of them stop the motor here, before this cycle
+/// gives it another voltage.
+void ControlLoop::count_missed(const Wake& wake, LoopOutcome& outcome) noexcept {
+  if (wake.missed == 0) return;
+  if (periods_late_ == 0) first_late_tick_ = wake.tick - wake.missed;
+  periods_late_ += wake.missed;
+  row_.flags |= row_flag::missed;
+  outcome.counts.missed += wake.missed;
+  if (periods_late_ > limits_.most_periods_late) stop(outcome, StopReason::overrun, first_late_tick_);
+}
+
 /// Counts a cycle that ended after the next was due, on the part that took longest.
 void ControlLoop::attribute_overrun(const Wake& wake, std::int64_t end_ns, LoopOutcome& outcome) noexcept {
-  const bool overran = end_ns > phase_.due_ns(wake.tick + 1);
-  if (!overran && wake.missed == 0) {
+  if (end_ns <= phase_.due_ns(wake.tick + 1)) {
     periods_late_ = 0;
     return;
   }
-  if (periods_late_ == 0) first_late_tick_ = wake.tick - wake.missed;
-  periods_late_ += wake.missed + (overran ? 1 : 0);
-  if (wake.missed > 0) {
-    row_.flags |= row_flag::missed;
-    outcome.counts.missed += wake.missed;
-  }
-  if (overran) {
-    LoopCounts& counts = outcome.counts;
-    const std::int64_t longest = std::max({row_.wake_late_ns, row_.read_ns, row_.compute_ns, row_.write_ns});
-    if (longest == row_.read_ns) {
-      row_.flags |= row_flag::overrun_read;
-      ++counts.overruns_read;
-    } else if (longest == row_.compute_ns) {
-      row_.flags |= row_flag::overrun_compute;
-      ++counts.overruns_compute;
-    } else if (longest == row_.write_ns) {
-      row_.flags |= row_flag::overrun_write;
-      ++counts.overruns_write;
-    } else {
-      row_.flags |= row_flag::overrun_wake;
-      ++counts.overruns_wake;
-    }
+  if (periods_late_ == 0) first_late_tick_ = wake.tick;
+  ++periods_late_;
+  LoopCounts& counts = outcome.counts;
+  const std::int64_t longest = std::max({row_.wake_late_ns, row_.read_ns, row_.compute_ns, row_.write_ns});
+  if (longest == row_.read_ns) {
+    row_.flags |= row_flag::overrun_read;
+    ++counts.overruns_read;
+  } else if (longest == row_.compute_ns) {
+    row_.flags |= row_flag::overrun_compute;
+    ++counts.overruns_compute;
+  } else if (longest == row_.write_ns) {
+    row_.flags |= row_flag::overrun_write;
+    ++counts.overruns_write;
+  } else {
+    row_.flags |= row_flag::overrun_wake;
+    ++counts.overruns_wake;
   }
   if (periods_late_ > limits_.most_periods_late && !stopped_)
     stop(outcome, StopReason::overrun, first_late_tick_);
-  if (!overran) periods_late_ = 0;
+}
+
+/// Reads, computes and writes; returns when each was done.
+ControlLoop::Stamps ControlLoop::act(const Wake& wake, LoopOutcome& outcome) noexcept {
+  const RigReading reading = rig_.read();
+  read_done_ns_ = clock_.now_ns();
+  const bool computed = accept(reading, wake, outcome);
+  if (computed) compute(wake, outcome);
+  const std::int64_t computed_ns = clock_.now_ns();
+  if (!stopped_) write(wake, outcome);
+  return {read_done_ns_, computed_ns, clock_.now_ns()};
 }
 
 void ControlLoop::run_cycle(const Wake& wake, std::int64_t woke_ns, LoopOutcome& outcome) noexcept {
@@ -288,17 +340,18 @@ void ControlLoop::run_cycle(const Wake& wake, std::int64_t woke_ns, LoopOutcome&
   row_.time_ns = woke_ns - phase_.start_ns;
   row_.flags = 0;
   row_.wake_late_ns = wake.late_ns;
-  const RigReading reading = rig_.read();
-  read_done_ns_ = clock_.now_ns();
-  const bool computed = accept(reading, wake, outcome);
-  if (computed) compute(wake, outcome);
-  const std::int64_t computed_ns = clock_.now_ns();
-  if (!stopped_) write(wake, outcome);
-  const std::int64_t end_ns = clock_.now_ns();
-  row_.read_ns = read_done_ns_ - woke_ns;
-  row_.compute_ns = computed_ns - read_done_ns_;
-  row_.write_ns = end_ns - computed_ns;
-  attribute_overrun(wake, end_ns, outcome);
+  Stamps done{woke_ns, woke_ns, woke_ns};
+  count_missed(wake, outcome);
+  if (stopped_) {
+    row_.flags |= row_flag::stale;
+    ++outcome.counts.stale;
+  } else {
+    done = act(wake, outcome);
+  }
+  row_.read_ns = done.read_ns - woke_ns;
+  row_.compute_ns = done.computed_ns - done.read_ns;
+  row_.write_ns = done.end_ns - done.computed_ns;
+  attribute_overrun(wake, done.end_ns, outcome);
   if (stopped_) {
     row_.flags |= row_flag::stopped;
     row_.voltage_v = 0.0;
@@ -308,7 +361,7 @@ void ControlLoop::run_cycle(const Wake& wake, std::int64_t woke_ns, LoopOutcome&
   outcome.read.add(row_.read_ns);
   outcome.compute.add(row_.compute_ns);
   outcome.write.add(row_.write_ns);
-  outcome.cycle.add(end_ns - woke_ns);
+  outcome.cycle.add(done.end_ns - woke_ns);
   if (clock_.is_virtual())
     log_.push_waiting(row_);
   else

@@ -70,6 +70,7 @@ std::string loop_text(const RunSetup& setup) {
   const LoopLimits& limits = setup.limits;
   return "loop:\n  periods: " + std::to_string(limits.periods) +
          "\n  track_limit_m: " + exact_text(limits.track_limit_m) +
+         "\n  coast_s: " + exact_text(limits.coast_s) +
          "\n  fall_angle_rad: " + exact_text(limits.fall_angle_rad) +
          "\n  watchdog_s: " + exact_text(limits.watchdog_s) +
          "\n  most_periods_late: " + std::to_string(limits.most_periods_late) +

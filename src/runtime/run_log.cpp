@@ -23,6 +23,7 @@ using namespace std::chrono_literals;
 
 constexpr auto writer_pause = 10ms;
 constexpr auto sync_pause = 50ms;
+constexpr auto full_queue_patience = 2s;  // of a loop in virtual time, whose writer may have died
 constexpr std::size_t buffer_bytes = 64 * 1024;
 constexpr std::size_t rows_at_once = 64;
 constexpr int writer_priority = 5;  // below everything that moves the motor, above what merely computes
@@ -84,7 +85,7 @@ std::size_t format_row(const LogRecord& r, char* const begin) noexcept {
 }
 
 RunLog::RunLog(const std::filesystem::path& file, const Options& options)
-    : file_(file), options_(options), queue_(options.queue_rows) {
+    : file_(file), options_(options), queue_(options.queue_rows), buffer_(buffer_bytes) {
   fd_ = ::open(file.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0644);
   if (fd_ < 0)
     throw Error(ExitCode::usage, "check the folder and its free space: cannot create " + file.string() +
@@ -107,14 +108,38 @@ RunLog::~RunLog() {
   close();
 }
 
+/// From the loop: does the writer still move?
+void RunLog::note_progress() noexcept {
+  const std::uint64_t rounds = rounds_.load(std::memory_order_relaxed);
+  rows_since_round_ = rounds == rounds_seen_ ? rows_since_round_ + 1 : 0;
+  rounds_seen_ = rounds;
+  if (rows_since_round_ > options_.stall_rows) stalled_.store(true, std::memory_order_relaxed);
+}
+
 bool RunLog::push(const LogRecord& record) noexcept {
+  note_progress();
   if (queue_.push(record)) return true;
   dropped_.fetch_add(1, std::memory_order_relaxed);
   return false;
 }
 
 void RunLog::push_waiting(const LogRecord& record) noexcept {
-  while (!queue_.push(record)) std::this_thread::yield();
+  const auto patience = std::chrono::steady_clock::duration(full_queue_patience);
+  if (queue_.push(record)) return;
+  std::uint64_t rounds = rounds_.load(std::memory_order_relaxed);
+  auto until = std::chrono::steady_clock::now() + patience;
+  while (!queue_.push(record)) {
+    std::this_thread::yield();
+    const auto now = std::chrono::steady_clock::now();
+    if (rounds != rounds_.load(std::memory_order_relaxed)) {
+      rounds = rounds_.load(std::memory_order_relaxed);
+      until = now + patience;
+    }
+    if (now < until) continue;
+    stalled_.store(true, std::memory_order_relaxed);
+    dropped_.fetch_add(1, std::memory_order_relaxed);
+    return;
+  }
 }
 
 bool RunLog::write_all(const char* text, std::size_t size) noexcept {
@@ -141,40 +166,43 @@ bool RunLog::write_all(const char* text, std::size_t size) noexcept {
   return false;
 }
 
+void RunLog::flush() noexcept {
+  if (used_ > 0 && !cannot_write() && write_all(buffer_.data(), used_)) {
+    rows_.fetch_add(rows_in_buffer_, std::memory_order_relaxed);
+    unsynced_.store(true, std::memory_order_relaxed);
+  }
+  used_ = 0;
+  rows_in_buffer_ = 0;
+  rounds_.fetch_add(1, std::memory_order_relaxed);
+}
+
+/// Rows are out of the queue only once they are text in the buffer: whoever comes after a writer that died
+/// while it wrote finds them there.
+void RunLog::drain() noexcept {
+  static_assert(buffer_bytes >= 2 * rows_at_once * longest_row);
+  std::array<LogRecord, rows_at_once> records;
+  for (;;) {
+    if (used_ + rows_at_once * longest_row > buffer_.size()) flush();
+    const std::size_t count = queue_.pop(records.data(), records.size());
+    if (count == 0) break;
+    // After a failure rows are still taken, so that a waiting loop goes on to its stop.
+    if (!cannot_write()) {
+      for (std::size_t i = 0; i < count; ++i) used_ += format_row(records[i], buffer_.data() + used_);
+      rows_in_buffer_ += count;
+    }
+    if (options_.watcher != nullptr) options_.watcher->see({records.data(), count});
+  }
+  flush();
+}
+
 void RunLog::write_loop() noexcept {
   if (options_.sync_while_running) {
     const sched_param parameters{writer_priority};
     pthread_setschedparam(pthread_self(), SCHED_FIFO, &parameters);  // where allowed
   }
-  static_assert(buffer_bytes > rows_at_once * longest_row);
-  std::array<LogRecord, rows_at_once> records;
-  static thread_local std::array<char, buffer_bytes> buffer;
-  std::size_t used = 0;
-  std::uint64_t rows = 0;
-  const auto flush = [&] {
-    if (used == 0) return;
-    if (!cannot_write() && write_all(buffer.data(), used)) {
-      rows_.fetch_add(rows, std::memory_order_relaxed);
-      unsynced_.store(true, std::memory_order_relaxed);
-    }
-    used = 0;
-    rows = 0;
-  };
   for (;;) {
     const bool last_round = closing_.load(std::memory_order_acquire);
-    const std::size_t count = queue_.pop(records.data(), records.size());
-    // After a failure rows are still taken, so that a waiting loop goes on to its stop.
-    if (!cannot_write())
-      for (std::size_t i = 0; i < count; ++i) {
-        if (used + longest_row > buffer.size()) flush();
-        used += format_row(records[i], buffer.data() + used);
-        ++rows;
-      }
-    if (count > 0) {
-      if (options_.watcher != nullptr) options_.watcher->see({records.data(), count});
-      continue;
-    }
-    flush();
+    drain();
     if (last_round) return;
     std::this_thread::sleep_for(writer_pause);
   }
@@ -192,6 +220,7 @@ void RunLog::close() noexcept {
   if (fd_ < 0) return;
   closing_.store(true, std::memory_order_release);
   if (writer_.joinable()) writer_.join();
+  drain();  // what a writer that ended early left behind
   if (syncer_.joinable()) syncer_.join();
   if (::fdatasync(fd_) != 0 && errno != EINVAL && !cannot_write())
     error_.store(errno, std::memory_order_relaxed);
@@ -201,6 +230,8 @@ void RunLog::close() noexcept {
 
 std::string RunLog::failure() const {
   if (!failed()) return {};
+  if (!cannot_write() && rows_dropped() == 0)
+    return "use a faster disk for --out: it held up " + file_.string() + " for longer than the log waits";
   if (!cannot_write())
     return "use a faster disk for --out: it held up " + file_.string() + " until " +
            std::to_string(rows_dropped()) + " rows were lost";

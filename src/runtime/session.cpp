@@ -15,6 +15,8 @@ namespace {
 
 using namespace std::chrono_literals;
 
+constexpr double log_patience_s = 2.0;  // ordinary disks stand still for a second now and then
+
 /// Whatever happens, the motor ends at zero volts.
 class StopAtEnd {
  public:
@@ -79,6 +81,8 @@ SessionResult run_session(RunSetup setup, Rig& rig, Clock& clock, const SignalFl
   log_options.sync_while_running = !clock.is_virtual();
   log_options.queue_rows = options.log_queue_rows;
   log_options.watcher = options.watcher;
+  log_options.stall_rows =
+      static_cast<std::size_t>(std::ceil(log_patience_s / controller.config().period_s()));
   RunLog log(directory.samples(), log_options);
   LiveStatus live;
   ControlLoop loop(rig, clock, controller, scaler, log, setup.limits, signal, live);

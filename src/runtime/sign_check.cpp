@@ -37,6 +37,7 @@ std::string wiring_of(const RigFile& rig) {
   RigFile plain = rig;
   plain.simulated.reset();
   plain.track_limit_m = plain.fall_angle_rad = plain.watchdog_s = 1.0;
+  plain.coast_s = 0.0;
   plain.amplifier.limit_v = 1.0;
   plain.calibration.zero_at_start = true;
   return rig_text(plain);

@@ -2,7 +2,6 @@
 // its baud rate: same counts, no old count passed off as new under any fault, one cause per fault, zero volts
 // seen from the plant's side.
 #include <gtest/gtest.h>
-#include <time.h>
 
 #include <chrono>
 #include <cmath>
@@ -42,12 +41,6 @@ std::unique_ptr<Rig> connect(const Folder& folder, const std::string& text, cons
   const std::filesystem::path file = folder / "client.yaml";
   std::ofstream(file) << pointed;
   return make_rig(read_rig_file(file), {period_s});
-}
-
-double monotonic_s() {
-  timespec now{};
-  clock_gettime(CLOCK_MONOTONIC, &now);
-  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
 }
 
 RigReading fresh_reading(Rig& rig) {

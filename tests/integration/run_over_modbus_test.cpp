@@ -2,7 +2,6 @@
 // on or is at zero volts within the watchdog's time, seen from the plant's side, and the log says which cycle
 // was the first.
 #include <gtest/gtest.h>
-#include <time.h>
 
 #include <algorithm>
 #include <chrono>
@@ -260,26 +259,6 @@ std::unique_ptr<Started> start_rig() {
   return started;
 }
 
-std::filesystem::path only_entry(const std::filesystem::path& folder) {
-  std::filesystem::path found;
-  for (const auto& entry : std::filesystem::directory_iterator(folder)) found = entry.path();
-  return found;
-}
-
-/// Waits until the run has written its first rows: the motor is on.
-void wait_for_rows(const std::filesystem::path& runs) {
-  for (int i = 0; i < 2000; ++i) {
-    std::error_code none_yet;
-    if (std::filesystem::exists(runs, none_yet)) {
-      const std::filesystem::path run = only_entry(runs);
-      const auto size = std::filesystem::file_size(run / "samples.csv", none_yet);
-      if (!none_yet && size > 300) return;
-    }
-    std::this_thread::sleep_for(std::chrono::milliseconds(5));
-  }
-  ADD_FAILURE() << "the run does not begin";
-}
-
 /// The plant knows when the first voltage came, which is when the log's time begins, and the test knows when
 /// it killed: no row between them that is older than a tenth of a second may be missing.
 TEST(KilledRun, KeepsEveryRowOlderThanATenthOfASecondAndItsReport) {
@@ -290,12 +269,10 @@ TEST(KilledRun, KeepsEveryRowOlderThanATenthOfASecondAndItsReport) {
     Process client(started->command);
     const double alive_s = moment_s(random);
     SCOPED_TRACE("killed " + std::to_string(alive_s) + " s after its first rows");
-    wait_for_rows(started->folder / "run");
+    ASSERT_TRUE(wait_for_rows(started->folder / "run"));
     std::this_thread::sleep_for(std::chrono::duration<double>(alive_s));
-    timespec now{};
-    clock_gettime(CLOCK_MONOTONIC, &now);
+    const double killed_s = monotonic_s();
     client.end(SIGKILL);
-    const double killed_s = static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
     std::this_thread::sleep_for(std::chrono::milliseconds(200));
     started->server->end();
     double let_go_s = 0.0, on_until_s = 0.0;
@@ -326,12 +303,10 @@ TEST(Signalled, IsAtZeroVoltsWithinAPeriodWithACompleteRunDirectory) {
   for (const int signal_number : {SIGINT, SIGTERM}) {
     const auto started = start_rig();
     Process client(started->command);
-    wait_for_rows(started->folder / "run");
+    ASSERT_TRUE(wait_for_rows(started->folder / "run"));
     std::this_thread::sleep_for(std::chrono::milliseconds(200));
-    timespec now{};
-    clock_gettime(CLOCK_MONOTONIC, &now);
+    const double signalled_s = monotonic_s();
     EXPECT_EQ(client.end(signal_number), 3);
-    const double signalled_s = static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
     started->server->end();
     double on_until_s = 0.0;
     for (const TraceRow& row : started->server->trace())

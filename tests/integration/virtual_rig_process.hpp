@@ -4,15 +4,18 @@
 #include <fcntl.h>
 #include <signal.h>
 #include <sys/wait.h>
+#include <time.h>
 #include <unistd.h>
 
 #include <algorithm>
+#include <chrono>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <sstream>
 #include <stdexcept>
 #include <string>
+#include <thread>
 #include <vector>
 
 namespace upright::test {
@@ -94,6 +97,7 @@ class Process {
     id_ = -1;
     return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
   }
+  pid_t id() const { return id_; }
   int end(int signal_number) {
     if (id_ <= 0) return -1;
     kill(id_, signal_number);
@@ -104,6 +108,33 @@ class Process {
   pid_t id_ = -1;
   int output_ = -1;
 };
+
+/// The one run directory below a folder; empty: there is none yet.
+inline std::filesystem::path only_entry(const std::filesystem::path& folder) {
+  std::filesystem::path found;
+  for (const auto& entry : std::filesystem::directory_iterator(folder)) found = entry.path();
+  return found;
+}
+
+/// Waits until the run has written its first rows: the motor is on. False: it does not begin.
+inline bool wait_for_rows(const std::filesystem::path& runs) {
+  for (int i = 0; i < 2000; ++i) {
+    std::error_code none_yet;
+    if (std::filesystem::exists(runs, none_yet)) {
+      const std::filesystem::path run = only_entry(runs);
+      const auto size = std::filesystem::file_size(run / "samples.csv", none_yet);
+      if (!none_yet && size > 300) return true;
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  }
+  return false;
+}
+
+inline double monotonic_s() {
+  timespec now{};
+  clock_gettime(CLOCK_MONOTONIC, &now);
+  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+}
 
 struct TraceRow {
   double time_s = 0, voltage_v = 0, cart_m = 0, theta_rad = 0;

@@ -73,6 +73,7 @@ TEST(RigFile, RandomRigsReadBackExactly) {
     rig.calibration.cart_zero_counts = rig.calibration.zero_at_start ? 0 : whole(-100000, 100000);
     rig.amplifier = {real(1, 24), whole(0, 1) * 2 - 1};
     rig.track_limit_m = real(0.1, 0.5);
+    rig.coast_s = real(0.0, 1.0);
     rig.fall_angle_rad = real(0.1, 1.0);
     rig.watchdog_s = real(0.05, 0.5);
     rig.modbus->voltage = {VoltageEncoding::float32, static_cast<WordOrder>(whole(0, 1)), real(0.1, 100)};
@@ -119,6 +120,7 @@ TEST(RigFile, RefusesWhatCannotBeMeant) {
       {"limit_v: 15.0", "limit_v: fifteen", "is not a number"},
       {"limit_v: 15.0", "limit_v: 40.0", "counts_per_v"},
       {"limit_m: 0.4", "limit_m: -0.4", "limit_m"},
+      {"coast_s: 0.1", "coast_s: -0.1", "coast_s"},
       {"fall_angle_rad: 0.6", "fall_angle_rad: 0", "fall_angle_rad"},
       {"fall_angle_rad: 0.6", "fall_angle_deg: 35", "fall_angle_rad"},
       {"watchdog_s: 0.1", "watchdog_s: 0", "watchdog_s"},

@@ -385,6 +385,13 @@ TEST(Session, EveryTroubleEndsInZeroVoltsWithItsReasonAndItsCycle) {
            if (i >= bad) reading.pendulum_counts -= 500;
          };
        }},
+      {"stuck", StopReason::stuck_encoder,
+       [](TamperedRig& rig, Clock&) {
+         rig.on_read = [last = std::int64_t{0}](int i, RigReading& reading) mutable {
+           if (i < bad) last = reading.cart_counts;
+           reading.cart_counts = last;
+         };
+       }},
       {"write", StopReason::link_lost,
        [](TamperedRig& rig, Clock&) {
          rig.on_write = [](int i) { return i > bad ? RigFault::link_timeout : RigFault::none; };
@@ -401,7 +408,9 @@ TEST(Session, EveryTroubleEndsInZeroVoltsWithItsReasonAndItsCycle) {
     const TestRun run = run_tampered(folder, setup_for(simulated_file(), 5.0), trouble.tamper);
     EXPECT_EQ(run.result.outcome.reason, trouble.reason) << trouble.what;
     EXPECT_NEAR(static_cast<double>(run.result.outcome.first_bad_tick), bad, 1.0) << trouble.what;
-    EXPECT_LE(run.result.outcome.time_s, 0.001 * bad + 0.1 + 0.06) << trouble.what;
+    // An encoder that sticks is noticed by what the motor does meanwhile.
+    const double noticed_s = trouble.reason == StopReason::stuck_encoder ? 1.0 : 0.1 + 0.06;
+    EXPECT_LE(run.result.outcome.time_s, 0.001 * bad + noticed_s) << trouble.what;
     EXPECT_TRUE(run.stopped) << trouble.what;
     EXPECT_EQ(run.last_v, 0.0) << trouble.what;
     EXPECT_EQ(run.record.samples.rows.back().voltage_v, 0.0) << trouble.what;
@@ -446,6 +455,49 @@ TEST(Session, AttributesAnOverrunToTheStepThatTookTheTime) {
   EXPECT_EQ(counts.missed, 2u);
   EXPECT_TRUE(run.record.samples.rows[100].flags & row_flag::overrun_read);
   EXPECT_TRUE(run.record.samples.rows[300].flags & row_flag::overrun_write);
+}
+
+TEST(Session, StopsWhereTheCartWouldRollToTheTrackLimit) {
+  TemporaryFolder folder;
+  RunSetup setup = setup_for(simulated_file(), 5.0);
+  setup.rig.calibration.cart.sign = -1;  // the plant counts as before: a runaway
+  const auto run_with = [&](double coast_s) {
+    setup.limits.coast_s = coast_s;
+    VirtualClock clock;
+    const auto plant = make_simulated_rig(simulated_file(), clock, {setup.seed, setup.theta0_rad});
+    plant->open();
+    const SignalFlag signal{0};
+    SessionOptions options;
+    options.out = folder.path();
+    const SessionResult result = run_session(setup, *plant, clock, signal, std::move(options));
+    EXPECT_EQ(result.outcome.reason, StopReason::track_limit);
+    for (int i = 0; i < 1000; ++i) {
+      clock.sleep_until(clock.now_ns() + 1'000'000);
+      plant->read();
+    }
+    return 2.27485e-5 * static_cast<double>(std::abs(plant->read().cart_counts));
+  };
+  constexpr double track_end_m = 0.407;
+  EXPECT_GT(run_with(0.0), track_end_m);
+  EXPECT_LT(run_with(0.1), track_end_m);
+}
+
+TEST(Session, GivesNoVoltageAfterMorePeriodsWereMissedThanItTolerates) {
+  TemporaryFolder folder;
+  int writes_before = 0;
+  const TestRun run =
+      run_tampered(folder, setup_for(simulated_file(), 5.0), [&](TamperedRig& rig, Clock& clock) {
+        rig.on_write = [&](int i) {
+          if (i == 300) clock.sleep_until(clock.now_ns() + 100'000'000);
+          writes_before = i;
+          return RigFault::none;
+        };
+      });
+  EXPECT_EQ(run.result.outcome.reason, StopReason::overrun);
+  EXPECT_EQ(writes_before, 300) << "not even one more";
+  EXPECT_EQ(run.record.samples.rows.size(), 301u);
+  EXPECT_TRUE(run.record.samples.rows.back().flags & row_flag::stopped);
+  EXPECT_FALSE(replay(run.record).first_mismatch.has_value());
 }
 
 TEST(Session, ASignalStopsBeforeAnotherVoltageIsWritten) {

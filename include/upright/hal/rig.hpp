@@ -20,6 +20,7 @@ enum class RigFault : std::uint8_t {
   link_lost,         ///< the connection is gone
   corrupt_reply,     ///< a reply failed its check sum or its format
   device_restarted,  ///< the device came back with its counters or its watchdog reset
+  counts_jumped,     ///< the counts went somewhere no motion leads to, and stayed there
   device_refused,    ///< the device answered with an exception
   not_finite,        ///< a value that is not a finite number was about to be used
   out_of_range,      ///< counts or volts outside what the hardware can mean

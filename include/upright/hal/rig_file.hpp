@@ -79,7 +79,10 @@ struct RigFile {
   Backend output = Backend::simulated;    ///< where the voltage goes: the same, or another
   Calibration calibration;
   Amplifier amplifier;
-  double track_limit_m = 0.0;   ///< the loop stops where |x| reaches it
+  double track_limit_m = 0.0;  ///< the loop stops where |x| reaches it
+  /// A cart without voltage rolls on for so many seconds times its velocity: while it balances, the loop
+  /// stops where it could just be halted before the track limit.
+  double coast_s = 0.0;
   double fall_angle_rad = 0.0;  ///< the loop stops where |theta| reaches it
   double watchdog_s = 0.0;      ///< the motor is at zero volts this long after the last good exchange
   std::optional<SimulatedRig> simulated;

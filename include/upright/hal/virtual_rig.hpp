@@ -28,8 +28,15 @@ struct InjectedFaults {
   double late_s = 0.0;
   int drop_every = 0;
   int corrupt_every = 0;  ///< one bit of a reply is wrong
-  double restart_after_s =
-      0.0;  ///< the device restarts once, this long after the pendulum was let go; 0 is never
+  // Once, this long after the pendulum was let go; 0 is never.
+  double restart_after_s = 0.0;  ///< the device restarts
+  double cut_after_s = 0.0;      ///< the link is cut, for good
+  double stick_after_s = 0.0;    ///< an encoder stops counting, for good
+  bool stick_cart = true;        ///< which: the cart's or the pendulum's
+  double jump_after_s = 0.0;     ///< the cart's counts jump, for good
+  int jump_counts = 0;
+  int stale_every = 0;    ///< one reply in so many: the reply before is sent once more in its place
+  int reorder_every = 0;  ///< the reply leaves after the next one
 };
 
 struct VirtualRigOptions {

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "upright/control/controller.hpp"
+#include "upright/control/encoder_watch.hpp"
 #include "upright/hal/calibration.hpp"
 #include "upright/hal/clock.hpp"
 #include "upright/hal/rig.hpp"
@@ -23,6 +24,7 @@ enum class StopReason : std::uint8_t {
   stop_button,  ///< of the live page
   not_finite,
   stale_encoder,
+  stuck_encoder,  ///< fresh counts that do not follow the motion
   link_lost,
   rig_fault,
   track_limit,
@@ -44,6 +46,9 @@ struct LoopLimits {
   double watchdog_s = 0.0;
   /// Stop when more periods than this in a row ended late or were missed.
   std::uint64_t most_periods_late = 0;
+  /// A cart without voltage rolls on for so many seconds times its velocity. Experiments leave it at 0: the
+  /// travel they keep to has room for that.
+  double coast_s = 0.0;
 };
 
 /// The latest of the loop, for whoever shows it. Written by the loop, read by others; each field for itself.
@@ -63,7 +68,8 @@ struct LoopCounts {
 
 struct LoopOutcome {
   StopReason reason = StopReason::duration;
-  RigFault fault = RigFault::none;  ///< behind a stop by the rig or the link
+  RigFault fault = RigFault::none;          ///< behind a stop by the rig or the link
+  StuckEncoder stuck = StuckEncoder::none;  ///< behind a stop by a stuck encoder
   int signal = 0;
   std::int64_t start_ns = 0;         ///< on the loop's clock: time zero of the samples
   std::uint64_t tick = 0;            ///< cycle in which the run ended
@@ -97,10 +103,18 @@ class ControlLoop {
 
  private:
   void stop(LoopOutcome& outcome, StopReason reason, std::uint64_t first_bad) noexcept;
+  /// When the parts of a cycle were done, on the loop's clock.
+  struct Stamps {
+    std::int64_t read_ns, computed_ns, end_ns;
+  };
+  Stamps act(const Wake& wake, LoopOutcome& outcome) noexcept;
   void run_cycle(const Wake& wake, std::int64_t woke_ns, LoopOutcome& outcome) noexcept;
   bool accept(const RigReading& reading, const Wake& wake, LoopOutcome& outcome) noexcept;
   void compute(const Wake& wake, LoopOutcome& outcome) noexcept;
+  bool beyond_track(bool balancing) const noexcept;
+  void watch_encoders(const Wake& wake, bool balancing, LoopOutcome& outcome) noexcept;
   void write(const Wake& wake, LoopOutcome& outcome) noexcept;
+  void count_missed(const Wake& wake, LoopOutcome& outcome) noexcept;
   void attribute_overrun(const Wake& wake, std::int64_t end_ns, LoopOutcome& outcome) noexcept;
   void show(const LoopOutcome& outcome) noexcept;
 
@@ -113,6 +127,7 @@ class ControlLoop {
   const SignalFlag& signal_;
   LiveStatus& live_;
 
+  EncoderWatch watch_;
   LoopPhase phase_;
   LogRecord row_;  ///< the latest: a cycle without fresh counts repeats its pose and voltage
   std::int64_t watchdog_ns_ = 0, last_fresh_ns_ = 0, last_write_ns_ = 0, read_done_ns_ = 0;

@@ -65,6 +65,8 @@ class RunLog final : public RowSink {
     /// False: only once at the end (virtual time, where nothing but the simulation is lost).
     bool sync_while_running = true;
     RowWatcher* watcher = nullptr;  ///< null: nobody. It must outlive the log.
+    /// The log has failed when its writer has not moved for so many rows in a row.
+    std::size_t stall_rows = 8192;
   };
 
   /// Creates the file with its header line. Throws Error when that fails.
@@ -77,9 +79,9 @@ class RunLog final : public RowSink {
   bool push(const LogRecord& record) noexcept override;
   /// From a loop in virtual time: waits for room, so that no row is dropped.
   void push_waiting(const LogRecord& record) noexcept override;
-  /// True once rows are missing: a write failed, so that no further row will arrive, or the queue was full.
-  /// `failure` says why.
-  bool failed() const noexcept override { return cannot_write() || rows_dropped() != 0; }
+  /// True once rows are missing or soon will be: a write failed, the queue was full, or the writer stands
+  /// still (its disk does not answer, or its thread is gone). `failure` says why.
+  bool failed() const noexcept override { return cannot_write() || rows_dropped() != 0 || stalled(); }
 
   /// Writes what is queued, syncs and closes. Safe to call twice.
   void close() noexcept;
@@ -90,6 +92,11 @@ class RunLog final : public RowSink {
 
  private:
   bool cannot_write() const noexcept { return error_.load(std::memory_order_relaxed) != 0; }
+  bool stalled() const noexcept { return stalled_.load(std::memory_order_relaxed); }
+  void note_progress() noexcept;
+  /// Writes what is queued.
+  void drain() noexcept;
+  void flush() noexcept;
   void write_loop() noexcept;
   void sync_loop() noexcept;
   /// Writes text that ends with a whole row; on failure cuts the file back to whole rows.
@@ -100,9 +107,16 @@ class RunLog final : public RowSink {
   int fd_ = -1;
   boost::lockfree::spsc_queue<LogRecord> queue_;
   std::atomic<std::uint64_t> rows_{0}, dropped_{0};
+  std::atomic<std::uint64_t> rounds_{0};  // of the writer: grows while it lives
+  std::atomic<bool> stalled_{false};
+  std::uint64_t rounds_seen_ = 0;  // by the loop
+  std::size_t rows_since_round_ = 0;
   std::atomic<int> error_{0};
   std::atomic<bool> closing_{false}, unsynced_{false};
   std::int64_t size_ = 0;
+  std::vector<char> buffer_;  // text not yet written
+  std::size_t used_ = 0;
+  std::uint64_t rows_in_buffer_ = 0;
   std::thread writer_, syncer_;
 };
 

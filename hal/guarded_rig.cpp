@@ -1,0 +1,62 @@
+#include "upright/hal/guarded_rig.hpp"
+
+#include <utility>
+
+namespace upright {
+
+namespace {
+
+constexpr int jumps_until_lost = 3;
+
+class GuardedRig final : public Rig {
+ public:
+  GuardedRig(std::unique_ptr<Rig> rig, const Calibration& calibration)
+      : rig_(std::move(rig)), calibration_(calibration) {}
+
+  void open() override {
+    rig_->open();
+    have_last_ = lost_ = false;
+    jumps_ = 0;
+  }
+  RigFault write(double voltage_v) noexcept override { return rig_->write(voltage_v); }
+  void stop() noexcept override { rig_->stop(); }
+
+  RigReading read() noexcept override {
+    RigReading reading = rig_->read();
+    if (reading.status != RigStatus::fresh) return reading;
+    if (lost_ || implausible(reading)) return refused(reading);
+    jumps_ = 0;
+    have_last_ = true;
+    last_ = reading;
+    return reading;
+  }
+
+ private:
+  bool implausible(const RigReading& reading) const noexcept {
+    if (!have_last_) return false;
+    const double elapsed_s = static_cast<double>(reading.time_ns - last_.time_ns) * 1e-9;
+    return implausible_step(last_.cart_counts, reading.cart_counts, elapsed_s, calibration_.cart) ||
+           implausible_step(last_.pendulum_counts, reading.pendulum_counts, elapsed_s, calibration_.pendulum);
+  }
+
+  RigReading refused(RigReading reading) noexcept {
+    lost_ = lost_ || ++jumps_ >= jumps_until_lost;
+    reading.status = RigStatus::fault;
+    reading.fault = lost_ ? RigFault::counts_jumped : RigFault::corrupt_reply;
+    return reading;
+  }
+
+  std::unique_ptr<Rig> rig_;
+  Calibration calibration_;
+  RigReading last_;
+  int jumps_ = 0;
+  bool have_last_ = false, lost_ = false;
+};
+
+}  // namespace
+
+std::unique_ptr<Rig> guarded(std::unique_ptr<Rig> rig, const Calibration& calibration) {
+  return std::make_unique<GuardedRig>(std::move(rig), calibration);
+}
+
+}  // namespace upright
