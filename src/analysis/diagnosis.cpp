@@ -5,6 +5,8 @@
 #include <limits>
 #include <map>
 #include <numbers>
+#include <numeric>
+#include <set>
 #include <sstream>
 
 #include "upright/analysis/confusable.hpp"
@@ -53,6 +55,33 @@ std::string kind_of(std::size_t effect) {
   return std::string(effect_registry()[effect].kind);
 }
 
+/// How lively a run is: root mean square speed of the cart, or of the pendulum where the cart does not move.
+double liveliness(const Measurement& run) {
+  const std::vector<double>& position = run.has_cart() && !run.cart_locked ? run.cart_m : run.theta_rad;
+  const auto stride = std::max<std::size_t>(1, static_cast<std::size_t>(0.02 / run.median_period_s()));
+  double sum = 0.0, count = 0.0;
+  for (std::size_t k = stride; k < position.size(); k += stride) {
+    const double speed = (position[k] - position[k - stride]) / (run.time_s[k] - run.time_s[k - stride]);
+    sum += speed * speed;
+    count += 1.0;
+  }
+  return std::sqrt(sum / std::max(count, 1.0));
+}
+
+/// Whole runs to hold out, a third of them: the middle one of each three in the order of how lively they are,
+/// so that the fit need not answer for motions beyond those it saw, in whatever order the runs were named.
+std::vector<std::size_t> choose_held_out(const std::vector<Measurement>& runs) {
+  std::vector<std::size_t> order(runs.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::stable_sort(order.begin(), order.end(),
+                   [&](std::size_t a, std::size_t b) { return liveliness(runs[a]) < liveliness(runs[b]); });
+  std::vector<std::size_t> held;
+  if (runs.size() == 2) held = {order[0]};
+  for (std::size_t i = 1; i < runs.size() && runs.size() > 2; i += 3) held.push_back(order[i]);
+  std::sort(held.begin(), held.end());
+  return held;
+}
+
 void split(const std::vector<Measurement>& runs, Diagnosis& diagnosis, FitData& train, FitData& held) {
   const std::vector<Segment> segments = cut_segments(runs);
   train.runs = held.runs = &runs;
@@ -62,14 +91,12 @@ void split(const std::vector<Measurement>& runs, Diagnosis& diagnosis, FitData& 
       (runs[0].time_s[segment.first] >= from ? held : train).segments.push_back(segment);
     diagnosis.notes.push_back("one run only: its last third is held out");
   } else {
-    // Every third run, counted from the end of each three, so that what is held out is as varied as what is
-    // fitted.
+    diagnosis.held_out_runs = choose_held_out(runs);
     for (const Segment& segment : segments) {
-      const bool out = runs.size() == 2 ? segment.run == 1 : segment.run % 3 == 2;
+      const bool out =
+          std::binary_search(diagnosis.held_out_runs.begin(), diagnosis.held_out_runs.end(), segment.run);
       (out ? held : train).segments.push_back(segment);
     }
-    for (std::size_t r = 0; r < runs.size(); ++r)
-      if (runs.size() == 2 ? r == 1 : r % 3 == 2) diagnosis.held_out_runs.push_back(r);
   }
   if (held.segments.empty() && train.segments.size() > 1) {
     held.segments.push_back(train.segments.back());
@@ -149,17 +176,24 @@ class Diagnostician {
     return true;
   }
 
-  /// How many standard errors the size of an effect is from nothing.
-  static double certainty(const Hypothesis& h, std::size_t effect) {
-    for (std::size_t j = 0; j < h.free.size(); ++j) {
-      if (h.free[j].effect != effect || h.free[j].index != 0) continue;
-      const double neutral = effect_registry()[effect].parameters[0].neutral;
-      if (!std::isfinite(neutral)) return infinity;
-      const auto at = static_cast<Eigen::Index>(j);
-      return std::abs(h.train.point.plant.find(effect)->values[0] - neutral) /
-             std::sqrt(std::max(h.train.covariance(at, at), 1e-300));
-    }
-    return 0.0;
+  /// How many standard errors the size of an effect is from nothing: from what the plant file says, of a
+  /// correction. Its other parameters (a shape, a place) are held: without a size they mean nothing.
+  double certainty(const Hypothesis& h, std::size_t effect) const {
+    std::vector<Eigen::Index> own;
+    for (std::size_t j = 0; j < h.free.size(); ++j)
+      if (h.free[j].effect == effect) own.push_back(static_cast<Eigen::Index>(j));
+    if (own.empty() || h.free[static_cast<std::size_t>(own.front())].index != 0) return 0.0;
+    const PlantEffect* given = plant_.find(effect);
+    const double nothing =
+        given != nullptr ? given->values[0] : effect_registry()[effect].parameters[0].neutral;
+    if (!std::isfinite(nothing)) return infinity;
+    const Eigen::MatrixXd covariance = h.train.covariance(own, own);
+    const Eigen::VectorXd scale = covariance.diagonal().cwiseMax(1e-300).cwiseSqrt();
+    const Eigen::MatrixXd correlation =
+        scale.cwiseInverse().asDiagonal() * covariance * scale.cwiseInverse().asDiagonal();
+    const double held = correlation.completeOrthogonalDecomposition().pseudoInverse()(0, 0);
+    return std::abs(h.train.point.plant.find(effect)->values[0] - nothing) / scale[0] *
+           std::sqrt(std::max(held, 1.0));
   }
 
   /// Gives the simpler hypothesis the richer one's noise to start from, so that a better estimate of the
@@ -179,6 +213,21 @@ class Diagnostician {
     const double evidence = improvement.train - price_of(effect);
     if (evidence < least_evidence || !(improvement.held > 0.0)) return false;
     return improvement.t_value > least_t || evidence > overwhelming_evidence;
+  }
+
+  /// How far off a plain simulation of held-out runs is, in units of the sensors' noise.
+  double simulation_gap(const Hypothesis& h) {
+    Hypothesis plain = h;
+    const Noise quiet = sensor_noise(h);
+    search_->judge(plain, &quiet);
+    return gap_of(plain);
+  }
+
+  /// Forces that look right a sample ahead can simulate badly: then the name is wrong.
+  bool simulates_as_well(const Hypothesis& h) {
+    constexpr double by_chance = 1.1;
+    if (held_.segments.empty()) return true;
+    return simulation_gap(h) < by_chance * simulation_gap(current_);
   }
 
   /// Where a hypothesis and the data disagree most: in which equation, with what it goes, and when.
@@ -216,6 +265,7 @@ class Diagnostician {
     result_.trials.push_back(trial);
   }
 
+  /// Adds effects one at a time, the best first, for as long as the data ask for one.
   void grow() {
     for (int round = 0; round < most_rounds; ++round) {
       const std::vector<std::size_t> candidates = open_candidates();
@@ -254,6 +304,7 @@ class Diagnostician {
         }
         const bool correction = current_.train.point.plant.find(candidates[i]) != nullptr;
         if (!correction && certainty(h, candidates[i]) < least_certainty) continue;
+        if (!simulates_as_well(h)) continue;
         const double score = improvement.train - price_of(candidates[i]);
         // Scores so close are equal: then the plainer effect is the one to believe.
         constexpr double equal = 4.0;
@@ -276,7 +327,51 @@ class Diagnostician {
       const double winning = screened[static_cast<std::size_t>(winner)].first;
       for (std::size_t i = 0; i < candidates.size(); ++i)
         if (candidates[i] != best_effect && screened[i].first > 0.3 * winning) near.push_back(candidates[i]);
+      record_step();
+      while (exchange()) {
+      }
     }
+  }
+
+  void record_step() {
+    Step step;
+    for (const std::size_t effect : found_) step.effects.push_back({effect, estimates_of(effect, current_)});
+    result_.steps.push_back(std::move(step));
+  }
+
+  /// What was the best name while another effect was still missing need not be the best beside it: each but
+  /// the last is exchanged for what had resembled it, where that does better now. Whether one was.
+  bool exchange() {
+    for (std::size_t i = 0; i + 1 < found_.size(); ++i) {
+      const std::size_t effect = found_[i];
+      std::vector<std::size_t> others;
+      for (const std::size_t other : near_[effect])
+        if (!is_found(other) && !exchanged_.contains({effect, other})) others.push_back(other);
+      if (others.empty()) continue;
+      tell(0.8, "is it still " + kind_of(effect));
+      const Hypothesis without = search_->without(current_, effect);
+      if (!std::isfinite(without.train.objective)) continue;
+      const double to_beat = search_->sieved(current_).train.objective - price_of(effect);
+      for (const std::size_t other : others) {
+        exchanged_.insert({effect, other});
+        Hypothesis h = search_->screened(without, other);
+        if (!(h.train.objective + price_of(other) < to_beat + confusable_evidence)) continue;
+        search_->refine(without, h);
+        const Improvement improvement = compare(current_, h);
+        const double evidence = improvement.train + price_of(effect) - price_of(other);
+        if (!(evidence > confusable_evidence) || !(improvement.held > 0.0)) continue;
+        if (!is_plausible(h, other) || certainty(h, other) < least_certainty || !simulates_as_well(h))
+          continue;
+        where_[other] = where_.at(effect);
+        near_[other] = near_[effect];
+        near_[other].push_back(effect);
+        current_ = std::move(h);
+        found_[i] = other;
+        record_step();
+        return true;
+      }
+    }
+    return false;
   }
 
   /// Two effects can hide each other, so that a third, which resembles both, is found instead. Every pair of
@@ -288,10 +383,7 @@ class Diagnostician {
     for (std::size_t a = 0; a < finalists_.size(); ++a)
       for (std::size_t b = a + 1; b < finalists_.size(); ++b) {
         const std::size_t first = finalists_[a].first, second = finalists_[b].first;
-        const auto has = [&](std::size_t e) {
-          return std::find(found_.begin(), found_.end(), e) != found_.end();
-        };
-        if (found_.size() > 2 || (found_.size() == 2 && has(first) && has(second))) continue;
+        if (found_.size() > 2 || (found_.size() == 2 && is_found(first) && is_found(second))) continue;
         tell(0.83, "trying " + kind_of(first) + " with " + kind_of(second));
         Hypothesis h = search_->with_pair(given_, finalists_[a].second, finalists_[b].second);
         const Improvement improvement = compare(best ? *best : current_, h);
@@ -299,6 +391,7 @@ class Diagnostician {
         if (improvement.train - price < least_evidence || improvement.held < 0.0) continue;
         if (!is_plausible(h, first) || !is_plausible(h, second)) continue;
         if (certainty(h, first) < least_certainty || certainty(h, second) < least_certainty) continue;
+        if (!simulates_as_well(h)) continue;
         best = std::move(h);
         best_found = {first, second};
       }
@@ -307,6 +400,7 @@ class Diagnostician {
       if (!where_.contains(effect)) where_[effect] = where_.empty() ? locate(given_) : where_.begin()->second;
     current_ = std::move(*best);
     found_ = best_found;
+    record_step();
   }
 
   /// Backward deletion: what is no longer needed once others are there goes.
@@ -323,6 +417,7 @@ class Diagnostician {
           continue;
         current_ = std::move(h);
         found_.erase(found_.begin() + static_cast<std::ptrdiff_t>(i));
+        record_step();
         again = found_.size() > 1;
         break;
       }
@@ -382,13 +477,26 @@ class Diagnostician {
       if (is_correction(j) && !is_within_belief(h, j) && is_plausible(h, h.free[j].effect) &&
           std::find(corrections.begin(), corrections.end(), h.free[j].effect) == corrections.end())
         corrections.push_back(h.free[j].effect);
-    tell(0.88, "fitting what is left");
-    std::vector<std::size_t> all = found_;
-    all.insert(all.end(), corrections.begin(), corrections.end());
-    final_ = search_->only(all, current_, nullptr, true);
-    tell(0.9, "fitting all runs");
-    known_ = search_->on_all(final_);
+    fit_last(corrections);
     order_corrections(corrections);
+  }
+
+  /// The last fits, of training runs and of all. A correction that these leave uncertain is none: it goes.
+  void fit_last(std::vector<std::size_t>& corrections) {
+    const Hypothesis* from = &current_;
+    for (;;) {
+      tell(0.88, "fitting what is left");
+      std::vector<std::size_t> all = found_;
+      all.insert(all.end(), corrections.begin(), corrections.end());
+      final_ = search_->only(all, *from, nullptr, true);
+      from = &final_;
+      tell(0.9, "fitting all runs");
+      known_ = search_->on_all(final_);
+      const auto includes_nothing = [&](std::size_t effect) { return certainty(known_, effect) < 2.0; };
+      const auto gone = std::remove_if(corrections.begin(), corrections.end(), includes_nothing);
+      if (gone == corrections.end()) return;
+      corrections.erase(gone, corrections.end());
+    }
   }
 
   /// A coefficient of the plant file that moved no further than such coefficients do from day to day: the
@@ -421,12 +529,13 @@ class Diagnostician {
 
   void conclude() {
     tell(0.92, "measuring the gap");
-    const ResidualStructure structure = examine();
+    ResidualStructure structure = examine();
+    if (!structure.structured) compare_held_out(structure);
     result_.noise = known_.train.point.noise;
     std::vector<std::size_t> all = found_;
     all.insert(all.end(), corrections_.begin(), corrections_.end());
     const Noise& fitted_noise = final_.train.point.noise;
-    const Noise quiet = sensor_noise();
+    const Noise quiet = sensor_noise(final_);
     // Of what is left but cannot be told from noise, the floor is what such noise makes; else the sensors
     // alone.
     const double floor = structure.structured ? 1.0 : floor_of(final_);
@@ -479,8 +588,8 @@ class Diagnostician {
     result_.residual_before = smooth_residuals(held_, search_->only({}, final_, &noise).held.point);
   }
 
-  Noise sensor_noise() const {
-    Noise noise = final_.train.point.noise;
+  static Noise sensor_noise(const Hypothesis& h) {
+    Noise noise = h.train.point.noise;
     noise.force = noise.torque = 0.0;
     noise.sensors = 1.0;
     return noise;
@@ -495,7 +604,7 @@ class Diagnostician {
     follow.starts_only = true;
     follow.noise_rounds = 0;
     FitPoint point = known_.train.point;
-    point.noise = sensor_noise();
+    point.noise = sensor_noise(known_);
     const FitResult plain = fit(all, point, {}, follow);
     structure.noise_ratio = whitened_rms(plain);
     point = plain.point;
@@ -503,6 +612,19 @@ class Diagnostician {
     structure.excess = structure.noise_ratio / simulation_floor(all, point);
     judge_structure(structure);
     return structure;
+  }
+
+  /// What is left of the training runs must account for the held-out runs too.
+  void compare_held_out(ResidualStructure& structure) {
+    if (held_.segments.empty()) return;
+    const double excess = simulation_gap(final_) / floor_of(final_);
+    if (!(excess > most_excess)) return;
+    structure.structured = true;
+    std::ostringstream text;
+    text.precision(3);
+    text << "a plain simulation of held-out runs is " << excess
+         << " times as far off as noise like what is left of the others would make it";
+    structure.sentence = text.str();
   }
 
   std::vector<std::size_t> all_found() const {
@@ -634,6 +756,9 @@ class Diagnostician {
     if (!rivals.empty()) result_.next_experiment = choose_experiment(final_.train.point.plant, rivals, runs_);
   }
 
+  bool is_found(std::size_t effect) const {
+    return std::find(found_.begin(), found_.end(), effect) != found_.end();
+  }
   FoundEffect& listed(std::size_t effect) {
     return *std::find_if(result_.effects.begin(), result_.effects.end(),
                          [&](const FoundEffect& found) { return found.effect == effect; });
@@ -657,6 +782,7 @@ class Diagnostician {
   Hypothesis final_;  ///< fitted to the training runs, judged on the others
   Hypothesis known_;  ///< the same effects fitted to all runs: what the model says in the end
   std::vector<std::size_t> found_, corrections_;
+  std::set<std::pair<std::size_t, std::size_t>> exchanged_;  ///< tried already
   std::map<std::size_t, std::vector<std::size_t>> near_;
   std::map<std::size_t, std::string> where_;
   std::vector<std::pair<std::size_t, Hypothesis>> finalists_;

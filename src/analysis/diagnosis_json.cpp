@@ -43,6 +43,13 @@ json trial_json(const Trial& trial) {
           {"taken", trial.taken}};
 }
 
+json step_json(const Step& step) {
+  json effects = json::array();
+  for (const Step::Effect& effect : step.effects)
+    effects.push_back({{"kind", kind_of(effect.effect)}, {"parameters", parameters_json(effect.parameters)}});
+  return effects;
+}
+
 json effect_json(const FoundEffect& effect) {
   json confusable = json::array();
   for (const std::size_t other : effect.confusable_with) confusable.push_back(kind_of(other));
@@ -67,6 +74,8 @@ json diagnosis_json(const Diagnosis& diagnosis) {
                           {"evidence", number(candidate.evidence)}});
   json trials = json::array();
   for (const Trial& trial : diagnosis.trials) trials.push_back(trial_json(trial));
+  json steps = json::array();
+  for (const Step& step : diagnosis.steps) steps.push_back(step_json(step));
   json next = nullptr;
   if (diagnosis.next_experiment)
     next = {{"name", diagnosis.next_experiment->name},
@@ -83,6 +92,7 @@ json diagnosis_json(const Diagnosis& diagnosis) {
           {"next_experiment", next},
           {"residual", diagnosis.residual},
           {"noise", noise_json(diagnosis.noise)},
+          {"steps", steps},
           {"trials", trials},
           {"notes", diagnosis.notes}};
 }

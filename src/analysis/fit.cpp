@@ -383,16 +383,6 @@ void with_jet_size(std::size_t parameters, Work&& work) {
   return work.template operator()<32>();
 }
 
-double prior_objective(const Plant& plant, const std::vector<FreeParameter>& free) {
-  double sum = 0.0;
-  for (const FreeParameter& p : free) {
-    if (p.prior_sigma <= 0.0) continue;
-    const double off = (plant.find(p.effect)->values[p.index] - p.prior_mean) / p.prior_sigma;
-    sum += off * off;
-  }
-  return sum;
-}
-
 /// Inverse of an information matrix. What holds no information at all is left out (zeros); combinations of
 /// the others that hold none are as good as unknown.
 NormalMatrix inverse_of(const NormalMatrix& h) {
@@ -475,7 +465,7 @@ class Fitter {
   /// Linearises at the present point; its objective.
   double evaluate() {
     linearise_all();
-    return likelihood_of_normals() + prior_objective(point_.plant, free_);
+    return likelihood_of_normals() + prior_objective();
   }
 
   double likelihood_of_normals() const {
@@ -523,27 +513,40 @@ class Fitter {
     }
   }
 
-  Eigen::VectorXd prior_gradient() const {
-    Eigen::VectorXd g(static_cast<Eigen::Index>(free_.size()));
+  /// How far the parameters are from where they are believed to be.
+  Eigen::VectorXd off_belief() const {
+    Eigen::VectorXd off(static_cast<Eigen::Index>(free_.size()));
     for (std::size_t j = 0; j < free_.size(); ++j) {
-      const FreeParameter& p = free_[j];
-      const double value = point_.plant.find(p.effect)->values[p.index];
-      g[static_cast<Eigen::Index>(j)] =
-          p.prior_sigma > 0.0 ? (p.prior_mean - value) / (p.prior_sigma * p.prior_sigma) : 0.0;
+      const auto at = static_cast<Eigen::Index>(j);
+      const double mean = options_.belief ? options_.belief->mean[at] : free_[j].prior_mean;
+      off[at] = point_.plant.find(free_[j].effect)->values[free_[j].index] - mean;
     }
-    return g;
+    return off;
+  }
+
+  NormalMatrix prior_information() const {
+    if (options_.belief) return options_.belief->information;
+    const auto np = static_cast<Eigen::Index>(free_.size());
+    NormalMatrix information = NormalMatrix::Zero(np, np);
+    for (Eigen::Index j = 0; j < np; ++j) {
+      const double sigma = free_[static_cast<std::size_t>(j)].prior_sigma;
+      if (sigma > 0.0) information(j, j) = 1.0 / (sigma * sigma);
+    }
+    return information;
+  }
+
+  double prior_objective() const {
+    if (free_.empty()) return 0.0;
+    const Eigen::VectorXd off = off_belief();
+    return off.dot(prior_information() * off);
   }
 
   /// The Gauss-Newton step of all segments: parameters first (initial states eliminated), then each initial
   /// state.
   FitPoint step(double damping) const {
     const auto np = static_cast<Eigen::Index>(free_.size());
-    NormalMatrix h = NormalMatrix::Zero(np, np);
-    Eigen::VectorXd g = prior_gradient();
-    for (Eigen::Index j = 0; j < np; ++j) {
-      const FreeParameter& p = free_[static_cast<std::size_t>(j)];
-      if (p.prior_sigma > 0.0) h(j, j) += 1.0 / (p.prior_sigma * p.prior_sigma);
-    }
+    NormalMatrix h = prior_information();
+    Eigen::VectorXd g = -h * off_belief();
     std::vector<Eigen::Matrix<double, states, Eigen::Dynamic>> back(normals_.size());
     std::vector<Eigen::Matrix<double, states, 1>> base(normals_.size());
     for (std::size_t s = 0; s < normals_.size(); ++s) {
@@ -695,13 +698,10 @@ class Fitter {
 
   void finish(FitResult& result) const {
     result.point = point_;
-    result.objective = prior_objective(point_.plant, free_);
+    result.objective = prior_objective();
     const auto np = static_cast<Eigen::Index>(free_.size());
-    NormalMatrix h = NormalMatrix::Zero(np, np), spread = NormalMatrix::Zero(np, np);
-    for (Eigen::Index j = 0; j < np; ++j) {
-      const FreeParameter& p = free_[static_cast<std::size_t>(j)];
-      if (p.prior_sigma > 0.0) h(j, j) += 1.0 / (p.prior_sigma * p.prior_sigma);
-    }
+    const NormalMatrix prior = prior_information();
+    NormalMatrix h = prior, spread = NormalMatrix::Zero(np, np);
     for (const Normal& n : normals_) {
       result.segment_objective.push_back(n.likelihood.objective());
       result.block_objective.insert(result.block_objective.end(), n.blocks.begin(), n.blocks.end());
@@ -723,11 +723,6 @@ class Fitter {
     const NormalMatrix inverse = inverse_of(without_held(h));
     const auto segments = static_cast<double>(normals_.size());
     const double small_sample = segments > np + 1.0 ? segments / (segments - 1.0) : 2.0;
-    NormalMatrix prior = NormalMatrix::Zero(np, np);
-    for (Eigen::Index j = 0; j < np; ++j) {
-      const FreeParameter& p = free_[static_cast<std::size_t>(j)];
-      if (p.prior_sigma > 0.0) prior(j, j) = 1.0 / (p.prior_sigma * p.prior_sigma);
-    }
     result.covariance = inverse * (robust_spread(h - prior, spread * small_sample) + prior) * inverse;
   }
 

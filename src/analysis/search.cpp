@@ -19,32 +19,53 @@ FitPoint moved_to(FitPoint point, const Plant& plant) {
   return point;
 }
 
+/// What a fit says of its parameters, as a belief. What it says nothing of is believed to be where it is.
+Belief belief_of(const Hypothesis& h) {
+  const auto n = static_cast<Eigen::Index>(h.free.size());
+  Belief belief{Eigen::VectorXd(n), Eigen::MatrixXd::Zero(n, n)};
+  Eigen::VectorXd scale(n);
+  for (Eigen::Index j = 0; j < n; ++j) {
+    const FreeParameter& p = h.free[static_cast<std::size_t>(j)];
+    belief.mean[j] = h.train.point.plant.find(p.effect)->values[p.index];
+    scale[j] = std::sqrt(h.train.covariance(j, j));
+    if (!(scale[j] > 0.0)) scale[j] = 1e-6 * p.scale;
+  }
+  Eigen::MatrixXd correlation =
+      scale.cwiseInverse().asDiagonal() * h.train.covariance * scale.cwiseInverse().asDiagonal();
+  correlation.diagonal().setConstant(1.0 + 1e-9);
+  belief.information = scale.cwiseInverse().asDiagonal() *
+                       correlation.ldlt().solve(Eigen::MatrixXd::Identity(n, n)) *
+                       scale.cwiseInverse().asDiagonal();
+  return belief;
+}
+
+double log_determinant(const Eigen::MatrixXd& information) {
+  if (information.size() == 0) return 0.0;
+  return information.ldlt().vectorD().array().abs().max(1e-300).log().sum();
+}
+
+/// Mean over its standard error.
+double t_of(const std::vector<double>& values) {
+  if (values.size() < 2) return 0.0;
+  const auto n = static_cast<double>(values.size());
+  double mean = 0.0, spread = 0.0;
+  for (const double v : values) mean += v / n;
+  for (const double v : values) spread += (v - mean) * (v - mean) / (n - 1.0);
+  return mean / std::sqrt(std::max(spread / n, 1e-12));
+}
+
 }  // namespace
 
 Improvement compare(const Hypothesis& simpler, const Hypothesis& richer) {
   Improvement result;
   if (!std::isfinite(richer.train.objective)) return {-infinity, -infinity, -infinity};
-  std::vector<double> falls, held_falls;
-  const auto by_block = [](const FitResult& before, const FitResult& after) {
-    std::vector<double> difference;
-    const std::size_t blocks = std::min(before.block_objective.size(), after.block_objective.size());
-    for (std::size_t b = 0; b < blocks; ++b)
-      difference.push_back(before.block_objective[b] - after.block_objective[b]);
-    return difference;
-  };
-  falls = by_block(simpler.train, richer.train);
-  held_falls = by_block(simpler.held, richer.held);
+  std::vector<double> falls;
+  const std::size_t blocks =
+      std::min(simpler.train.block_objective.size(), richer.train.block_objective.size());
+  for (std::size_t b = 0; b < blocks; ++b)
+    falls.push_back(simpler.train.block_objective[b] - richer.train.block_objective[b]);
   result.train = simpler.train.objective - richer.train.objective;
-  const auto t_of = [](const std::vector<double>& values) {
-    const auto n = static_cast<double>(values.size());
-    if (values.size() < 2) return 0.0;
-    double mean = 0.0, spread = 0.0;
-    for (const double f : values) mean += f / n;
-    for (const double f : values) spread += (f - mean) * (f - mean) / (n - 1.0);
-    return mean / std::sqrt(std::max(spread / n, 1e-12));
-  };
-  for (const double f : held_falls) result.held += f;
-  falls.insert(falls.end(), held_falls.begin(), held_falls.end());
+  result.held = simpler.surprise - richer.surprise;
   result.t_value = t_of(falls);
   return result;
 }
@@ -102,6 +123,18 @@ void Search::judge(Hypothesis& h, const Noise* noise) {
   const FitPoint plain{plant_, held_starts_, noise != nullptr ? *noise : h.train.point.noise};
   const FitPoint point = moved_to(plain, h.train.point.plant);
   h.held = fit(held_, point, {}, options);
+  if (noise == nullptr) h.surprise = surprise_of(h);
+}
+
+double Search::surprise_of(const Hypothesis& h) const {
+  if (!std::isfinite(h.held.objective) || held_.segments.empty()) return h.held.objective;
+  FitOptions options;
+  options.noise_rounds = 1;
+  options.most_iterations = 4;
+  options.belief = belief_of(h);
+  const FitResult told = fit(held_, h.held.point, h.free, options);
+  // Laplace's approximation of the likelihood, averaged over what the training runs left open.
+  return told.objective + log_determinant(told.information) - log_determinant(options.belief->information);
 }
 
 Hypothesis Search::baseline() {

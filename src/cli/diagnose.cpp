@@ -53,6 +53,29 @@ std::string in_words(const ParameterEstimate& p) {
   return text;
 }
 
+/// How the search came to its answer, where it did not only add one effect after the other.
+void print_steps(const Diagnosis& d) {
+  const auto lost = [&](const Step::Effect& had) {
+    return std::none_of(d.effects.begin(), d.effects.end(),
+                        [&](const FoundEffect& found) { return found.effect == had.effect; });
+  };
+  if (std::none_of(d.steps.begin(), d.steps.end(), [&](const Step& step) {
+        return std::any_of(step.effects.begin(), step.effects.end(), lost);
+      }))
+    return;
+  std::printf("Steps of the search (with --trials: every fit):\n");
+  for (std::size_t i = 0; i < d.steps.size(); ++i) {
+    std::printf("  %zu.", i + 1);
+    for (const Step::Effect& effect : d.steps[i].effects) {
+      std::printf(" %s", kind_of(effect.effect).c_str());
+      for (const ParameterEstimate& p : effect.parameters)
+        std::printf(" %s %.4g %s", p.name.c_str(), p.value, p.unit.c_str());
+      std::printf(";");
+    }
+    std::printf("\n");
+  }
+}
+
 void print(const Diagnosis& d, const std::string& out) {
   switch (d.verdict) {
     case Verdict::explained:
@@ -81,6 +104,7 @@ void print(const Diagnosis& d, const std::string& out) {
       names += (names.empty() ? "" : ", ") + kind_of(other);
     std::printf("      these data cannot tell it from: %s\n", names.c_str());
   }
+  print_steps(d);
   std::printf("Remaining: %s.\n", d.residual.c_str());
   if (d.next_experiment)
     std::printf("Next run, to tell them apart: upright experiment %s --rig RIG\n  %s\n",

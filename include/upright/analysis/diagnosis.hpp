@@ -49,6 +49,16 @@ struct Trial {
   bool taken = false;
 };
 
+/// The effects in the model after one step of the search: one added, exchanged or dropped. Values are of the
+/// training runs.
+struct Step {
+  struct Effect {
+    std::size_t effect = 0;
+    std::vector<ParameterEstimate> parameters;
+  };
+  std::vector<Effect> effects;
+};
+
 /// Residual force and torque along a run, smoothed, with what they are seen against. For the report.
 struct ResidualTrace {
   std::size_t run = 0;
@@ -68,6 +78,7 @@ struct Diagnosis {
   std::vector<FoundEffect> effects;        ///< in the order found
   std::vector<CandidateScore> candidates;  ///< of the first round, best first
   std::vector<Trial> trials;               ///< every whole fit of the search, in order
+  std::vector<Step> steps;                 ///< how the model grew
   std::optional<NextExperiment> next_experiment;
   Plant model;  ///< the plant with the effects added
   Noise noise;

@@ -97,12 +97,19 @@ struct FitResult {
   bool converged = false;
 };
 
+/// What is believed of all free parameters together: a Gaussian, in their order.
+struct Belief {
+  Eigen::VectorXd mean;
+  Eigen::MatrixXd information;
+};
+
 struct FitOptions {
   int most_iterations = 12;
   int noise_rounds = 2;           ///< how often the noise is estimated anew; 0: as given
   std::optional<Noise> or_noise;  ///< another place from which to search for the noise, if it is the better
   bool noise_last = false;        ///< with no rounds: estimate the noise once, roughly, after the descent
-  bool starts_only = false;       ///< the plant is held: only initial states follow (held-out data)
+  bool starts_only = false;       ///< the plant is held: only initial states follow
+  std::optional<Belief> belief;   ///< in the place of what each free parameter says of itself
   double tolerance = 1e-4;        ///< relative fall of the objective per sample at which to stop
 };
 

@@ -14,7 +14,9 @@ namespace upright {
 struct Hypothesis {
   std::set<std::size_t> added;  ///< effects freed beyond what the plant file says
   FitResult train;
-  FitResult held;                   ///< initial states only, plant from `train`
+  FitResult held;         ///< initial states only, plant and noise from `train`
+  double surprise = 0.0;  ///< of the held-out data: minus twice the log of their likelihood, with noise of
+                          ///< their own, averaged over what the training data leave open of the parameters
   std::vector<FreeParameter> free;  ///< the parameters that moved, in the order of train.covariance
   bool valid = false;               ///< fitted, and no parameter at a bound that makes it another effect
 };
@@ -23,8 +25,8 @@ struct Hypothesis {
 /// of a quarter of a second.
 struct Improvement {
   double train = 0.0;    ///< fall of the objective on training data
-  double held = 0.0;     ///< on held-out data
-  double t_value = 0.0;  ///< of the mean fall per quarter of a second, training and held-out together
+  double held = 0.0;     ///< of the surprise of held-out data
+  double t_value = 0.0;  ///< of the mean fall per quarter of a second of training data
 };
 
 Improvement compare(const Hypothesis& simpler, const Hypothesis& richer);
@@ -60,9 +62,11 @@ class Search {
   Hypothesis on_all(const Hypothesis& h) const;
   /// Adds two effects at once to a hypothesis and fits to convergence.
   Hypothesis with_pair(const Hypothesis& base, const Hypothesis& first, const Hypothesis& second);
+  /// Follows held-out data: with this noise, or else with the fitted noise, and then their surprise too.
   void judge(Hypothesis& hypothesis, const Noise* noise = nullptr);
 
  private:
+  double surprise_of(const Hypothesis& h) const;
   std::vector<FreeParameter> free_of(const std::set<std::size_t>& added) const;
   Plant plant_with(const Plant& current, const std::set<std::size_t>& added) const;
   std::vector<std::vector<double>> starts_of(std::size_t effect, const Hypothesis& base) const;
