@@ -10,6 +10,7 @@ namespace upright::cli {
 void add_check(CLI::App& app, int& exit_code);
 void add_design(CLI::App& app, int& exit_code);
 void add_diagnose(CLI::App& app, int& exit_code);
+void add_doctor(CLI::App& app, int& exit_code);
 void add_effects(CLI::App& app, int& exit_code);
 void add_experiment(CLI::App& app, int& exit_code);
 void add_identify(CLI::App& app, int& exit_code);

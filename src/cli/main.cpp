@@ -102,6 +102,7 @@ int run(int argc, char** argv) {
   upright::cli::add_diagnose(app, exit_code);
   upright::cli::add_identify(app, exit_code);
   upright::cli::add_virtual_rig(app, exit_code);
+  upright::cli::add_doctor(app, exit_code);
   try {
     app.parse(argc, argv);
     upright::cli::finish_output();

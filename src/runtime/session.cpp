@@ -4,10 +4,12 @@
 #include <cmath>
 #include <exception>
 #include <future>
+#include <optional>
 #include <thread>
 
 #include "upright/model/error.hpp"
 #include "upright/model/plant_file.hpp"
+#include "upright/runtime/cpu_latency.hpp"
 
 namespace upright {
 
@@ -72,6 +74,8 @@ void find_zero(Rig& rig, Clock& clock, RigFile& file, double patience_s) {
 SessionResult run_session(RunSetup setup, Rig& rig, Clock& clock, const SignalFlag& signal,
                           SessionOptions options) {
   const StopAtEnd stop_at_end(rig);
+  std::optional<CpuLatencyHold> awake;
+  if (!clock.is_virtual()) awake.emplace();
   Controller controller(setup.control, setup.rig.amplifier.limit_v, std::move(options.compensator));
   controller.follow(options.source);
   PoseScaler scaler(calibration_in_use(setup.rig));
@@ -95,6 +99,7 @@ SessionResult run_session(RunSetup setup, Rig& rig, Clock& clock, const SignalFl
   std::thread thread([&] {
     try {
       if (!clock.is_virtual()) setup.scheduling = enter_realtime(options.realtime);
+      if (awake && awake->held()) setup.scheduling.note += ", processors kept out of deep sleep";
       directory.write_start(setup);
       loop.run(result.outcome);
       finished.set_value();

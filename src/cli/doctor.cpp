@@ -1,0 +1,194 @@
+// `upright doctor`: what this machine, and with a rig its link, are good for, on one page with one verdict.
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <iostream>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "commands.hpp"
+#include "options.hpp"
+#include "signals.hpp"
+#include "upright/control/gain_file.hpp"
+#include "upright/hal/rig_factory.hpp"
+#include "upright/model/error.hpp"
+#include "upright/runtime/machine_check.hpp"
+#include "upright/runtime/rig_check.hpp"
+#include "upright/runtime/wake_probe.hpp"
+
+namespace upright::cli {
+
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+struct Arguments {
+  std::string rig, gains;
+  std::optional<double> rate_hz;
+  double seconds = 10.0, hand_s = 30.0;
+  bool by_hand = false, as_json = false;
+};
+
+/// What was measured, beside what it means.
+struct Page {
+  std::vector<Finding> findings;
+  double rate_hz = 0.0;
+  DurationHistogram idle, loaded;
+  std::optional<LinkProbe> link;
+};
+
+/// The rate to examine: the one given, the gain file's, or what suits the link.
+double rate_of(const Arguments& arguments, const std::optional<RigFile>& rig) {
+  constexpr double usual_hz = 1000.0;
+  if (arguments.rate_hz) return *arguments.rate_hz;
+  if (!arguments.gains.empty()) return read_gain_file(arguments.gains).sample_rate_hz;
+  if (!rig || !rig->modbus) return usual_hz;
+  return std::min(usual_hz, std::max(lowest_sample_rate_hz, 0.5 / rig->modbus->response_timeout_s));
+}
+
+void append(std::vector<Finding>& to, const std::vector<Finding>& more) {
+  to.insert(to.end(), more.begin(), more.end());
+}
+
+void examine_timing(const Arguments& arguments, Page& page) {
+  std::fprintf(stderr, "upright: measuring wake-ups, %.0f s idle and %.0f s under load\n", arguments.seconds,
+               arguments.seconds);
+  const WakeProbe idle = probe_wake_ups(page.rate_hz, arguments.seconds, false, {});
+  const WakeProbe loaded = probe_wake_ups(page.rate_hz, arguments.seconds, true, {});
+  page.idle = idle.late;
+  page.loaded = loaded.late;
+  append(page.findings, examine_grant(loaded.grant));
+  page.findings.push_back(judge_wake_ups("wake-ups, idle", idle.late, 1.0 / page.rate_hz));
+  page.findings.push_back(judge_wake_ups("wake-ups, loaded", loaded.late, 1.0 / page.rate_hz));
+}
+
+void examine_hand(const Arguments& arguments, const RigFile& file, Rig& rig, Clock& clock,
+                  const SignalFlag& signal, Page& page) {
+  if (!arguments.by_hand) {
+    page.findings.push_back({"encoder signs", Health::not_examined, "nobody moved cart and pendulum",
+                             "switch the amplifier off and run it with --by-hand"});
+    return;
+  }
+  append(page.findings, examine_signs_by_hand(rig, clock, calibration_in_use(file), arguments.hand_s, signal,
+                                              [](const std::string& words) {
+                                                std::fprintf(stderr, "upright: with the amplifier off, %s\n",
+                                                             words.c_str());
+                                              }));
+}
+
+void examine_rig(const Arguments& arguments, const RigFile& file, Page& page) {
+  if (is_simulated(file)) {
+    page.findings.push_back({"link", Health::good, "none: the rig is simulated", ""});
+    return;
+  }
+  const SignalFlag& signal = catch_signals();
+  MonotonicClock clock;
+  const std::unique_ptr<Rig> rig = make_rig(file, {1.0 / page.rate_hz});
+  rig->open();
+  std::fprintf(stderr, "upright: measuring the link for %.0f s, at zero volts\n", arguments.seconds);
+  page.link = probe_link(*rig, clock, page.rate_hz, arguments.seconds, signal);
+  page.findings.push_back(judge_link(*page.link, page.rate_hz));
+  page.findings.push_back(judge_zero(page.link->counts, calibration_in_use(file)));
+  examine_hand(arguments, file, *rig, clock, signal, page);
+  page.findings.push_back({"emergency stop, limit switches", Health::not_examined, "the rig file names none",
+                           "let the emergency stop cut the amplifier's supply: the program does not see it"});
+  rig->stop();
+}
+
+const char* sentence_for(Health verdict) {
+  if (verdict == Health::bad) return "not fit to run a rig: see the lines marked bad";
+  if (verdict == Health::poor) return "fit to run a rig, less well than it could: see the remedies";
+  return "fit to run a rig";
+}
+
+Json json_of(const DurationHistogram& h) {
+  Json upper = Json::array(), count = Json::array();
+  for (std::size_t i = 0; i < h.buckets().size(); ++i) {
+    if (h.buckets()[i] == 0) continue;
+    upper.push_back(static_cast<double>(h.upper_end_ns(i)) / 1e3);
+    count.push_back(h.buckets()[i]);
+  }
+  return {{"count", h.count()},
+          {"p50_us", h.quantile_us(0.5)},
+          {"p99_us", h.quantile_us(0.99)},
+          {"p99_9_us", h.quantile_us(0.999)},
+          {"max_us", h.max_us()},
+          {"histogram_upper_us", upper},
+          {"histogram_count", count}};
+}
+
+Json json_of(const Page& page, Health verdict) {
+  Json findings = Json::array();
+  for (const Finding& f : page.findings)
+    findings.push_back({{"subject", f.subject},
+                        {"health", name_of(f.health)},
+                        {"what", f.what},
+                        {"remedy", f.remedy.empty() ? Json(nullptr) : Json(f.remedy)}});
+  Json document{{"verdict", name_of(verdict)},
+                {"sentence", sentence_for(verdict)},
+                {"findings", findings},
+                {"rate_hz", page.rate_hz},
+                {"wake_late_idle", json_of(page.idle)},
+                {"wake_late_loaded", json_of(page.loaded)},
+                {"link", nullptr}};
+  if (page.link) {
+    document["link"] = json_of(page.link->round_trip);
+    document["link"]["failed"] = page.link->failed;
+    document["link"]["highest_rate_hz"] = highest_rate_hz(page.link->round_trip);
+  }
+  return document;
+}
+
+void print(const Page& page, Health verdict) {
+  for (const Finding& f : page.findings) {
+    std::printf("%-13s %s: %s\n", name_of(f.health), f.subject.c_str(), f.what.c_str());
+    if (!f.remedy.empty()) std::printf("              -> %s\n", f.remedy.c_str());
+  }
+  std::printf("Verdict: %s.\n", sentence_for(verdict));
+  std::fflush(stdout);
+}
+
+ExitCode run(const Arguments& arguments) {
+  std::optional<RigFile> rig;
+  if (!arguments.rig.empty()) rig = read_rig_file(arguments.rig);
+  Page page;
+  page.rate_hz = rate_of(arguments, rig);
+  page.findings = examine_machine();
+  examine_timing(arguments, page);
+  if (rig) examine_rig(arguments, *rig, page);
+  const Health verdict = verdict_of(page.findings);
+  if (arguments.as_json)
+    std::cout << json_of(page, verdict).dump(2, ' ', false, Json::error_handler_t::replace) << "\n";
+  else
+    print(page, verdict);
+  return verdict == Health::bad ? ExitCode::device : ExitCode::done;
+}
+
+}  // namespace
+
+void add_doctor(CLI::App& app, int& exit_code) {
+  CLI::App* command = app.add_subcommand("doctor", "What this machine and a rig's link are good for");
+  command->footer(
+      "Example:  upright doctor --rig config/rigs/modbus-tcp.yaml --rate 500\n"
+      "Writes no voltage. Each line has its remedy; exit code 4 when the verdict is bad.");
+  const auto a = std::make_shared<Arguments>();
+  command->add_option("--rig", a->rig, "Rig file, to examine its link too");
+  command->add_option("--gains", a->gains, "Gain file, for its sample rate");
+  command
+      ->add_option("--rate", a->rate_hz,
+                   "Sample rate to examine [Hz] (the gain file's, or what suits the link)")
+      ->check(number_in(Range::within(lowest_sample_rate_hz, highest_sample_rate_hz)));
+  constexpr double longest_s = 3600.0;
+  command->add_option("--seconds", a->seconds, "How long to measure each [s] (10)")
+      ->check(number_in({0.0, longest_s, true}));
+  command->add_flag("--by-hand", a->by_hand, "Check the encoders' signs: asks you to move cart and pendulum");
+  command->add_option("--hand-wait", a->hand_s, "How long to wait for each move [s] (30)")
+      ->check(number_in({0.0, longest_s, true}));
+  command->add_flag("--json", a->as_json, "One JSON document");
+  command->callback([a, &exit_code] { exit_code = static_cast<int>(run(*a)); });
+}
+
+}  // namespace upright::cli

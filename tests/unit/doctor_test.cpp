@@ -1,0 +1,230 @@
+// What `upright doctor` concludes from what it finds, without a machine or a rig that has it.
+#include <gtest/gtest.h>
+#include <stdlib.h>
+
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <iterator>
+#include <numbers>
+#include <string>
+
+#include "upright/runtime/cpu_latency.hpp"
+#include "upright/runtime/machine_check.hpp"
+#include "upright/runtime/rig_check.hpp"
+#include "upright/runtime/wake_probe.hpp"
+
+namespace upright {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// A folder that stands for the root of a machine.
+class FakeRoot {
+ public:
+  FakeRoot() {
+    std::string name = (fs::temp_directory_path() / "upright-XXXXXX").string();
+    path_ = ::mkdtemp(name.data());
+  }
+  ~FakeRoot() {
+    std::error_code ignored;
+    fs::remove_all(path_, ignored);
+  }
+  FakeRoot(const FakeRoot&) = delete;
+  FakeRoot& operator=(const FakeRoot&) = delete;
+  const fs::path& path() const { return path_; }
+  void put(const std::string& name, const std::string& text) const {
+    fs::create_directories((path_ / name).parent_path());
+    std::ofstream(path_ / name) << text;
+  }
+
+ private:
+  fs::path path_;
+};
+
+const Finding& about(const std::vector<Finding>& findings, const std::string& subject) {
+  for (const Finding& finding : findings)
+    if (finding.subject == subject) return finding;
+  throw std::runtime_error("nothing about " + subject);
+}
+
+TEST(MachineCheck, KnowsAMachineThatIsWellSetUp) {
+  const FakeRoot root;
+  root.put("sys/kernel/realtime", "1\n");
+  root.put("sys/devices/system/cpu/isolated", "3\n");
+  root.put("sys/devices/system/cpu/cpu0/cpufreq/scaling_governor", "performance\n");
+  root.put("sys/devices/system/cpu/cpu0/cpuidle/state1/name", "C1\n");
+  root.put("dev/cpu_dma_latency", "");
+  const std::vector<Finding> findings = examine_machine(root.path());
+  for (const char* subject : {"kernel", "processors", "governor", "sleep states"}) {
+    EXPECT_EQ(about(findings, subject).health, Health::good) << subject;
+    EXPECT_TRUE(about(findings, subject).remedy.empty()) << subject;
+  }
+}
+
+TEST(MachineCheck, HasARemedyForEachThingThatIsPoor) {
+  const FakeRoot root;
+  root.put("sys/devices/system/cpu/isolated", "\n");
+  root.put("sys/devices/system/cpu/cpu0/cpufreq/scaling_governor", "powersave\n");
+  root.put("sys/devices/system/cpu/cpu1/cpufreq/scaling_governor", "schedutil\n");
+  root.put("sys/devices/system/cpu/cpu0/cpuidle/state1/name", "C1\n");
+  const std::vector<Finding> findings = examine_machine(root.path());
+  for (const char* subject : {"kernel", "processors", "governor", "sleep states"}) {
+    EXPECT_EQ(about(findings, subject).health, Health::poor) << subject;
+    EXPECT_FALSE(about(findings, subject).remedy.empty()) << subject;
+  }
+  EXPECT_EQ(verdict_of(findings), Health::poor);
+}
+
+TEST(MachineCheck, JudgesWhatWasGranted) {
+  RealtimeGrant grant;
+  EXPECT_EQ(verdict_of(examine_grant(grant)), Health::poor);
+  grant.policy = "SCHED_FIFO";
+  grant.memory_locked = true;
+  EXPECT_EQ(verdict_of(examine_grant(grant)), Health::good);
+}
+
+TEST(Verdict, IsTheWorstAndWhatWasNotExaminedCountsForNothing) {
+  EXPECT_EQ(verdict_of({}), Health::good);
+  EXPECT_EQ(verdict_of({{"a", Health::not_examined, "", ""}}), Health::good);
+  EXPECT_EQ(verdict_of({{"a", Health::poor, "", ""}, {"b", Health::good, "", ""}}), Health::poor);
+  EXPECT_EQ(verdict_of({{"a", Health::bad, "", ""}, {"b", Health::not_examined, "", ""}}), Health::bad);
+}
+
+DurationHistogram all_of(std::int64_t ns) {
+  DurationHistogram histogram;
+  for (int i = 0; i < 1000; ++i) histogram.add(ns);
+  return histogram;
+}
+
+TEST(WakeUps, AreJudgedAgainstThePeriod) {
+  EXPECT_EQ(judge_wake_ups("w", all_of(90'000), 0.001).health, Health::good);
+  EXPECT_EQ(judge_wake_ups("w", all_of(200'000), 0.001).health, Health::poor);
+  EXPECT_EQ(judge_wake_ups("w", all_of(700'000), 0.001).health, Health::bad);
+  EXPECT_EQ(judge_wake_ups("w", all_of(700'000), 0.01).health, Health::good);
+}
+
+TEST(WakeUps, AreMeasuredAtTheRateThatWasAsked) {
+  const WakeProbe probe = probe_wake_ups(500.0, 0.3, true, {});
+  EXPECT_LE(probe.late.count(), 150u);
+  EXPECT_GT(probe.late.count(), 20u) << "a busy machine misses some";
+  EXPECT_FALSE(probe.grant.note.empty());
+}
+
+TEST(Link, CarriesTwoRoundTripsPerPeriod) {
+  LinkProbe probe;
+  probe.round_trip = all_of(1'000'000);
+  EXPECT_NEAR(highest_rate_hz(probe.round_trip), 500.0, 1.0);
+  EXPECT_EQ(judge_link(probe, 400.0).health, Health::good);
+  EXPECT_EQ(judge_link(probe, 600.0).health, Health::poor);
+  probe.failed = 5;
+  EXPECT_EQ(judge_link(probe, 400.0).health, Health::poor);
+  probe.failed = 100;
+  EXPECT_EQ(judge_link(probe, 400.0).health, Health::bad);
+  EXPECT_EQ(judge_link({}, 400.0).health, Health::bad);
+}
+
+Calibration ip02() {
+  Calibration calibration;
+  calibration.cart = {2.27485e-5, 1, 32, 5.0};
+  calibration.pendulum = {2.0 * std::numbers::pi / 4096.0, 1, 32, 60.0};
+  return calibration;
+}
+
+TEST(Zero, IsRightWhenTheRestingPendulumHangsByIt) {
+  const Calibration calibration = ip02();
+  EXPECT_EQ(judge_zero({{100, 2048}, {101, 2047}}, calibration).health, Health::good);
+  EXPECT_EQ(judge_zero({{100, -2048}}, calibration).health, Health::good) << "the other way round";
+  const Finding off = judge_zero({{100, 1000}}, calibration);
+  EXPECT_EQ(off.health, Health::poor);
+  EXPECT_NE(off.remedy.find("{at: counts, cart_counts: 100, pendulum_counts: 1000, pose: hanging}"),
+            std::string::npos)
+      << off.remedy;
+}
+
+TEST(Zero, IsNotJudgedWhileTheRigMoves) {
+  EXPECT_EQ(judge_zero({{100, 2048}, {100, 2060}}, ip02()).health, Health::not_examined);
+  EXPECT_EQ(judge_zero({}, ip02()).health, Health::not_examined);
+}
+
+TEST(HandTest, TellsAgreementFromOppositionAndWaitsForAClearMove) {
+  const HandTest cart(HandMove::cart_to_plus, {0.1, 3.0});
+  EXPECT_EQ(cart.look({0.105, 9.0}), HandAnswer::nothing_yet);
+  EXPECT_EQ(cart.look({0.13, 3.0}), HandAnswer::agrees);
+  EXPECT_EQ(cart.look({0.07, 3.0}), HandAnswer::opposes);
+  // The bob of a hanging pendulum at +x: theta is below pi.
+  const HandTest bob(HandMove::bob_to_plus, {0.1, std::numbers::pi});
+  EXPECT_EQ(bob.look({0.5, std::numbers::pi}), HandAnswer::nothing_yet);
+  EXPECT_EQ(bob.look({0.1, 2.5}), HandAnswer::agrees);
+  EXPECT_EQ(bob.look({0.1, 3.8}), HandAnswer::opposes);
+}
+
+/// Encoders that somebody moves.
+class MovedRig final : public Rig {
+ public:
+  MovedRig(Clock& clock, std::function<EncoderCounts(double)> at) : clock_(clock), at_(std::move(at)) {}
+  void open() override {}
+  RigReading read() noexcept override {
+    const EncoderCounts counts = at_(static_cast<double>(clock_.now_ns()) * 1e-9);
+    RigReading reading;
+    reading.cart_counts = counts.cart;
+    reading.pendulum_counts = counts.pendulum;
+    reading.time_ns = clock_.now_ns();
+    reading.status = RigStatus::fresh;
+    return reading;
+  }
+  RigFault write(double) noexcept override {
+    ADD_FAILURE() << "a voltage was written";
+    return RigFault::none;
+  }
+  void stop() noexcept override {}
+
+ private:
+  Clock& clock_;
+  std::function<EncoderCounts(double)> at_;
+};
+
+TEST(SignsByHand, FollowBothMovesAndWriteNothing) {
+  for (const int sign : {1, -1}) {
+    VirtualClock clock;
+    MovedRig rig(clock, [sign](double time_s) {
+      const double pushed_m = std::min(0.1, 0.05 * time_s),
+                   lifted_rad = time_s < 3.0 ? 0.0 : 0.5 * (time_s - 3.0);
+      return EncoderCounts{sign * std::llround(pushed_m / 2.27485e-5),
+                           sign * std::llround((std::numbers::pi - lifted_rad) * 2048.0 / std::numbers::pi)};
+    });
+    Calibration calibration = ip02();
+    std::string asked;
+    const SignalFlag signal{0};
+    const std::vector<Finding> findings = examine_signs_by_hand(
+        rig, clock, calibration, 10.0, signal, [&](const std::string& words) { asked += words; });
+    ASSERT_EQ(findings.size(), 2u);
+    for (const Finding& finding : findings)
+      EXPECT_EQ(finding.health, sign == 1 ? Health::good : Health::bad) << finding.subject;
+    EXPECT_NE(asked.find("+x"), std::string::npos);
+  }
+}
+
+TEST(SignsByHand, SayThatNobodyMovedAnything) {
+  VirtualClock clock;
+  MovedRig rig(clock, [](double) { return EncoderCounts{5, 2048}; });
+  const SignalFlag signal{0};
+  const std::vector<Finding> findings =
+      examine_signs_by_hand(rig, clock, ip02(), 1.0, signal, [](const std::string&) {});
+  for (const Finding& finding : findings) EXPECT_EQ(finding.health, Health::not_examined);
+  EXPECT_NEAR(static_cast<double>(clock.now_ns()) * 1e-9, 2.0, 0.1);
+}
+
+TEST(CpuLatencyHold, WritesZeroMicrosecondsWhereItCan) {
+  const FakeRoot root;
+  root.put("cpu_dma_latency", "");
+  const CpuLatencyHold hold(root.path() / "cpu_dma_latency");
+  EXPECT_TRUE(hold.held());
+  std::ifstream in(root.path() / "cpu_dma_latency", std::ios::binary);
+  EXPECT_EQ(std::string((std::istreambuf_iterator<char>(in)), std::istreambuf_iterator<char>()),
+            std::string(4, '\0'));
+  EXPECT_FALSE(CpuLatencyHold(root.path() / "none").held());
+}
+
+}  // namespace
+}  // namespace upright
