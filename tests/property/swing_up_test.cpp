@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cstdio>
 #include <filesystem>
 #include <random>
 
@@ -46,6 +47,8 @@ TEST_P(SwingUp, CatchesAndBalancesInNearlyEveryTrial) {
     farthest_m = std::max(farthest_m, r.farthest_m);
     if (r.outcome.reason == StopReason::duration) ++caught;
   }
+  std::printf("%s: %d of %d caught and balanced, cart within %.3f m\n", GetParam(), caught, trials,
+              farthest_m);
   EXPECT_GE(caught, 95);
   EXPECT_LT(farthest_m, 0.35);
 }
