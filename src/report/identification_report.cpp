@@ -25,9 +25,9 @@ double dry_level_n(const Plant& plant, double speed_mps) {
   return value_or(plant, "coulomb_friction", 0, 0.0) + extra * std::exp(-std::pow(speed_mps / vs, shape));
 }
 
-void save(const Plot& plot, const std::string& id, const std::filesystem::path& file) {
+void save(const Plot& plot, const std::filesystem::path& file) {
   std::ofstream out(file);
-  out << svg_of(plot, id);
+  out << svg_file_of(plot);
   out.close();
   if (!out)
     throw ConfigError("free some space or choose another folder with --out: cannot write " + file.string());
@@ -129,10 +129,10 @@ void write_identification_report(const Identification& id, const std::vector<Mea
   const Plot friction = friction_plot(id);
   page.figure(friction,
               "What friction takes at constant speed, read from the data, and the identified curve.");
-  save(friction, "friction", folder / "friction.svg");
+  save(friction, folder / "friction.svg");
   if (const auto sine = slow_sine_plot(id, runs)) {
     page.figure(*sine, "A loop here is friction with a memory: bristles.");
-    save(*sine, "sine", folder / "slow-sine.svg");
+    save(*sine, folder / "slow-sine.svg");
   }
   for (const std::string& note : id.notes) page.paragraph(note + ".");
   page.write(file);

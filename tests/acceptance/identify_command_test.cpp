@@ -69,6 +69,8 @@ void expect_identified(const TemporaryFolder& folder, const std::string& plant,
   for (const auto& [name, value] : truth) ADD_FAILURE() << name << " was not identified";
   for (const char* file : {"plant.yaml", "identification.json", "report.html", "friction.svg"})
     EXPECT_TRUE(fs::exists(out / file)) << file;
+  // Without its name space a browser shows no such file.
+  EXPECT_NE(read_text(out / "friction.svg").find("<svg xmlns="), std::string::npos);
   EXPECT_EQ(run_upright("check " + (out / "plant.yaml").string()).exit_code, 0);
 }
 
