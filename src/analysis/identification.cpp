@@ -4,6 +4,9 @@
 #include <cmath>
 #include <cstdio>
 #include <limits>
+#include <numeric>
+#include <tuple>
+#include <utility>
 
 #include "upright/analysis/candidates.hpp"
 #include "upright/model/error.hpp"
@@ -16,8 +19,9 @@ namespace {
 constexpr double least_evidence = 25.0;
 /// And its size, in standard errors.
 constexpr double least_certainty = 4.0;
-constexpr double most_samples = 120000.0;
-constexpr double trial_samples = 20000.0;
+constexpr double most_samples = 60000.0;
+constexpr double trial_samples = 10000.0;
+constexpr double few_samples = 2500.0;
 
 constexpr std::string_view frictions[] = {"viscous_friction",
                                           "coulomb_friction",
@@ -81,6 +85,38 @@ std::vector<Segment> thinned(const std::vector<Segment>& segments, double most) 
   return kept;
 }
 
+/// The runs in an order of their own, whatever order they were read in: which segments are left out, and how
+/// sums round, then do not depend on it.
+std::vector<std::size_t> own_order(const std::vector<Measurement>& runs) {
+  std::vector<std::size_t> order(runs.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+    const auto key = [&](std::size_t i) {
+      const Measurement& run = runs[i];
+      return std::tie(run.cart_locked, run.voltage_v, run.cart_m, run.theta_rad, run.time_s);
+    };
+    return key(a) < key(b);
+  });
+  return order;
+}
+
+std::vector<Measurement> arranged(const std::vector<Measurement>& runs,
+                                  const std::vector<std::size_t>& order) {
+  std::vector<Measurement> sorted;
+  sorted.reserve(order.size());
+  for (const std::size_t i : order) sorted.push_back(runs[i]);
+  return sorted;
+}
+
+/// What was read in each run, in the order the runs were given.
+template <class Reading>
+std::vector<Reading> as_given(std::vector<Reading> readings, const std::vector<std::size_t>& order) {
+  for (Reading& reading : readings) reading.run = order[reading.run];
+  std::stable_sort(readings.begin(), readings.end(),
+                   [](const Reading& a, const Reading& b) { return a.run < b.run; });
+  return readings;
+}
+
 /// A model under way: the plant with its free effects, and the fit of it.
 struct Model {
   Plant plant;
@@ -91,7 +127,11 @@ struct Model {
 class Identifier {
  public:
   Identifier(const Plant& base, const std::vector<Measurement>& runs, const IdentificationOptions& options)
-      : base_(base), runs_(runs), options_(options), range_(range_of(runs, base)) {}
+      : base_(base),
+        order_(own_order(runs)),
+        runs_(arranged(runs, order_)),
+        options_(options),
+        range_(range_of(runs_, base)) {}
 
   Identification run() {
     result_.breakaways = find_breakaways(runs_, base_);
@@ -101,6 +141,7 @@ class Identifier {
     if (segments.empty()) throw ConfigError("record runs in which the cart or the pendulum moves");
     whole_ = {&runs_, thinned(segments, most_samples)};
     trial_ = {&runs_, thinned(segments, trial_samples)};
+    few_ = {&runs_, thinned(segments, few_samples)};
     tell(0.05, "balance of forces");
     Model model = start();
     model = fitted(model, trial_, 8, 1);
@@ -109,6 +150,8 @@ class Identifier {
     model = fitted(model, whole_, 12, 2);
     report(model);
     if (!transition && result_.balance) prefer_balance();
+    result_.breakaways = as_given(std::move(result_.breakaways), order_);
+    result_.steady_points = as_given(std::move(result_.steady_points), order_);
     return std::move(result_);
   }
 
@@ -202,23 +245,46 @@ class Identifier {
     std::vector<double> values;
   };
 
-  /// Adds effects from the best of several starts; keeps them when the data ask for them.
-  bool try_effects(Model& model, const Model& base, const std::vector<std::vector<Addition>>& starts) {
-    Model best = base;
-    double least = std::numeric_limits<double>::infinity();
-    for (const std::vector<Addition>& start : starts) {
-      Model richer = base;
+  using Start = std::vector<Addition>;
+
+  static double rank_of(const Model& model) {
+    return std::isfinite(model.fit.objective) ? model.fit.objective : std::numeric_limits<double>::infinity();
+  }
+
+  /// Fits from every start to few data, from the better ones to more, and from the best two to the end: where
+  /// friction and bristles trade with each other, the start that looks best at first may lead to a lesser
+  /// optimum.
+  Model best_of(const Model& base, const std::vector<Start>& starts) const {
+    struct Round {
+      const FitData& data;
+      int iterations, noise_rounds;
+      std::size_t kept;
+    };
+    const Round rounds[] = {{few_, 6, 1, 3}, {trial_, 8, 1, 2}, {trial_, 12, 2, 1}};
+    std::vector<Model> models;
+    models.reserve(starts.size());
+    for (const Start& start : starts) {
+      // Noise that made up for what was missing is not where to start from.
+      Model richer{base.plant, base.free, {}};
       for (const Addition& addition : start) {
         richer.plant.set(number_of(addition.kind), addition.values);
         richer.free.push_back(number_of(addition.kind));
       }
-      richer = fitted(richer, trial_, 8, 1);
-      if (richer.fit.objective >= least) continue;
-      least = richer.fit.objective;
-      best = richer;
+      models.push_back(std::move(richer));
     }
-    if (!std::isfinite(least)) return false;
-    best = fitted(best, trial_, 12, 2);
+    for (const Round& round : rounds) {
+      for (Model& model : models) model = fitted(model, round.data, round.iterations, round.noise_rounds);
+      std::stable_sort(models.begin(), models.end(),
+                       [](const Model& x, const Model& y) { return rank_of(x) < rank_of(y); });
+      models.resize(std::min(round.kept, models.size()));
+    }
+    return models.front();
+  }
+
+  /// Adds effects; keeps them when the data ask for them.
+  bool try_effects(Model& model, const Model& base, const std::vector<Start>& starts) {
+    const Model best = best_of(base, starts);
+    if (!std::isfinite(best.fit.objective)) return false;
     const double evidence = model.fit.objective - best.fit.objective;
     bool sized = true;
     std::string names;
@@ -246,22 +312,24 @@ class Identifier {
       breakaway += std::abs(b.force_n) / static_cast<double>(result_.breakaways.size());
     const double extra = std::max(breakaway - sliding, 0.3 * std::max(sliding, 0.03));
     const double fast = range_.largest_speed_mps;
-    tell(0.15, "Stribeck rise");
-    bool found = try_effects(model, plain,
-                             {{{"stribeck_friction", {extra, 0.05 * fast, 1.5}}},
-                              {{"stribeck_friction", {extra, 0.15 * fast, 2.0}}},
-                              {{"stribeck_friction", {0.5 * extra, 0.3 * fast, 2.0}}}});
-    std::vector<std::vector<Addition>> bristles, both;
-    for (const double stiffness : {100.0, 1000.0, 10000.0}) {
-      const Addition bristle{"bristle_friction",
-                             {stiffness, std::sqrt(stiffness * model.plant.cart_mass_kg)}};
-      bristles.push_back({bristle});
-      both.push_back({{"stribeck_friction", {extra, 0.15 * fast, 2.0}}, bristle});
+    const auto rise = [&](double velocity, double shape) {
+      return Addition{"stribeck_friction", {extra, velocity * fast, shape}};
+    };
+    std::vector<Start> bristles, both;
+    for (const double stiffness : {100.0, 1000.0}) {
+      const double critical = std::sqrt(stiffness * model.plant.cart_mass_kg);
+      for (const double damping : {1.0, 5.0}) {
+        const Addition bristle{"bristle_friction", {stiffness, damping * critical}};
+        bristles.push_back({bristle});
+        for (const double velocity : {0.07, 0.2}) both.push_back({rise(velocity, 2.0), bristle});
+      }
     }
-    tell(0.3, "bristles");
+    tell(0.15, "Stribeck rise");
+    bool found = try_effects(model, plain, {{rise(0.05, 1.5)}, {rise(0.15, 2.0)}, {rise(0.3, 2.0)}});
+    tell(0.25, "bristles");
     found = try_effects(model, plain, bristles) || found;
     // Each may hide behind the other: a rise that is seen through bristles, and bristles through a rise.
-    tell(0.45, "both");
+    tell(0.4, "both");
     return try_effects(model, plain, both) || found;
   }
 
@@ -402,10 +470,11 @@ class Identifier {
   }
 
   Plant base_;
-  const std::vector<Measurement>& runs_;
+  std::vector<std::size_t> order_;  ///< place among the runs as given, for each of `runs_`
+  std::vector<Measurement> runs_;
   const IdentificationOptions& options_;
   DataRange range_;
-  FitData whole_, trial_;
+  FitData whole_, trial_, few_;
   Identification result_;
 };
 

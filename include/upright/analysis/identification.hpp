@@ -37,8 +37,8 @@ struct IdentificationOptions {
 };
 
 /// `base` gives masses, length and the motor's force per volt; its effects of friction are estimated anew.
-/// The force per volt is the scale of every force, so the cart's mass is estimated and not believed. Throws
-/// ConfigError where the runs show nothing.
+/// The result does not depend on the order of the runs. The force per volt is the scale of every force, so
+/// the cart's mass is estimated and not believed. Throws ConfigError where the runs show nothing.
 Identification identify(const Plant& base, const std::vector<Measurement>& runs,
                         const IdentificationOptions& options = {});
 
