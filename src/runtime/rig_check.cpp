@@ -107,16 +107,16 @@ Finding judge_link(const LinkProbe& probe, double rate_hz) {
   if (trips.count() == 0)
     return {"link", Health::bad, "no reading came", "check cable, address and response_timeout_s"};
   const double carried_hz = highest_rate_hz(trips);
+  const std::uint64_t asked = probe.failed + trips.count();
   char what[240];
   std::snprintf(what, sizeof what,
                 "round trips of %.0f us (50 %%), %.0f us (99.9 %%), %.0f us at worst, of a period of %.0f "
                 "us; %llu of %llu "
                 "failed; it carries %.0f Hz",
                 trips.quantile_us(0.5), trips.quantile_us(0.999), trips.max_us(), 1e6 / rate_hz,
-                static_cast<unsigned long long>(probe.failed),
-                static_cast<unsigned long long>(probe.failed + trips.count()), carried_hz);
-  const double failed_share =
-      static_cast<double>(probe.failed) / static_cast<double>(probe.failed + trips.count());
+                static_cast<unsigned long long>(probe.failed), static_cast<unsigned long long>(asked),
+                carried_hz);
+  const double failed_share = static_cast<double>(probe.failed) / static_cast<double>(asked);
   constexpr double poor_share = 1e-3, bad_share = 0.02;
   if (failed_share > bad_share)
     return {"link", Health::bad, what, "check cable and device, or give response_timeout_s more room"};
