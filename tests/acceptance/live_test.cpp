@@ -233,6 +233,8 @@ TEST_F(LivePage, ShowsARunThatMovesAndStopsIt) {
   Browser browser(folder_.path() / "profile");
   browser.open("http://127.0.0.1:" + std::to_string(port) + "/");
   ASSERT_TRUE(comes_true([&] { return browser.text_of("state") == "balancing"; }));
+  const std::string drawn = "document.getElementById('pendulum').hasAttribute('transform')";
+  ASSERT_TRUE(comes_true([&] { return browser.value_of(drawn).get<bool>(); }));
   std::set<std::string> carts, pendulums, clocks;
   for (int i = 0; i < 30; ++i) {
     carts.insert(browser.value_of("document.getElementById('cart').getAttribute('transform')"));
