@@ -218,8 +218,7 @@ class Diagnostician {
   /// How far off a plain simulation of held-out runs is, in units of the sensors' noise.
   double simulation_gap(const Hypothesis& h) {
     Hypothesis plain = h;
-    const Noise quiet = sensor_noise(h);
-    search_->judge(plain, &quiet);
+    search_->judge(plain, sensor_noise(h));
     return gap_of(plain);
   }
 
@@ -532,8 +531,7 @@ class Diagnostician {
     ResidualStructure structure = examine();
     if (!structure.structured) compare_held_out(structure);
     result_.noise = known_.train.point.noise;
-    std::vector<std::size_t> all = found_;
-    all.insert(all.end(), corrections_.begin(), corrections_.end());
+    const std::vector<std::size_t> all = all_found();
     const Noise& fitted_noise = final_.train.point.noise;
     const Noise quiet = sensor_noise(final_);
     // Of what is left but cannot be told from noise, the floor is what such noise makes; else the sensors
@@ -541,7 +539,7 @@ class Diagnostician {
     const double floor = structure.structured ? 1.0 : floor_of(final_);
     const auto gap_with = [&](const std::vector<std::size_t>& effects, const Hypothesis& from, bool settled) {
       Hypothesis h = search_->only(effects, from, &fitted_noise, settled);
-      search_->judge(h, &quiet);
+      search_->judge(h, quiet);
       return gap_of(h) / floor;
     };
     double gap = result_.gap_before = gap_with({}, final_, false);

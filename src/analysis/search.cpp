@@ -114,16 +114,26 @@ Hypothesis Search::fitted(const std::set<std::size_t>& added, const FitPoint& st
   return h;
 }
 
-void Search::judge(Hypothesis& h, const Noise* noise) {
+void Search::judge(Hypothesis& h, const Noise& noise) const {
   if (!std::isfinite(h.train.objective)) return;
   FitOptions options;
   options.starts_only = true;
   options.noise_rounds = 0;
   options.most_iterations = 6;
-  const FitPoint plain{plant_, held_starts_, noise != nullptr ? *noise : h.train.point.noise};
+  const FitPoint plain{plant_, held_starts_, noise};
   const FitPoint point = moved_to(plain, h.train.point.plant);
   h.held = fit(held_, point, {}, options);
-  if (noise == nullptr) h.surprise = surprise_of(h);
+}
+
+void Search::weigh(Hypothesis& h) const {
+  judge(h, h.train.point.noise);
+  if (std::isfinite(h.train.objective)) h.surprise = surprise_of(h);
+}
+
+FitPoint Search::sieve_point(const Hypothesis& base) const {
+  FitPoint point{base.train.point.plant, {}, base.train.point.noise};
+  for (const std::size_t place : sieve_places_) point.starts.push_back(base.train.point.starts[place]);
+  return point;
 }
 
 double Search::surprise_of(const Hypothesis& h) const {
@@ -147,7 +157,7 @@ Hypothesis Search::baseline() {
   options.most_iterations = 24;
   Hypothesis again = fitted({}, calm, options, free_of({}));
   if (again.train.objective < h.train.objective) h = std::move(again);
-  judge(h);
+  weigh(h);
   return h;
 }
 
@@ -159,9 +169,7 @@ Hypothesis Search::screened(const Hypothesis& base, std::size_t effect) {
   options.noise_rounds = 0;
   options.noise_last = true;
   options.most_iterations = 4;
-  FitPoint from = base.train.point;
-  from.starts.clear();
-  for (const std::size_t place : sieve_places_) from.starts.push_back(base.train.point.starts[place]);
+  const FitPoint from = sieve_point(base);
   Hypothesis best;
   best.train.objective = infinity;
   const bool correction = from.plant.find(effect) != nullptr;
@@ -184,13 +192,10 @@ Hypothesis Search::sieved(const Hypothesis& base) const {
   options.noise_rounds = 0;
   options.noise_last = true;
   options.most_iterations = 2;
-  FitPoint point = base.train.point;
-  point.starts.clear();
-  for (const std::size_t place : sieve_places_) point.starts.push_back(base.train.point.starts[place]);
   Hypothesis h;
   h.added = base.added;
   h.free = base.free;
-  h.train = fit(sieve_, point, base.free, options);
+  h.train = fit(sieve_, sieve_point(base), base.free, options);
   return h;
 }
 
@@ -201,7 +206,7 @@ void Search::refine(const Hypothesis& base, Hypothesis& h) {
   FitPoint point = moved_to(base.train.point, h.train.point.plant);
   point.noise = h.train.point.noise;
   h = fitted(h.added, point, options, h.free);
-  judge(h);
+  weigh(h);
 }
 
 Hypothesis Search::without(const Hypothesis& base, std::size_t effect) {
@@ -219,7 +224,7 @@ Hypothesis Search::without(const Hypothesis& base, std::size_t effect) {
   const FitPoint point = moved_to(base.train.point, plant);
   FitOptions options;
   h = fitted(added, point, options, free_of(added));
-  judge(h);
+  weigh(h);
   return h;
 }
 
@@ -251,7 +256,7 @@ Hypothesis Search::only(const std::vector<std::size_t>& effects, const Hypothesi
   if (fixed_noise != nullptr) options.noise_rounds = 0;
   if (fixed_noise != nullptr) point.noise = *fixed_noise;
   Hypothesis h = fitted({effects.begin(), effects.end()}, point, options, free);
-  judge(h);
+  judge(h, h.train.point.noise);
   return h;
 }
 
@@ -315,7 +320,7 @@ Hypothesis Search::with_pair(const Hypothesis& base, const Hypothesis& first, co
   FitPoint point = moved_to(base.train.point, plant);
   point.noise = noise;
   Hypothesis h = fitted(added, point, FitOptions{}, free_of(added));
-  judge(h);
+  weigh(h);
   return h;
 }
 

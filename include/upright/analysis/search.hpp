@@ -16,7 +16,8 @@ struct Hypothesis {
   FitResult train;
   FitResult held;         ///< initial states only, plant and noise from `train`
   double surprise = 0.0;  ///< of the held-out data: minus twice the log of their likelihood, with noise of
-                          ///< their own, averaged over what the training data leave open of the parameters
+                          ///< their own, averaged over what the training data leave open of the parameters;
+                          ///< not of what `only` and `on_all` made
   std::vector<FreeParameter> free;  ///< the parameters that moved, in the order of train.covariance
   bool valid = false;               ///< fitted, and no parameter at a bound that makes it another effect
 };
@@ -62,13 +63,16 @@ class Search {
   Hypothesis on_all(const Hypothesis& h) const;
   /// Adds two effects at once to a hypothesis and fits to convergence.
   Hypothesis with_pair(const Hypothesis& base, const Hypothesis& first, const Hypothesis& second);
-  /// Follows held-out data: with this noise, or else with the fitted noise, and then their surprise too.
-  void judge(Hypothesis& hypothesis, const Noise* noise = nullptr);
+  /// Follows held-out data with this noise.
+  void judge(Hypothesis& hypothesis, const Noise& noise) const;
 
  private:
+  /// Follows held-out data with the fitted noise, for their surprise.
+  void weigh(Hypothesis& h) const;
   double surprise_of(const Hypothesis& h) const;
+  /// A hypothesis's point on the sieve alone.
+  FitPoint sieve_point(const Hypothesis& base) const;
   std::vector<FreeParameter> free_of(const std::set<std::size_t>& added) const;
-  Plant plant_with(const Plant& current, const std::set<std::size_t>& added) const;
   std::vector<std::vector<double>> starts_of(std::size_t effect, const Hypothesis& base) const;
   std::vector<std::pair<double, double>> force_residual(const Hypothesis& base) const;
   Hypothesis fitted(const std::set<std::size_t>& added, const FitPoint& start, const FitOptions& options,
