@@ -7,8 +7,8 @@
 
 namespace upright {
 
-/// Any number of runs, sixteen side by side, each with its own clock, step and delay; a lane that ends takes
-/// the next run. A result does not depend on the runs beside it.
+/// Any number of runs, `lane_count` side by side, each with its own clock, step and delay; a lane that ends
+/// takes the next run. A result does not depend on the runs beside it.
 void run_continuous_on_lanes(const LoopSetup& setup, std::span<const LoopCase> cases,
                              std::span<LoopResult> results);
 

@@ -1,5 +1,6 @@
 #include "upright/sim/fast_loop.hpp"
 
+#include <algorithm>
 #include <bit>
 #include <optional>
 #include <vector>
@@ -259,7 +260,12 @@ bool lanes_can_run(const LoopSetup& setup) {
 
 void run_on_lanes(const LoopSetup& setup, std::span<const LoopCase> cases, std::span<LoopResult> results) {
   if (!setup.sampled) return run_continuous_on_lanes(setup, cases, results);
-  with_effects(setup.model.present, [&](const auto& present) { run_with(setup, present, cases, results); });
+  with_effects(setup.model.present, [&](const auto& present) {
+    for (std::size_t first = 0; first < cases.size(); first += lane_count) {
+      const std::size_t count = std::min(lane_count, cases.size() - first);
+      run_with(setup, present, cases.subspan(first, count), results.subspan(first, count));
+    }
+  });
 }
 
 }  // namespace upright

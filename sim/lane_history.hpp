@@ -1,5 +1,5 @@
-// The dense history of the feedback signal of sixteen continuous loops, each with a clock of its own: for
-// every step a polynomial of order 4 (the continuous extension of Dormand and Prince's method: Hairer,
+// The dense history of the feedback signal of `lane_count` continuous loops, each with a clock of its own:
+// for every step a polynomial of order 4 (the continuous extension of Dormand and Prince's method: Hairer,
 // Norsett, Wanner, Solving Ordinary Differential Equations I, II.6).
 #pragma once
 

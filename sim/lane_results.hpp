@@ -1,4 +1,4 @@
-// What sixteen runs have shown so far, lane by lane.
+// What runs side by side have shown so far, lane by lane.
 #pragma once
 
 #include <span>

@@ -67,25 +67,22 @@ class SweepAccuracy : public testing::TestWithParam<Friction> {
 TEST_P(SweepAccuracy, SampledLoops) {
   const LoopSetup setup = SweepAccuracy::setup(true);
   const std::vector<LoopCase> cases = cases_240();
-  std::vector<LoopResult> lanes(lane_count);
-  for (std::size_t first = 0; first < cases.size(); first += lane_count) {
-    run_on_lanes(setup, std::span(cases).subspan(first, lane_count), lanes);
-    for (std::size_t i = 0; i < lane_count; ++i) {
-      const LoopCase& start = cases[first + i];
-      ControlConfig control = setup.control;
-      control.delay_s = start.delay_s;
-      Controller controller(control, setup.amplifier_limit_v);
-      SampledLoop<EventEngine<double>> loop(setup.model, control.sample_rate_hz, tight());
-      loop.start(released(start));
-      loop.advance_to(setup.duration_s, [&](std::uint64_t tick, const Measured& measured) {
-        ControlInput input;
-        input.tick = tick;
-        input.cart_m = measured[0];
-        input.theta_rad = measured[1];
-        return controller.step(input).voltage_v;
-      });
-      expect_near(lanes[i].end, loop.engine().state(), start);
-    }
+  std::vector<LoopResult> lanes(cases.size());
+  run_on_lanes(setup, cases, lanes);
+  for (std::size_t i = 0; i < cases.size(); ++i) {
+    ControlConfig control = setup.control;
+    control.delay_s = cases[i].delay_s;
+    Controller controller(control, setup.amplifier_limit_v);
+    SampledLoop<EventEngine<double>> loop(setup.model, control.sample_rate_hz, tight());
+    loop.start(released(cases[i]));
+    loop.advance_to(setup.duration_s, [&](std::uint64_t tick, const Measured& measured) {
+      ControlInput input;
+      input.tick = tick;
+      input.cart_m = measured[0];
+      input.theta_rad = measured[1];
+      return controller.step(input).voltage_v;
+    });
+    expect_near(lanes[i].end, loop.engine().state(), cases[i]);
   }
 }
 

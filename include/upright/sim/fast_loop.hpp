@@ -1,4 +1,4 @@
-// Sixteen closed-loop runs at once on SIMD lanes: the engine of sweeps.
+// Several closed-loop runs at once on SIMD lanes: the engine of sweeps.
 #pragma once
 
 #include <span>
@@ -13,12 +13,14 @@ namespace upright {
 /// millisecond, and the plant's own input delay in a sampled loop.
 bool lanes_can_run(const LoopSetup& setup);
 
-/// Sampled loops: at most `lane_count` runs side by side, by RK4 with extra substeps where the friction
-/// turns; with true stick-slip a lane in which the cart stops or breaks away is taken through that period by
-/// the event engine. A run that fell costs nothing more once all of them did. A result depends on the runs
-/// that share its lanes in the last digits, so callers keep groups fixed.
+/// Any number of runs, `lane_count` side by side.
 ///
-/// Continuous loops: any number of runs, each with its own adaptive steps and its own events.
+/// Sampled loops: by RK4 with extra substeps where the friction turns; with true stick-slip a lane in which
+/// the cart stops or breaks away is taken through that period by the event engine. A run that fell costs
+/// nothing more once all beside it did. A result depends on the runs that share its lanes in the last digits,
+/// so callers keep groups fixed.
+///
+/// Continuous loops: each with its own adaptive steps and its own events.
 void run_on_lanes(const LoopSetup& setup, std::span<const LoopCase> cases, std::span<LoopResult> results);
 
 }  // namespace upright

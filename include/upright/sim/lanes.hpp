@@ -1,5 +1,5 @@
-// A scalar that is many: sixteen runs side by side in SIMD registers, for the generic physics. Two registers
-// of eight on AVX-512, so that one hides the latency of the other; four of four on AVX2. A comparison gives a
+// A scalar that is many: runs side by side in SIMD registers, for the generic physics. Two registers
+// of eight on AVX-512, of four on AVX2, so that one hides the latency of the other. A comparison gives a
 // LaneMask, with which `select` chooses lane by lane.
 //
 // The functions are as exact as the sweeps need (relative 2e-12, angles of any size), not correctly rounded.
@@ -171,7 +171,7 @@ struct LaneMask {
   }
 };
 
-/// Sixteen numbers.
+/// One number for each run.
 class Lanes {
  public:
   using Batch = lanes_detail::Batch;
