@@ -29,8 +29,10 @@ std::array<S*, states> as_array(PlantState<S>& s) {
   return {&s.cart_m, &s.theta_rad, &s.cart_mps, &s.theta_radps, &s.bristle_m};
 }
 
-EngineOptions fit_options() {
+EngineOptions engine_options(bool rough) {
   EngineOptions options;
+  constexpr double roughly_stiff_radps = 500.0;
+  if (rough) options.stiff_bristles_radps = roughly_stiff_radps;
   options.max_step_s = 4e-3;
   options.step_fraction = 0.5;
   options.event_tolerance_s = 1e-9;
@@ -225,9 +227,10 @@ void correct_state(EventEngine<S>& engine, const double (&update)[states]) {
 /// Follows a segment with dual numbers, a sample at a time; chains the derivatives and whitens them on the
 /// way.
 template <int N>
-void linearise_segment(const Measurement& run, const Segment& segment, const FitPoint& point,
-                       const PlantState<double>& start, const std::vector<FreeParameter>& free,
-                       bool with_normal, std::vector<LinearStep>& steps, Normal& normal) {
+void linearise_segment(const Measurement& run, const Segment& segment, const EngineOptions& engine,
+                       const FitPoint& point, const PlantState<double>& start,
+                       const std::vector<FreeParameter>& free, bool with_normal,
+                       std::vector<LinearStep>& steps, Normal& normal) {
   using Jet = ceres::Jet<double, N>;
   const int parameters = static_cast<int>(free.size());
   const int columns = states + parameters;
@@ -237,7 +240,7 @@ void linearise_segment(const Measurement& run, const Segment& segment, const Fit
         .parameters[effect_parameter_offset(free[static_cast<std::size_t>(j)].effect) +
                     free[static_cast<std::size_t>(j)].index]
         .v[states + j] = 1.0;
-  Simulator<Jet> simulator(model, fit_options(), 64 + segment.last - segment.first);
+  Simulator<Jet> simulator(model, engine, 64 + segment.last - segment.first);
   PlantState<Jet> state;
   {
     PlantState<double> plain = start;
@@ -454,10 +457,11 @@ class Fitter {
   const Measurement& run_of(std::size_t s) const { return (*data_.runs)[data_.segments[s].run]; }
 
   void linearise_all() {
+    const EngineOptions engine = engine_options(options_.rough);
     parallel_for(data_.segments.size(), [&](std::size_t s) {
       with_jet_size(free_.size(), [&]<int N>() {
-        linearise_segment<N>(run_of(s), data_.segments[s], point_, point_.starts[s], free_, true, steps_[s],
-                             normals_[s]);
+        linearise_segment<N>(run_of(s), data_.segments[s], engine, point_, point_.starts[s], free_, true,
+                             steps_[s], normals_[s]);
       });
     });
   }
@@ -871,8 +875,8 @@ std::vector<std::vector<LinearStep>> linearise(const FitData& data, const FitPoi
   std::vector<std::vector<LinearStep>> steps(data.segments.size());
   parallel_for(data.segments.size(), [&](std::size_t s) {
     Normal unused;
-    linearise_segment<8>((*data.runs)[data.segments[s].run], data.segments[s], point, point.starts[s], {},
-                         false, steps[s], unused);
+    linearise_segment<8>((*data.runs)[data.segments[s].run], data.segments[s], engine_options(false), point,
+                         point.starts[s], {}, false, steps[s], unused);
   });
   return steps;
 }

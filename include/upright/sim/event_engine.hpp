@@ -150,9 +150,6 @@ class EventEngine {
  private:
   static constexpr double least_lag_s = 1e-6;
   static constexpr double smallest_step_s = 1e-13;
-  /// From this relaxation on sliding bristles are taken as following; the error in force is of the order of
-  /// (rate of the motion / relaxation)^2.
-  static constexpr double stiff_bristles_radps = 5e4;
   static constexpr double followed_within = 1e-4;
   static constexpr double most_rate_radps = 2e6;
 
@@ -203,9 +200,12 @@ class EventEngine {
   bool bristles_follow(double motor_v) {
     if (!dynamics_.has_bristle_state()) return false;
     const PlantState<double> s = plain_state(state_);
-    if (plain_.bristle_relaxation_radps(s) < stiff_bristles_radps) return false;
+    const double relaxation = plain_.bristle_relaxation_radps(s);
+    if (relaxation < options_.stiff_bristles_radps) return false;
     const PlantState<double> rate = plain_.slaved_bristle_derivative(s, motor_v, contacts_);
     speed_change_radps_ = std::abs(rate.cart_mps / s.cart_mps);
+    const double behind = speed_change_radps_ / relaxation;
+    if (behind * behind > followed_within) return false;
     return std::abs(s.bristle_m - rate.bristle_m) < followed_within * std::abs(rate.bristle_m);
   }
 
