@@ -196,7 +196,8 @@ Json json_of(const SessionResult& result, const LoopLimits& limits,
             {"overruns_compute", c.overruns_compute},
             {"overruns_write", c.overruns_write},
             {"saturated", c.saturated},
-            {"writes_failed", c.writes_failed}}},
+            {"writes_failed", c.writes_failed},
+            {"page_faults", c.page_faults}}},
           {"timing",
            {{"wake_late", json_of(o.wake_late)},
             {"read", json_of(o.read)},
@@ -231,7 +232,8 @@ void print_summary(const SessionResult& result, const LoopLimits& limits, bool f
                 static_cast<unsigned long long>(c.overruns_read),
                 static_cast<unsigned long long>(c.overruns_compute),
                 static_cast<unsigned long long>(c.overruns_write), static_cast<unsigned long long>(c.missed));
-    std::printf("Scheduling: %s.\n", result.scheduling.note.c_str());
+    std::printf("Scheduling: %s; %llu page faults while it ran.\n", result.scheduling.note.c_str(),
+                static_cast<unsigned long long>(c.page_faults));
   }
   if (c.stale + c.faults + c.writes_failed > 0)
     std::printf("Link: %llu stale and %llu failed readings, %llu failed writes.\n",

@@ -93,4 +93,10 @@ RealtimeGrant enter_realtime(const RealtimeRequest& request) {
   return grant;
 }
 
+std::uint64_t page_faults() {
+  rusage usage{};
+  getrusage(RUSAGE_THREAD, &usage);
+  return static_cast<std::uint64_t>(usage.ru_minflt + usage.ru_majflt);
+}
+
 }  // namespace upright

@@ -135,7 +135,8 @@ std::string outcome_text(const LoopOutcome& o, const LoopLimits& limits, const L
           ", overruns_compute: " + std::to_string(c.overruns_compute) +
           ", overruns_write: " + std::to_string(c.overruns_write) +
           ", saturated: " + std::to_string(c.saturated) +
-          ", writes_failed: " + std::to_string(c.writes_failed) + "}\n";
+          ", writes_failed: " + std::to_string(c.writes_failed) +
+          ", page_faults: " + std::to_string(c.page_faults) + "}\n";
   text += "  timing:\n" + histogram_text("wake_late", o.wake_late) + histogram_text("read", o.read) +
           histogram_text("compute", o.compute) + histogram_text("write", o.write) +
           histogram_text("cycle", o.cycle);

@@ -101,7 +101,9 @@ SessionResult run_session(RunSetup setup, Rig& rig, Clock& clock, const SignalFl
       if (!clock.is_virtual()) setup.scheduling = enter_realtime(options.realtime);
       if (awake && awake->held()) setup.scheduling.note += ", processors kept out of deep sleep";
       directory.write_start(setup);
+      const std::uint64_t faults_before = page_faults();
       loop.run(result.outcome);
+      result.outcome.counts.page_faults = page_faults() - faults_before;
       finished.set_value();
     } catch (...) {
       finished.set_exception(std::current_exception());

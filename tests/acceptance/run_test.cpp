@@ -77,6 +77,15 @@ TEST(Run, PrintsTheRunDirectoryOnItsLastLine) {
   EXPECT_TRUE(result.err.empty()) << result.err;
 }
 
+TEST(Run, WaitsForNoPageOfMemoryWhileItRuns) {
+  const TemporaryFolder folder;
+  const CommandResult result = run_upright(run_arguments(folder, "--duration 3 --theta0-deg 1 --json"));
+  const auto json = nlohmann::json::parse(result.out);
+  if (json.at("scheduling").get<std::string>().find("memory not locked") != std::string::npos)
+    GTEST_SKIP() << "NOT TESTED: page faults, for memory could not be locked";
+  EXPECT_EQ(json.at("counts").at("page_faults"), 0) << result.out;
+}
+
 TEST(Run, SameSeedSameBytes) {
   const TemporaryFolder rigs, first, second, other;
   const std::string rig = rig_with_plant(rigs, "exponential", "0.0001");

@@ -64,6 +64,7 @@ struct LoopCounts {
   std::uint64_t missed = 0;  ///< periods that passed without a cycle
   std::uint64_t overruns_wake = 0, overruns_read = 0, overruns_compute = 0, overruns_write = 0;
   std::uint64_t saturated = 0, writes_failed = 0;
+  std::uint64_t page_faults = 0;  ///< of the loop's thread, none with memory locked; the session counts them
 };
 
 struct LoopOutcome {

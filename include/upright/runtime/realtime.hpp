@@ -1,6 +1,7 @@
 // Real-time set-up of the thread that runs the loop, and what was granted of it, read back.
 #pragma once
 
+#include <cstdint>
 #include <string>
 
 namespace upright {
@@ -21,6 +22,9 @@ struct RealtimeGrant {
 /// Asks for SCHED_FIFO, a processor and locked memory for the calling thread, touches its stack, and says
 /// plainly what was not granted. Never fails.
 RealtimeGrant enter_realtime(const RealtimeRequest& request);
+
+/// Pages that the calling thread has waited for the kernel to bring in, so far.
+std::uint64_t page_faults();
 
 /// The processor that enter_realtime would stay on, asked for from a thread that is not bound yet; -1: none.
 int loop_cpu(const RealtimeRequest& request);
