@@ -211,7 +211,9 @@ class Diagnostician {
 
   static bool is_believed(const Improvement& improvement, std::size_t effect) {
     const double evidence = improvement.train - price_of(effect);
-    if (evidence < least_evidence || !(improvement.held > 0.0)) return false;
+    // Held-out data that do not excite the effect say nothing: odds of less than 2 to 1 against it.
+    constexpr double indifferent = 1.4;
+    if (evidence < least_evidence || !(improvement.held > -indifferent)) return false;
     return improvement.t_value > least_t || evidence > overwhelming_evidence;
   }
 
@@ -612,10 +614,12 @@ class Diagnostician {
     return structure;
   }
 
-  /// What is left of the training runs must account for the held-out runs too.
+  /// What is left of the training runs must account for the held-out runs too, with the parameters anywhere
+  /// that the training runs leave open.
   void compare_held_out(ResidualStructure& structure) {
     if (held_.segments.empty()) return;
-    const double excess = simulation_gap(final_) / floor_of(final_);
+    const Hypothesis told = search_->told(final_);
+    const double excess = simulation_gap(told) / floor_of(told);
     if (!(excess > most_excess)) return;
     structure.structured = true;
     std::ostringstream text;

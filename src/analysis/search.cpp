@@ -147,6 +147,20 @@ double Search::surprise_of(const Hypothesis& h) const {
   return told.objective + log_determinant(told.information) - log_determinant(options.belief->information);
 }
 
+Hypothesis Search::told(const Hypothesis& h) const {
+  FitOptions options;
+  options.noise_rounds = 0;
+  options.belief = belief_of(h);
+  FitPoint point = h.held.point;
+  point.noise = h.train.point.noise;
+  const FitResult held = fit(held_, point, h.free, options);
+  if (!std::isfinite(held.objective)) return h;
+  Hypothesis result = h;
+  result.train.point.plant = held.point.plant;
+  result.held = held;
+  return result;
+}
+
 Hypothesis Search::baseline() {
   FitOptions options;
   Hypothesis h = fitted({}, {plant_, train_starts_, {.force = 0.1, .torque = 0.01}}, options, free_of({}));

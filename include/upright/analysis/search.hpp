@@ -63,6 +63,9 @@ class Search {
   Hypothesis on_all(const Hypothesis& h) const;
   /// Adds two effects at once to a hypothesis and fits to convergence.
   Hypothesis with_pair(const Hypothesis& base, const Hypothesis& first, const Hypothesis& second);
+  /// A hypothesis with its parameters moved to what the held-out data say too, as far as the training runs
+  /// leave them open; the noise stays.
+  Hypothesis told(const Hypothesis& h) const;
   /// Follows held-out data with this noise.
   void judge(Hypothesis& hypothesis, const Noise& noise) const;
 
