@@ -615,12 +615,13 @@ class Diagnostician {
   }
 
   /// What is left of the training runs must account for the held-out runs too, with the parameters anywhere
-  /// that the training runs leave open.
+  /// that the training runs leave open. What is left need not be white: all runs together may be further off
+  /// than white noise makes them, and held-out ones by as much again.
   void compare_held_out(ResidualStructure& structure) {
     if (held_.segments.empty()) return;
     const Hypothesis told = search_->told(final_);
     const double excess = simulation_gap(told) / floor_of(told);
-    if (!(excess > most_excess)) return;
+    if (!(excess > most_excess * std::max(1.0, structure.excess))) return;
     structure.structured = true;
     std::ostringstream text;
     text.precision(3);
