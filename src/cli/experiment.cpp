@@ -37,7 +37,7 @@ struct Arguments {
   std::string file, rig, plant, out, live_port;
   std::optional<double> rate_hz;
   std::optional<std::uint64_t> seed;
-  int priority = RealtimeRequest{}.priority, cpu = RealtimeRequest{}.cpu;
+  RealtimeRequest realtime;
   bool fast = false, dry_run = false, ready = false, as_json = false;
 };
 
@@ -220,7 +220,7 @@ std::unique_ptr<LiveView> open_live(const Arguments& arguments, const Experiment
   subject.rig = &setup.rig;
   subject.plant = &setup.plant;
   subject.period_s = setup.control.period_s();
-  subject.realtime = {arguments.priority, arguments.cpu};
+  subject.realtime = arguments.realtime;
   subject.fast = arguments.fast;
   return open_live(arguments.live_port, subject, arguments.as_json ? stderr : stdout);
 }
@@ -245,7 +245,7 @@ ExperimentResult perform(const Arguments& arguments, const ExperimentSetup& setu
   options.folder = folder;
   options.command = command_line();
   options.seed = arguments.seed.value_or(1);
-  options.realtime = {arguments.priority, arguments.cpu};
+  options.realtime = arguments.realtime;
   options.watcher = view;
   std::pair<Piece, ExperimentTrial> current;
   const bool on_terminal = ::isatty(STDERR_FILENO) != 0 && !arguments.fast;
@@ -331,9 +331,7 @@ void add_experiment(CLI::App& app, int& exit_code) {
   command->add_flag("--dry-run", a->dry_run, "Plan and rehearse, then stop: nothing moves");
   command->add_flag("--ready", a->ready, "What pieces ask of an operator is done: do not wait for Enter");
   command->add_option("--out", a->out, "Folder of this experiment (runs/<UTC start>-<name>)");
-  command->add_option("--priority", a->priority, "Real-time priority to ask for (80)")
-      ->check(CLI::Range(1, 99));
-  command->add_option("--cpu", a->cpu, "Processor to stay on (the last one)")->check(CLI::Range(0, 1023));
+  add_realtime(*command, a->realtime);
   add_live(*command, a->live_port);
   command->add_flag("--json", a->as_json, "One JSON document");
   command->callback([a, &exit_code] { exit_code = static_cast<int>(run(*a)); });

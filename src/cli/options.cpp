@@ -21,6 +21,13 @@ CLI::Validator number_in(const Range& range) {
   return CLI::Validator(check, "");
 }
 
+void add_realtime(CLI::App& command, RealtimeRequest& realtime) {
+  command.add_option("--priority", realtime.priority, "Real-time priority to ask for (80)")
+      ->check(CLI::Range(1, 99));
+  command.add_option("--cpu", realtime.cpu, "Processor to stay on (the last one)")
+      ->check(CLI::Range(0, 1023));
+}
+
 void finish_output() {
   errno = 0;
   std::cout.flush();

@@ -35,7 +35,7 @@ struct Arguments {
   std::optional<double> delay_s, theta0_deg;
   double duration_s = 10.0, wait_s = WaitOptions{}.patience_s;
   std::optional<std::uint64_t> seed;
-  int priority = RealtimeRequest{}.priority, cpu = RealtimeRequest{}.cpu;
+  RealtimeRequest realtime;
   bool fast = false, as_json = false;
 };
 
@@ -253,7 +253,7 @@ std::unique_ptr<LiveView> open_live(const Arguments& arguments, const RunSetup& 
   subject.rig = &setup.rig;
   subject.plant = setup.plant ? &*setup.plant : nullptr;
   subject.period_s = setup.control.period_s();
-  subject.realtime = {arguments.priority, arguments.cpu};
+  subject.realtime = arguments.realtime;
   subject.fast = arguments.fast;
   return open_live(arguments.live_port, subject, arguments.as_json ? stderr : stdout);
 }
@@ -278,7 +278,7 @@ SessionResult balance(const Arguments& arguments, RunSetup setup, const SignalFl
 
   SessionOptions options;
   options.out = arguments.out;
-  options.realtime = {arguments.priority, arguments.cpu};
+  options.realtime = arguments.realtime;
   options.compensator = make_compensator(setup.control);
   options.watcher = view;
   if (on_terminal && !arguments.fast) options.show = show_live;
@@ -343,9 +343,7 @@ void add_run(CLI::App& app, int& exit_code) {
   command->add_flag("--fast", a->fast, "Virtual time: as fast as it goes, simulated rigs only");
   command->add_option("--out", a->out, "The folder that the run directory is made in (runs)");
   command->add_option("--label", a->label, "End of the run directory's name (run)");
-  command->add_option("--priority", a->priority, "Real-time priority to ask for (80)")
-      ->check(CLI::Range(1, 99));
-  command->add_option("--cpu", a->cpu, "Processor to stay on (the last one)")->check(CLI::Range(0, 1023));
+  add_realtime(*command, a->realtime);
   add_live(*command, a->live_port);
   command->add_flag("--json", a->as_json, "One JSON document");
   command->callback([a, &exit_code] { exit_code = static_cast<int>(run(*a)); });
