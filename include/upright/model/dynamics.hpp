@@ -325,7 +325,9 @@ class Dynamics {
   static constexpr double smallest_level_n = 1e-6;
 
   template <class E>
-  static constexpr bool renders_as_bristles = requires(const double* q) { E::bristle_stiffness(q); };
+  static constexpr bool renders_as_bristles = requires(const double* q) {
+    E::bristle_stiffness(q);
+  };
   template <class E, class T>
   static constexpr bool has_cart_level = requires(const T* q, const T& x) {
     E::cart_dry_level(q, x, x, x);
