@@ -72,7 +72,7 @@ Improvement compare(const Hypothesis& simpler, const Hypothesis& richer) {
 
 Search::Search(const Plant& plant, const std::vector<Measurement>& runs, const FitData& train,
                const FitData& held)
-    : given_(plant), plant_(plant), runs_(runs), train_(train), held_(held), range_(range_of(runs, plant)) {
+    : given_(plant), plant_(plant), train_(train), held_(held), range_(range_of(runs, plant)) {
   for (const PlantEffect& effect : plant.effects) nuisances_.push_back(effect.number);
   for (const std::size_t effect : base_corrections(plant, range_)) {
     nuisances_.push_back(effect);

@@ -83,7 +83,6 @@ class Search {
 
   Plant given_;  ///< the plant file
   Plant plant_;  ///< the same with every correction at its neutral value
-  const std::vector<Measurement>& runs_;
   FitData train_, held_;
   FitData sieve_;  ///< every few training segments: enough to see which candidates are worth a whole fit
   std::vector<std::size_t> sieve_places_;
