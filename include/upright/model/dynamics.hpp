@@ -299,7 +299,7 @@ class Dynamics {
     for_each_effect([&]<std::size_t I>() {
       using E = EffectAt<I>;
       if constexpr (requires(const double* q) { E::rate_radps(q, v, mass); })
-        if (present_.template has<I>() && !(slaved && renders_as_bristles<E>)) {
+        if (present_.template has<I>() && !(slaved && has_bristles<E, S>)) {
           std::array<double, parameter_count_of<I>> plain;
           for (std::size_t i = 0; i < plain.size(); ++i) plain[i] = value_of(p<I>()[i]);
           rate += E::rate_radps(plain.data(), v, mass);
@@ -324,10 +324,6 @@ class Dynamics {
   /// A level that vanishes somewhere along the track lets the bristles slip freely, not divide by zero.
   static constexpr double smallest_level_n = 1e-6;
 
-  template <class E>
-  static constexpr bool renders_as_bristles = requires(const double* q) {
-    E::bristle_stiffness(q);
-  };
   template <class E, class T>
   static constexpr bool has_cart_level = requires(const T* q, const T& x) {
     E::cart_dry_level(q, x, x, x);
