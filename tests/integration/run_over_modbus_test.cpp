@@ -34,6 +34,14 @@ struct Outcome {
   std::string said;
   std::string run_yaml, samples;
   std::vector<TraceRow> trace;
+
+  /// Why the run ended, of run.yaml's outcome.
+  std::string reason() const {
+    const std::string key = "\n  reason: ";
+    const std::size_t at = run_yaml.find(key);
+    if (at == std::string::npos) return "";
+    return run_yaml.substr(at + key.size(), run_yaml.find('\n', at + 1) - at - key.size());
+  }
 };
 
 enum class End { balances, any, stops };
@@ -43,6 +51,7 @@ struct Case {
   bool serial;
   End end;
   std::vector<std::string> flags;
+  double stall_s = 0.0;  ///< the controller stands still for so long once the motor is on
 };
 
 void PrintTo(const Case& c, std::ostream* out) {
@@ -61,6 +70,11 @@ Outcome run(const Case& c) {
                   c.serial ? "sample_rate_hz: 200" : "sample_rate_hz: 500");
   Process client({UPRIGHT_BINARY, "run", "--rig", folder / "rig.yaml", "--gains", folder / "gains.yaml",
                   "--duration", std::to_string(duration_s()), "--out", folder / "run", "--json"});
+  if (c.stall_s > 0.0 && wait_for_rows(folder / "run")) {
+    kill(client.id(), SIGSTOP);
+    std::this_thread::sleep_for(std::chrono::duration<double>(c.stall_s));
+    kill(client.id(), SIGCONT);
+  }
   Outcome outcome;
   outcome.said = client.rest();
   outcome.exit_code = client.wait();
@@ -81,7 +95,9 @@ struct Row {
   double cart_m = 0.0, read_s = 0.0;
   std::uint32_t flags = 0;
   std::uint64_t sequence = 0;
-  bool held() const { return (flags & 3u) != 0; }  // stale or fault
+  bool held() const { return (flags & 3u) != 0; }                      // stale or fault
+  bool late() const { return (flags & (8u | 16u | 32u | 64u)) != 0; }  // it ended after the next was due
+  bool after_missed() const { return (flags & 128u) != 0; }
   bool write_failed() const { return (flags & 256u) != 0; }
   bool stopped() const { return (flags & 512u) != 0; }
 };
@@ -138,9 +154,10 @@ void expect_no_old_count(const Outcome& outcome, const std::vector<Row>& rows, b
   EXPECT_EQ(can_be_told ? wrong : 0u, 0u) << "of " << fresh;
 }
 
-/// The cycle that the outcome names is the first of the trouble and the log's row of it says so; or it is the
-/// first in which an encoder was silent, and then it was silent to the end. The plant had its zero volts
-/// within the watchdog's time of the trouble, or of the row that ended the run: silence takes time to notice.
+/// The cycle that the outcome names is the first of the trouble and the log's row of it says so; a cycle that
+/// never was has no row, and the row after it says that. Or it is the first in which an encoder was silent,
+/// and then it was silent to the end. The plant had its zero volts within the watchdog's time of the trouble,
+/// or of the row that ended the run where trouble takes time to notice: silence, and a few late periods.
 void expect_named_stop(const Outcome& outcome, const std::vector<Row>& rows) {
   const double start_s = outcome_number(outcome.run_yaml, "started_monotonic_s");
   const auto tick = static_cast<std::uint64_t>(outcome_number(outcome.run_yaml, "tick"));
@@ -148,8 +165,10 @@ void expect_named_stop(const Outcome& outcome, const std::vector<Row>& rows) {
   EXPECT_TRUE(rows.back().stopped());
   const auto named = std::find_if(rows.begin(), rows.end(), [&](const Row& row) { return row.tick >= tick; });
   ASSERT_NE(named, rows.end()) << "cycle " << tick << " is not in the log";
-  EXPECT_EQ(named->tick, tick);
-  const bool silent = outcome.run_yaml.find("\n  reason: stuck_encoder") != std::string::npos;
+  const bool overrun = outcome.reason() == "overrun", silent = outcome.reason() == "stuck_encoder";
+  if (!overrun || !named->after_missed()) {
+    EXPECT_EQ(named->tick, tick);
+  }
   if (silent) {
     const auto keeps = [&](auto counts) {
       return std::all_of(named, rows.end(), [&](const Row& row) { return counts(row) == counts(*named); });
@@ -157,6 +176,8 @@ void expect_named_stop(const Outcome& outcome, const std::vector<Row>& rows) {
     EXPECT_TRUE(keeps([](const Row& row) { return row.cart_counts; }) ||
                 keeps([](const Row& row) { return row.pendulum_counts; }))
         << "cycle " << tick;
+  } else if (overrun) {
+    EXPECT_TRUE(named->late() || named->after_missed()) << "cycle " << tick;
   } else {
     EXPECT_TRUE(named->held() || named->write_failed() || named->stopped()) << "cycle " << tick;
   }
@@ -164,7 +185,7 @@ void expect_named_stop(const Outcome& outcome, const std::vector<Row>& rows) {
   double on_until_s = 0.0;
   for (const TraceRow& row : outcome.trace)
     if (row.voltage_v != 0.0) on_until_s = row.time_s;
-  const double trouble_s = silent ? rows.back().time_s : named->time_s;
+  const double trouble_s = silent || overrun ? rows.back().time_s : named->time_s;
   EXPECT_LT(on_until_s - (start_s + trouble_s), watchdog_s + scheduling_margin_s);
 }
 
@@ -172,7 +193,10 @@ class RunOverModbus : public testing::TestWithParam<Case> {};
 
 TEST_P(RunOverModbus, BalancesOrStopsAtZeroVolts) {
   const Case& c = GetParam();
-  const Outcome outcome = run(c);
+  Outcome outcome = run(c);
+  // What must balance is judged on a run that the machine did not interrupt; it has three attempts for it.
+  for (int attempt = 1; attempt < 3 && c.end == End::balances && outcome.reason() == "overrun"; ++attempt)
+    outcome = run(c);
   ASSERT_FALSE(outcome.trace.empty());
   EXPECT_EQ(outcome.trace.back().voltage_v, 0.0) << "the motor is off in the end";
   const std::vector<Row> rows = rows_of(outcome.samples);
@@ -383,6 +407,7 @@ INSTANTIATE_TEST_SUITE_P(
         Case{"rtu_drop", true, End::any, {"--inject-drop-every", "300"}},
         Case{"tcp_corrupt", false, End::any, {"--inject-corrupt-every", "300"}},
         Case{"rtu_corrupt", true, End::any, {"--inject-corrupt-every", "300"}},
+        Case{"tcp_stalled", false, End::stops, {}, 0.3}, Case{"rtu_stalled", true, End::stops, {}, 0.3},
         Case{"tcp_restart", false, End::stops, {"--inject-restart-after", std::to_string(duration_s() / 2)}},
         Case{"rtu_restart", true, End::stops, {"--inject-restart-after", std::to_string(duration_s() / 2)}},
         // Nothing comes back any more: the motor may not go on with the last voltage.
