@@ -29,10 +29,8 @@ std::array<S*, states> as_array(PlantState<S>& s) {
   return {&s.cart_m, &s.theta_rad, &s.cart_mps, &s.theta_radps, &s.bristle_m};
 }
 
-EngineOptions engine_options(bool rough) {
+EngineOptions engine_options() {
   EngineOptions options;
-  constexpr double roughly_stiff_radps = 500.0;
-  if (rough) options.stiff_bristles_radps = roughly_stiff_radps;
   options.max_step_s = 4e-3;
   options.step_fraction = 0.5;
   options.event_tolerance_s = 1e-9;
@@ -457,7 +455,7 @@ class Fitter {
   const Measurement& run_of(std::size_t s) const { return (*data_.runs)[data_.segments[s].run]; }
 
   void linearise_all() {
-    const EngineOptions engine = engine_options(options_.rough);
+    const EngineOptions engine = engine_options();
     parallel_for(data_.segments.size(), [&](std::size_t s) {
       with_jet_size(free_.size(), [&]<int N>() {
         linearise_segment<N>(run_of(s), data_.segments[s], engine, point_, point_.starts[s], free_, true,
@@ -875,7 +873,7 @@ std::vector<std::vector<LinearStep>> linearise(const FitData& data, const FitPoi
   std::vector<std::vector<LinearStep>> steps(data.segments.size());
   parallel_for(data.segments.size(), [&](std::size_t s) {
     Normal unused;
-    linearise_segment<8>((*data.runs)[data.segments[s].run], data.segments[s], engine_options(false), point,
+    linearise_segment<8>((*data.runs)[data.segments[s].run], data.segments[s], engine_options(), point,
                          point.starts[s], {}, false, steps[s], unused);
   });
   return steps;

@@ -182,7 +182,6 @@ Hypothesis Search::screened(const Hypothesis& base, std::size_t effect) {
   FitOptions options;
   options.noise_rounds = 0;
   options.noise_last = true;
-  options.rough = true;
   options.most_iterations = 4;
   const FitPoint from = sieve_point(base);
   Hypothesis best;
@@ -206,7 +205,6 @@ Hypothesis Search::sieved(const Hypothesis& base) const {
   FitOptions options;
   options.noise_rounds = 0;
   options.noise_last = true;
-  options.rough = true;
   options.most_iterations = 2;
   Hypothesis h;
   h.added = base.added;

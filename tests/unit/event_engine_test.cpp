@@ -30,6 +30,59 @@ TEST(EventEngine, ConvergesAtOrderFourBetweenEvents) {
   EXPECT_NEAR(std::log2(ratio), 4.0, 0.3);
 }
 
+Plant with_bristles(double stiffness_n_per_m, double damping_n_per_mps) {
+  Plant plant = paper_plant();
+  plant.set("viscous_friction", {3.0});
+  plant.set("coulomb_friction", {0.43});
+  plant.set("stribeck_friction", {0.43, 0.105, 2.0});
+  plant.set("bristle_friction", {stiffness_n_per_m, damping_n_per_mps});
+  return plant;
+}
+
+TEST(EventEngine, BristlesConvergeAtOrderFourToo) {
+  const auto end = [](double stiffness, double step) {
+    EngineOptions options;
+    options.max_step_s = step;
+    options.step_fraction = 1e9;
+    EventEngine<double> engine(make_model<double>(with_bristles(stiffness, 20.0)), options);
+    engine.start({0.0, 0.4, 0.05, 0.0});
+    engine.advance(0.2, 2.0);
+    return engine.state().cart_m;
+  };
+  for (const double stiffness : {121.0, 2000.0}) {
+    const double exact = end(stiffness, 2e-5);
+    const double ratio = (end(stiffness, 2e-3) - exact) / (end(stiffness, 1e-3) - exact);
+    EXPECT_NEAR(std::log2(std::abs(ratio)), 4.0, 0.6) << stiffness;
+  }
+}
+
+// What rates the relaxation of stiff bristles has, no step needs to resolve; the cart's own motion is all
+// there is to follow.
+TEST(EventEngine, StiffBristlesCostNoStepsAndNoAccuracy) {
+  const auto run = [](EventEngine<double>& engine) {
+    engine.start({0.0, std::numbers::pi});
+    std::vector<double> cart_m;
+    for (int k = 0; k < 400; ++k) {
+      engine.advance(2e-3, k % 200 < 100 ? 3.0 : -3.0);
+      cart_m.push_back(engine.state().cart_m);
+    }
+    return cart_m;
+  };
+  for (const double stiffness : {1e3, 4e3, 2e4, 1e5})
+    for (const double damping : {0.0, 70.0}) {
+      const PlantModel<double> model = make_model<double>(with_bristles(stiffness, damping));
+      EngineOptions fine;
+      fine.max_step_s = 2e-5;
+      EventEngine<double> exact_engine(model, fine), engine(model);
+      const std::vector<double> exact = run(exact_engine), found = run(engine);
+      double worst_m = 0.0;
+      for (std::size_t i = 0; i < exact.size(); ++i)
+        worst_m = std::max(worst_m, std::abs(found[i] - exact[i]));
+      EXPECT_LT(worst_m, 1e-7) << stiffness << ' ' << damping;
+      EXPECT_LT(engine.step_count(), 3200u) << stiffness << ' ' << damping;
+    }
+}
+
 // Derivatives across sticking and breakaway against central differences of whole runs.
 TEST(EventEngine, DualNumbersAreRightAcrossEvents) {
   using Jet = ceres::Jet<double, 4>;
@@ -77,6 +130,36 @@ TEST(EventEngine, DualNumbersAreRightAcrossEvents) {
 
 // A cart that the pendulum tears loose for less than a step and that friction stops again at once: neither
 // missed nor repeated without end.
+TEST(EventEngine, DualNumbersAreRightThroughStiffBristles) {
+  using Jet = ceres::Jet<double, 2>;
+  const auto run = []<class Number>(EventEngine<Number>& engine) {
+    for (int k = 0; k < 600; ++k) engine.advance(Number(2e-3), Number(2.0 * std::sin(k * 2e-3 * 9.0)));
+  };
+  const Plant plant = with_bristles(8000.0, 30.0);
+  const std::size_t stiffness = effect_parameter_offset(effect_number("bristle_friction"));
+  const std::size_t level = effect_parameter_offset(effect_number("coulomb_friction"));
+  PlantModel<Jet> model = make_model<Jet>(plant);
+  model.parameters[stiffness].v[0] = 1.0;
+  model.parameters[level].v[1] = 1.0;
+  EventEngine<Jet> dual(model);
+  dual.start({});
+  run(dual);
+  for (int i = 0; i < 2; ++i) {
+    const std::size_t number = i == 0 ? stiffness : level;
+    const double aside = i == 0 ? 20.0 : 1e-4;
+    const auto end = [&](double by) {
+      PlantModel<double> other = make_model<double>(plant);
+      other.parameters[number] += by;
+      EventEngine<double> engine(other);
+      engine.start({});
+      run(engine);
+      return engine.state().cart_m;
+    };
+    const double difference = (end(aside) - end(-aside)) / (2.0 * aside);
+    EXPECT_NEAR(dual.state().cart_m.v[i], difference, 0.01 * std::abs(difference)) << i;
+  }
+}
+
 TEST(EventEngine, MicroSlipWithinOneStepIsOneSlip) {
   Plant plant = paper_plant();
   plant.pendulum.reset();

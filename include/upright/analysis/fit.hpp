@@ -108,7 +108,6 @@ struct FitOptions {
   int noise_rounds = 2;           ///< how often the noise is estimated anew; 0: as given
   std::optional<Noise> or_noise;  ///< another place from which to search for the noise, if it is the better
   bool noise_last = false;        ///< with no rounds: estimate the noise once, roughly, after the descent
-  bool rough = false;             ///< for a first look: steps do not resolve bristles that follow the cart
   bool starts_only = false;       ///< the plant is held: only initial states follow
   std::optional<Belief> belief;   ///< in the place of what each free parameter says of itself
   double tolerance = 1e-4;        ///< relative fall of the objective per sample at which to stop

@@ -188,44 +188,15 @@ class Dynamics {
     return rate;
   }
 
-  /// The rate of a cart that slides over bristles much stiffer than its motion: they follow their steady
-  /// deflection g(v) / s0 with the lag 1 / relaxation_radps, to first order in it. `bristle_m` in the result
-  /// is the deflection itself, not its rate.
-  PlantState<S> slaved_bristle_derivative(const PlantState<S>& state, const S& motor_v,
-                                          Contacts contacts) const {
-    constexpr double aside_mps = 1e-6, aside_m = 1e-6;
-    const S direction(value_of(state.cart_mps) < 0.0 ? -1.0 : 1.0);
-    const S speed = absolute(state.cart_mps);
-    const S level = cart_dry_level(state.cart_m, speed, direction);
-    const S over_speed = (cart_dry_level(state.cart_m, S(speed + S(aside_mps)), direction) -
-                          cart_dry_level(state.cart_m, S(speed - S(aside_mps)), direction)) /
-                         S(2.0 * aside_mps);
-    const S over_place = (cart_dry_level(S(state.cart_m + S(aside_m)), speed, direction) -
-                          cart_dry_level(S(state.cart_m - S(aside_m)), speed, direction)) /
-                         S(2.0 * aside_m);
-    const S lag_s = level / (bristle_stiffness() * speed);
-    const S lead_s = bristle_damping() / bristle_stiffness() - lag_s;
-    S torque(0.0);
-    if (model_.has_pendulum) {
-      torque = pivot_smooth_torque(state.theta_radps);
-      if (pivot_dry_) torque = torque + pivot_sliding_torque(state.theta_radps, contacts.pivot);
-    }
+  /// What a unit of force on a cart that does not stick adds to the accelerations.
+  PlantState<S> push(const PlantState<S>& state, Contacts contacts) const {
     const bool pivot_rests = !model_.has_pendulum || (contacts.pivot == Contact::stick && pivot_can_stick());
-    const S force = cart_smooth_force(state, motor_v) - level * direction;
-    PlantState<S> rate{};
-    accelerate(state, S(force + S(1.0)), torque, model_.cart_locked, pivot_rests, rate);
-    const S pushed = rate.cart_mps;
-    accelerate(state, force, torque, model_.cart_locked, pivot_rests, rate);
-    const S mobility = pushed - rate.cart_mps;
-    const S acceleration = (rate.cart_mps - mobility * lead_s * direction * over_place * state.cart_mps) /
-                           (S(1.0) + mobility * lead_s * over_speed);
-    const S level_rate = over_speed * direction * acceleration + over_place * state.cart_mps;
-    accelerate(state, S(force - direction * lead_s * level_rate), torque, model_.cart_locked, pivot_rests,
-               rate);
-    rate.cart_m = model_.cart_locked ? S(0.0) : state.cart_mps;
-    rate.theta_rad = pivot_rests ? S(0.0) : state.theta_radps;
-    rate.bristle_m = direction * (level - lag_s * level_rate) / bristle_stiffness();
-    return rate;
+    PlantState<S> without{}, with{};
+    accelerate(state, S(0.0), S(0.0), model_.cart_locked, pivot_rests, without);
+    accelerate(state, S(1.0), S(0.0), model_.cart_locked, pivot_rests, with);
+    with.cart_mps = with.cart_mps - without.cart_mps;
+    with.theta_radps = with.theta_radps - without.theta_radps;
+    return with;
   }
 
   /// How fast bristles approach their steady deflection while the cart slides [1/s].
@@ -290,22 +261,22 @@ class Dynamics {
     return gravity - coupling_ * cos(state.theta_rad) * rate.cart_mps;
   }
 
-  /// Fastest rate of the motion here [1/s]; engines keep their steps below a fraction of its inverse. The
-  /// bristles' own rates count unless they are `slaved`.
-  double fastest_rate_radps(const PlantState<S>& state, bool slaved = false) const {
+  /// Fastest rate of the motion here [1/s]; engines keep their steps below a fraction of its inverse. With
+  /// `relaxation` the one of the bristles counts as well.
+  double fastest_rate_radps(const PlantState<S>& state, bool relaxation = true) const {
     const double mass = value_of(least_cart_inertia());
     const double v = value_of(state.cart_mps);
     double rate = value_of(base_.back_emf_n_per_mps) / mass + std::abs(value_of(state.theta_radps));
     for_each_effect([&]<std::size_t I>() {
       using E = EffectAt<I>;
       if constexpr (requires(const double* q) { E::rate_radps(q, v, mass); })
-        if (present_.template has<I>() && !(slaved && has_bristles<E, S>)) {
+        if (present_.template has<I>()) {
           std::array<double, parameter_count_of<I>> plain;
           for (std::size_t i = 0; i < plain.size(); ++i) plain[i] = value_of(p<I>()[i]);
           rate += E::rate_radps(plain.data(), v, mass);
         }
     });
-    if (bristles_ && !slaved) rate += bristle_relaxation_radps(state);
+    if (bristles_ && relaxation) rate += bristle_relaxation_radps(state);
     if (cart_dry_ && model_.smoothing > 0.0 && std::abs(v) * model_.smoothing < 3.0)
       rate += model_.smoothing * value_of(cart_dry_level(state.cart_m, S(0.0), S(1.0))) / mass;
     return rate;

@@ -38,9 +38,6 @@ struct EngineOptions {
   /// Steps of the Runge-Kutta engine are at most this fraction of the inverse of the fastest rate of the
   /// motion.
   double step_fraction = 0.2;
-  /// From this relaxation on the Runge-Kutta engine takes sliding bristles that have come to follow the cart
-  /// as following; the error in force is of the order of (rate of the motion / relaxation)^2.
-  double stiff_bristles_radps = 5e4;
   /// Relative tolerance of the reference engine.
   double relative_tolerance = 1e-10;
   /// How exactly the Runge-Kutta engine finds the time of an event.

@@ -50,11 +50,10 @@ class EventEngine {
     while (value_of(remaining) > 0.0 && !halted_) {
       ++step_count_;
       const bool held = budget_.spent(time_s_);
-      slaved_ = bristles_follow(value_of(state_.motor_v));
+      look_at_bristles(value_of(state_.motor_v));
       const S step = next_step(remaining);
       FirstRate rate;
-      PlantState<S> next = rk4(dynamics_, state_, drive_, step, &rate);
-      if (slaved_) let_bristles_follow(dynamics_, next, next.motor_v);
+      const PlantState<S> next = rk4(dynamics_, state_, drive_, step, &rate);
       const PlantState<double> plain_next = plain_state(next);
       const auto along = [&](double t) { return plain_step(t); };
       const auto found = first_event(plain_next, rate, value_of(step), held, along);
@@ -86,7 +85,7 @@ class EventEngine {
     while (!halted_ && end_s - time_s_ > smallest_step_s) {
       ++step_count_;
       const bool held = budget_.spent(time_s_);
-      slaved_ = bristles_follow(lag ? state_.motor_v : plain_.actuate(command(time_s_, state_)));
+      look_at_bristles(lag ? state_.motor_v : plain_.actuate(command(time_s_, state_)));
       double rate = motion_rate();
       if (lag) rate += 1.0 / dynamics_.motor_time_constant_s();
       const double step = even_step(end_s - time_s_, std::min(rate_step(rate), most_step_s));
@@ -150,7 +149,6 @@ class EventEngine {
  private:
   static constexpr double least_lag_s = 1e-6;
   static constexpr double smallest_step_s = 1e-13;
-  static constexpr double followed_within = 1e-4;
   static constexpr double most_rate_radps = 2e6;
 
   struct Found {
@@ -196,46 +194,29 @@ class EventEngine {
     budget_.count();
   }
 
-  /// Whether stiff bristles have come to follow the sliding cart, so that steps need not resolve them.
-  bool bristles_follow(double motor_v) {
-    if (!dynamics_.has_bristle_state()) return false;
+  /// How fast bristles relax, which a step need not resolve, and how fast what it must resolve changes: their
+  /// way to the steady deflection, and the relaxation itself.
+  void look_at_bristles(double motor_v) {
+    if (!dynamics_.has_bristle_state()) return;
     const PlantState<double> s = plain_state(state_);
+    const PlantState<double> rate = plain_.derivative(s, motor_v, contacts_);
     const double relaxation = plain_.bristle_relaxation_radps(s);
-    if (relaxation < options_.stiff_bristles_radps) return false;
-    const PlantState<double> rate = plain_.slaved_bristle_derivative(s, motor_v, contacts_);
-    speed_change_radps_ = std::abs(rate.cart_mps / s.cart_mps);
-    const double behind = speed_change_radps_ / relaxation;
-    if (behind * behind > followed_within) return false;
-    return std::abs(s.bristle_m - rate.bristle_m) < followed_within * std::abs(rate.bristle_m);
+    constexpr double aside_s = 1e-7;
+    const double growth = (plain_.bristle_relaxation_radps(moved(s, rate, aside_s)) - relaxation) / aside_s;
+    const double way = s.cart_mps == 0.0 ? 0.0 : std::abs(rate.bristle_m / s.cart_mps);
+    const double change = std::abs(growth);
+    bristle_change_radps_ =
+        std::min(way, 1.0) * relaxation + std::min(std::sqrt(change), change / std::max(relaxation, 1.0));
+    const PlantState<double> push = plain_.push(s, contacts_);
+    const double damping = plain_.bristle_damping(), slowed = damping * push.cart_mps;
+    bristles_ = {relaxation + slowed, rate.cart_mps + slowed * rate.bristle_m - growth * s.bristle_m, slowed,
+                 damping * push.theta_radps};
   }
 
   /// Rate of the motion itself, capped so that no plant costs unbounded work.
   double motion_rate() const {
-    double rate = plain_.fastest_rate_radps(plain_state(state_), slaved_);
-    if (slaved_) rate += speed_change_radps_;
+    const double rate = plain_.fastest_rate_radps(plain_state(state_), false) + bristle_change_radps_;
     return std::min(rate, most_rate_radps);
-  }
-
-  template <class T>
-  [[gnu::noinline]] PlantState<T> slaved_motion(const Dynamics<T>& dynamics, const PlantState<T>& s,
-                                                const T& motor_v) const {
-    PlantState<T> rate = dynamics.slaved_bristle_derivative(s, motor_v, contacts_);
-    rate.bristle_m = T(0.0);
-    return rate;
-  }
-
-  template <class T>
-  [[gnu::always_inline]] PlantState<T> motion(const Dynamics<T>& dynamics, const PlantState<T>& s,
-                                              const T& motor_v) const {
-    if (slaved_) [[unlikely]]
-      return slaved_motion(dynamics, s, motor_v);
-    return dynamics.derivative(s, motor_v, contacts_);
-  }
-
-  /// Puts slaved bristles where they are at the end of a step.
-  template <class T>
-  void let_bristles_follow(const Dynamics<T>& dynamics, PlantState<T>& s, const T& motor_v) const {
-    s.bristle_m = dynamics.slaved_bristle_derivative(s, motor_v, contacts_).bristle_m;
   }
 
   double rate_step(double rate) const { return std::min(options_.max_step_s, options_.step_fraction / rate); }
@@ -278,7 +259,13 @@ class EventEngine {
             drive + gap * (T(3.0) * m0 - T(24.0) * m1 + T(30.0) * m2), drive + gap * e};
   }
 
-  /// One step under constant drive. Slaved bristles are left where they are.
+  template <class T>
+  std::optional<Relaxation<T>> relaxation_over(const T& h) const {
+    if (!dynamics_.has_bristle_state()) return std::nullopt;
+    return Relaxation<T>(bristles_, h);
+  }
+
+  /// One step under constant drive.
   template <class T>
   PlantState<T> rk4(const Dynamics<T>& dynamics, const PlantState<T>& s, const T& drive, const T& h,
                     FirstRate* first = nullptr) const {
@@ -288,11 +275,12 @@ class EventEngine {
     const T& middle_v = lagged ? lagged->middle_v : drive;
     const T& end_v = lagged ? lagged->end_v : drive;
     const auto rate = [&](const PlantState<T>& at, Stage stage) {
-      return motion(dynamics, at, stage == Stage::middle ? middle_v : end_v);
+      return dynamics.derivative(at, stage == Stage::middle ? middle_v : end_v, contacts_);
     };
-    const PlantState<T> k1 = motion(dynamics, s, begin_v);
+    const PlantState<T> k1 = dynamics.derivative(s, begin_v, contacts_);
     if (first != nullptr) *first = {value_of(k1.cart_mps), value_of(k1.theta_radps)};
-    PlantState<T> end = runge_kutta_4(rate, s, k1, h);
+    const std::optional<Relaxation<T>> bristles = relaxation_over(h);
+    PlantState<T> end = runge_kutta_4(rate, s, k1, h, bristles ? &*bristles : nullptr);
     end.motor_v = lagged ? lagged->after_v : drive;
     return end;
   }
@@ -312,7 +300,7 @@ class EventEngine {
   PlantState<double> driven_rate(const Command& command, bool lag, double t,
                                  const PlantState<double>& s) const {
     const double drive = plain_.actuate(command(t, s));
-    PlantState<double> rate = motion(plain_, s, lag ? s.motor_v : drive);
+    PlantState<double> rate = plain_.derivative(s, lag ? s.motor_v : drive, contacts_);
     rate.motor_v = lag ? (drive - s.motor_v) / plain_.motor_time_constant_s() : 0.0;
     return rate;
   }
@@ -324,9 +312,9 @@ class EventEngine {
     };
     const PlantState<double> s = plain_state(state_);
     DrivenStep step{driven_rate(command, lag, time_s_, s), {}};
-    step.end = runge_kutta_4<MotorVoltage::moves>(rate, s, step.first, h);
+    const std::optional<Relaxation<double>> bristles = relaxation_over(h);
+    step.end = runge_kutta_4<MotorVoltage::moves>(rate, s, step.first, h, bristles ? &*bristles : nullptr);
     if (!lag) step.end.motor_v = plain_.actuate(command(time_s_ + h, step.end));
-    if (slaved_) let_bristles_follow(plain_, step.end, step.end.motor_v);
     return step;
   }
 
@@ -395,14 +383,13 @@ class EventEngine {
   S pass(const Found& found, bool held) {
     S taken(found.after_s);
     PlantState<S> at = rk4(dynamics_, state_, drive_, taken);
-    if (slaved_) let_bristles_follow(dynamics_, at, at.motor_v);
     if constexpr (!std::is_same_v<S, double>) {
       // The root moves with the parameters: dt = -dg / (dg/dt).
       const S g = event_indicator(dynamics_, at, contacts_, found.watch, options_);
       const double slope = indicator_slope(found);
       constexpr double flattest = 1e-9;  // a grazing event has no derivative; keep it finite
       const S shift = (S(value_of(g)) - g) / S(std::max(slope, flattest));
-      at = moved(at, motion(dynamics_, at, at.motor_v), shift);
+      at = moved(at, dynamics_.derivative(at, at.motor_v, contacts_), shift);
       if (dynamics_.has_motor_lag())
         at.motor_v = at.motor_v + shift * (drive_ - at.motor_v) / dynamics_.motor_time_constant_s();
       taken = taken + shift;
@@ -440,8 +427,8 @@ class EventEngine {
   PlantState<S> state_{};
   Contacts contacts_;
   S drive_{};
-  bool slaved_ = false;              ///< the bristles follow the cart during this step
-  double speed_change_radps_ = 0.0;  ///< |acceleration / velocity| while they do
+  Bristles bristles_;                  ///< at the beginning of this step
+  double bristle_change_radps_ = 0.0;  ///< what steps must resolve of them
   double time_s_ = 0.0;
   std::optional<EventKind> halted_;
   EventBudget budget_;

@@ -1,6 +1,10 @@
 // The classical Runge-Kutta method of order 4 over a plant's state, for any scalar: double, dual numbers,
-// lanes.
+// lanes. Bristles that relax fast are followed by its exponential form.
 #pragma once
+
+#include <array>
+#include <cmath>
+#include <type_traits>
 
 #include "upright/model/dynamics.hpp"
 
@@ -21,18 +25,137 @@ PlantState<S> moved(const PlantState<S>& s, const PlantState<S>& rate, const S& 
   return to;
 }
 
+/// Bristles at the beginning of a step, as the exponential method below splits their motion. Whatever the
+/// numbers are, the method has order 4; the nearer they are to the truth, the less a long step errs.
+struct Bristles {
+  double relaxation_radps = 0.0;  ///< R, with the velocity that their damping gives the cart
+  double drift_mps2 = 0.0;        ///< how fast the rest of their rate changes
+  double cart_mps_per_m = 0.0;    ///< velocity that their damping takes from the cart per deflection
+  double theta_radps_per_m = 0.0;
+};
+
+/// How bristles move within a step of length h however fast they relax: dz/dt = -R z + drift t + smooth part,
+/// by ETDRK4, equations (26)-(29) of Cox and Matthews, "Exponential time differencing for stiff systems", J.
+/// Comput. Phys. 176 (2002). With all of `Bristles` zero it is the classical method. Their damping pushes the
+/// cart by how far they moved, not by how fast they do at a few moments.
+template <class S>
+struct Relaxation {
+  Bristles bristles;
+  S half_decay, decay;             ///< exp(-R h / 2), exp(-R h)
+  S half_weight;                   ///< of the smooth part over half the step
+  std::array<S, 3> whole_weights;  ///< of the smooth part at the beginning, in the middle and at the end
+  S first_half_m, second_half_m, whole_m;  ///< what the drift adds
+  S half_drift_mps, drift_mps;             ///< drift in the middle and at the end
+
+  /// The smooth part of their rate, where the drift has come to `drift`.
+  S smooth(const PlantState<S>& at, const PlantState<S>& rate, const S& drift) const {
+    return rate.bristle_m + S(bristles.relaxation_radps) * at.bristle_m - drift;
+  }
+  /// Puts them where they are, in the place of where the classical method has them, and the cart with them.
+  void put(PlantState<S>& at, const S& bristle_m) const {
+    const S aside = bristle_m - at.bristle_m;
+    at.bristle_m = bristle_m;
+    at.cart_mps = at.cart_mps - S(bristles.cart_mps_per_m) * aside;
+    at.theta_radps = at.theta_radps - S(bristles.theta_radps_per_m) * aside;
+  }
+
+  Relaxation(const Bristles& those, const S& h) : bristles(those) {
+    const double rate = bristles.relaxation_radps;
+    const Phi half(-0.5 * rate * value_of(h)), whole(-rate * value_of(h));
+    const double length = value_of(h);
+    half_decay = along(h, half.zero, -0.5 * rate * half.zero);
+    decay = along(h, whole.zero, -rate * whole.zero);
+    half_weight = along(h, 0.5 * length * half.one, 0.5 * half.zero);
+    constexpr double of_phi[3][3] = {{1.0, -3.0, 4.0}, {0.0, 2.0, -4.0}, {0.0, -1.0, 4.0}};
+    for (std::size_t i = 0; i < 3; ++i) {
+      double weight = 0.0, slope = 0.0;
+      for (std::size_t k = 0; k < 3; ++k) {
+        weight += of_phi[i][k] * length * whole.values()[k];
+        slope += of_phi[i][k] * whole.slope_of_length(k);
+      }
+      whole_weights[i] = along(h, weight, slope);
+    }
+    const double drift = bristles.drift_mps2, q = 0.5 * length;
+    const double to_middle = q * q * half.two, slope_to_middle = q + half.c * q * half.two;
+    first_half_m = along(h, drift * to_middle, 0.5 * drift * slope_to_middle);
+    second_half_m = along(h, drift * (q * q * half.one + to_middle),
+                          0.5 * drift * (q * half.one + q * half.zero + slope_to_middle));
+    whole_m = along(h, drift * length * length * whole.two, drift * length * (1.0 + whole.c * whole.two));
+    half_drift_mps = along(h, drift * q, 0.5 * drift);
+    drift_mps = along(h, drift * length, drift);
+  }
+
+ private:
+  /// phi_0(c) = exp(c), phi_k(c) = (phi_{k-1}(c) - 1 / (k-1)!) / c.
+  struct Phi {
+    double c, zero, one, two, three;
+
+    explicit Phi(double at) : c(at) {
+      constexpr double series_within = 1.0;
+      if (std::abs(c) > series_within) {
+        zero = std::exp(c);
+        one = (zero - 1.0) / c;
+        two = (one - 1.0) / c;
+        three = (two - 0.5) / c;
+        return;
+      }
+      constexpr int last = 18;  // of the factorials: the rest is below the rounding
+      double term = 1.0;
+      for (int k = last; k > 3; --k) term = 1.0 + term * c / k;
+      three = term / 6.0;
+      two = 0.5 + c * three;
+      one = 1.0 + c * two;
+      zero = 1.0 + c * one;
+    }
+    std::array<double, 3> values() const { return {one, two, three}; }
+    /// d (h phi_{k+1}(-R h)) / dh.
+    double slope_of_length(std::size_t k) const {
+      constexpr std::array<double, 3> inverse_factorial = {1.0, 1.0, 0.5};
+      const double order = static_cast<double>(k) + 1.0;
+      return (1.0 - order + c) * values()[k] + inverse_factorial[k];
+    }
+  };
+
+  /// A function of the length from its value and its slope there.
+  static S along([[maybe_unused]] const S& h, double value, [[maybe_unused]] double slope) {
+    if constexpr (std::is_same_v<S, double>)
+      return value;
+    else
+      return S(value) + S(slope) * (h - S(value_of(h)));
+  }
+};
+
 /// Where in a step a rate is asked for. Its beginning is asked for by the caller.
 enum class Stage : std::uint8_t { middle, end };
 
 /// One step of length h from `s`. `first` is the rate at its beginning, `rate(state, Stage)` that of the
-/// others.
+/// others. `bristles` is how they move, null where nothing relaxes fast.
 template <MotorVoltage motor = MotorVoltage::held, class S, class Rate>
-PlantState<S> runge_kutta_4(const Rate& rate, const PlantState<S>& s, const PlantState<S>& first,
-                            const S& h) {
+PlantState<S> runge_kutta_4(const Rate& rate, const PlantState<S>& s, const PlantState<S>& first, const S& h,
+                            const Relaxation<S>* bristles = nullptr) {
   const S half = S(0.5) * h;
-  const PlantState<S> second = rate(moved<motor>(s, first, half), Stage::middle);
-  const PlantState<S> third = rate(moved<motor>(s, second, half), Stage::middle);
-  const PlantState<S> fourth = rate(moved<motor>(s, third, h), Stage::end);
+  S begin_smooth{}, middle_smooth{}, again_smooth{}, middle_m{};
+  PlantState<S> at = moved<motor>(s, first, half);
+  if (bristles != nullptr) {
+    begin_smooth = bristles->smooth(s, first, S(0.0));
+    middle_m =
+        bristles->half_decay * s.bristle_m + bristles->half_weight * begin_smooth + bristles->first_half_m;
+    bristles->put(at, middle_m);
+  }
+  const PlantState<S> second = rate(at, Stage::middle);
+  if (bristles != nullptr) middle_smooth = bristles->smooth(at, second, bristles->half_drift_mps);
+  at = moved<motor>(s, second, half);
+  if (bristles != nullptr)
+    bristles->put(at, bristles->half_decay * s.bristle_m + bristles->half_weight * middle_smooth +
+                          bristles->first_half_m);
+  const PlantState<S> third = rate(at, Stage::middle);
+  if (bristles != nullptr) again_smooth = bristles->smooth(at, third, bristles->half_drift_mps);
+  at = moved<motor>(s, third, h);
+  if (bristles != nullptr)
+    bristles->put(at, bristles->half_decay * middle_m +
+                          bristles->half_weight * (S(2.0) * again_smooth - begin_smooth) +
+                          bristles->second_half_m);
+  const PlantState<S> fourth = rate(at, Stage::end);
   const S sixth = h / S(6.0);
   const auto along = [&](S PlantState<S>::*of) {
     return s.*of + sixth * (first.*of + S(2.0) * (second.*of + third.*of) + fourth.*of);
@@ -45,6 +168,12 @@ PlantState<S> runge_kutta_4(const Rate& rate, const PlantState<S>& s, const Plan
   end.motor_v = s.motor_v;
   if constexpr (motor == MotorVoltage::moves) end.motor_v = along(&PlantState<S>::motor_v);
   end.bristle_m = along(&PlantState<S>::bristle_m);
+  if (bristles != nullptr) {
+    const auto& [begin, middle, last] = bristles->whole_weights;
+    bristles->put(end, bristles->decay * s.bristle_m + begin * begin_smooth +
+                           middle * (middle_smooth + again_smooth) +
+                           last * bristles->smooth(at, fourth, bristles->drift_mps) + bristles->whole_m);
+  }
   return end;
 }
 
