@@ -38,6 +38,9 @@ struct EngineOptions {
   /// Steps of the Runge-Kutta engine are at most this fraction of the inverse of the fastest rate of the
   /// motion.
   double step_fraction = 0.2;
+  /// Steps of the Runge-Kutta engine resolve the oscillation of the cart on its bristles even where their
+  /// relaxation damps it. Without, stiff bristles cost nothing, and positions err by less than 1e-6 m or so.
+  bool resolve_bristles = true;
   /// Relative tolerance of the reference engine.
   double relative_tolerance = 1e-10;
   /// How exactly the Runge-Kutta engine finds the time of an event.
