@@ -261,22 +261,22 @@ class Dynamics {
     return gravity - coupling_ * cos(state.theta_rad) * rate.cart_mps;
   }
 
-  /// Fastest rate of the motion here [1/s]; engines keep their steps below a fraction of its inverse. With
-  /// `relaxation` the one of the bristles counts as well.
-  double fastest_rate_radps(const PlantState<S>& state, bool relaxation = true) const {
+  /// Fastest rate of the motion here [1/s]; engines keep their steps below a fraction of its inverse. Without
+  /// `bristles` theirs do not count.
+  double fastest_rate_radps(const PlantState<S>& state, bool bristles = true) const {
     const double mass = value_of(least_cart_inertia());
     const double v = value_of(state.cart_mps);
     double rate = value_of(base_.back_emf_n_per_mps) / mass + std::abs(value_of(state.theta_radps));
     for_each_effect([&]<std::size_t I>() {
       using E = EffectAt<I>;
       if constexpr (requires(const double* q) { E::rate_radps(q, v, mass); })
-        if (present_.template has<I>()) {
+        if (present_.template has<I>() && (bristles || !has_bristles<E, S>)) {
           std::array<double, parameter_count_of<I>> plain;
           for (std::size_t i = 0; i < plain.size(); ++i) plain[i] = value_of(p<I>()[i]);
           rate += E::rate_radps(plain.data(), v, mass);
         }
     });
-    if (bristles_ && relaxation) rate += bristle_relaxation_radps(state);
+    if (bristles_ && bristles) rate += bristle_relaxation_radps(state);
     if (cart_dry_ && model_.smoothing > 0.0 && std::abs(v) * model_.smoothing < 3.0)
       rate += model_.smoothing * value_of(cart_dry_level(state.cart_m, S(0.0), S(1.0))) / mass;
     return rate;

@@ -194,8 +194,9 @@ class EventEngine {
     budget_.count();
   }
 
-  /// How fast bristles relax, which a step need not resolve, and how fast what it must resolve changes: their
-  /// way to the steady deflection, and the relaxation itself.
+  /// How bristles move at first, and how fast what a step must resolve of them changes: their way to the
+  /// steady deflection, the relaxation itself, and the cart on their stiffness, which a fast relaxation turns
+  /// from an oscillation into a creep.
   void look_at_bristles(double motor_v) {
     if (!dynamics_.has_bristle_state()) return;
     const PlantState<double> s = plain_state(state_);
@@ -205,10 +206,14 @@ class EventEngine {
     const double growth = (plain_.bristle_relaxation_radps(moved(s, rate, aside_s)) - relaxation) / aside_s;
     const double way = s.cart_mps == 0.0 ? 0.0 : std::abs(rate.bristle_m / s.cart_mps);
     const double change = std::abs(growth);
-    bristle_change_radps_ =
-        std::min(way, 1.0) * relaxation + std::min(std::sqrt(change), change / std::max(relaxation, 1.0));
     const PlantState<double> push = plain_.push(s, contacts_);
     const double damping = plain_.bristle_damping(), slowed = damping * push.cart_mps;
+    const double spring = plain_.bristle_stiffness() * push.cart_mps;
+    // A cart that damping holds against its bristles moves by small differences of large numbers.
+    constexpr double of_damping = 0.05;
+    bristle_change_radps_ =
+        std::min(way, 1.0) * relaxation + std::min(std::sqrt(change), change / std::max(relaxation, 1.0)) +
+        std::min(std::sqrt(spring), spring / std::max(relaxation + slowed, 1.0)) + of_damping * slowed;
     bristles_ = {relaxation + slowed, rate.cart_mps + slowed * rate.bristle_m - growth * s.bristle_m, slowed,
                  damping * push.theta_radps};
   }
