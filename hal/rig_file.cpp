@@ -124,15 +124,17 @@ void read_serial_line(const YamlMap& map, ModbusRig& rig) {
   rig.stop_bits = small_integer(map, "stop_bits", 1, 2);
 }
 
-void read_counters(const YamlMap& map, const Calibration& calibration, ModbusRig& rig) {
+void read_counters(const YamlMap& map, const Calibration& calibration, const RigRoles& roles,
+                   ModbusRig& rig) {
   rig.input_registers = choose<int>(map, "table", tables) == 1;
-  rig.cart_address = small_integer(map, "cart_address", 0, last_address);
-  rig.pendulum_address = small_integer(map, "pendulum_address", 0, last_address);
+  if (roles.cart) rig.cart_address = small_integer(map, "cart_address", 0, last_address);
+  if (roles.pendulum) rig.pendulum_address = small_integer(map, "pendulum_address", 0, last_address);
   rig.counter.registers = small_integer(map, "registers", 1, 2);
   rig.counter.word_order = rig.counter.registers == 2 || map.has("word_order")
                                ? choose<WordOrder>(map, "word_order", word_orders)
                                : WordOrder::high_first;
-  const int widest = std::max(calibration.cart.width_bits, calibration.pendulum.width_bits);
+  const int widest = std::max(roles.cart ? calibration.cart.width_bits : 0,
+                              roles.pendulum ? calibration.pendulum.width_bits : 0);
   if (widest > 16 * rig.counter.registers)
     map.fail("registers", "is 1, for counters of " + std::to_string(widest) + " bits",
              "give registers 2, or width_bits 16 in the calibration");
@@ -173,11 +175,19 @@ void refuse_overlap(const YamlMap& map, const std::vector<Block>& blocks) {
   }
 }
 
-void check_registers(const YamlMap& map, const ModbusRig& rig) {
-  std::vector<Block> read = {{"counters", rig.cart_address, rig.counter.registers},
-                             {"counters", rig.pendulum_address, rig.counter.registers}};
+/// With function 0x17 every request carries a voltage, which is zero where another backend has the output.
+bool carries_voltage(const ModbusRig& rig, const RigRoles& roles) {
+  return roles.output || rig.exchange == ModbusExchange::read_write;
+}
+
+void check_registers(const YamlMap& map, const ModbusRig& rig, const RigRoles& roles) {
+  std::vector<Block> read;
+  if (roles.cart) read.push_back({"counters", rig.cart_address, rig.counter.registers});
+  if (roles.pendulum) read.push_back({"counters", rig.pendulum_address, rig.counter.registers});
   if (rig.boot_count_address) read.push_back({"boot_count_address", *rig.boot_count_address, 1});
-  std::vector<Block> written = {{"voltage", rig.voltage_address, rig.voltage.registers()}};
+  std::vector<Block> written;
+  if (carries_voltage(rig, roles))
+    written.push_back({"voltage", rig.voltage_address, rig.voltage.registers()});
   if (rig.enable_address) written.push_back({"enable_address", *rig.enable_address, 1});
   if (rig.watchdog) written.push_back({"device_watchdog", rig.watchdog->address, 1});
   refuse_overlap(map, read);
@@ -188,7 +198,7 @@ void check_registers(const YamlMap& map, const ModbusRig& rig) {
     all.insert(all.end(), written.begin(), written.end());
     refuse_overlap(map, all);
   }
-  int first = last_address, end = 0;
+  int first = last_address, end = first;
   for (const Block& block : read) {
     first = std::min(first, block.first);
     end = std::max(end, block.first + block.count);
@@ -212,13 +222,17 @@ ModbusRig read_modbus(const YamlMap& map, bool serial, const RigFile& rig_file) 
   rig.unit = small_integer(map, "unit", serial ? 1 : 0, serial ? 247 : 255);
   rig.response_timeout_s = map.number("response_timeout_s", Range{1e-4, 1.0});
   rig.exchange = choose<ModbusExchange>(map, "exchange", exchanges);
-  read_counters(map.map("counters"), rig_file.calibration, rig);
+  const RigRoles roles = roles_of(rig_file, serial ? Backend::modbus_rtu : Backend::modbus_tcp);
+  if (roles.encoders()) read_counters(map.map("counters"), rig_file.calibration, roles, rig);
   if (map.has("boot_count_address"))
     rig.boot_count_address = small_integer(map, "boot_count_address", 0, last_address);
-  read_voltage(map.map("voltage"), rig_file.amplifier.limit_v, rig);
-  if (map.has("enable_address")) rig.enable_address = small_integer(map, "enable_address", 0, last_address);
-  if (const auto watchdog = map.optional_map("device_watchdog")) rig.watchdog = read_watchdog(*watchdog);
-  check_registers(map, rig);
+  if (carries_voltage(rig, roles)) read_voltage(map.map("voltage"), rig_file.amplifier.limit_v, rig);
+  if (roles.output) {
+    if (map.has("enable_address"))
+      rig.enable_address = small_integer(map, "enable_address", 0, last_address);
+    if (const auto watchdog = map.optional_map("device_watchdog")) rig.watchdog = read_watchdog(*watchdog);
+  }
+  check_registers(map, rig, roles);
   if (rig.response_timeout_s >= rig_file.watchdog_s)
     map.fail("response_timeout_s", "is not below watchdog_s", "give it less than the watchdog's time");
   map.finish();
@@ -227,17 +241,36 @@ ModbusRig read_modbus(const YamlMap& map, bool serial, const RigFile& rig_file) 
 
 void read_backends(const YamlMap& document, RigFile& rig) {
   if (!document.is_map("backend")) {
-    rig.encoders = rig.output = choose<Backend>(document, "backend", backends);
+    rig.cart_encoder = rig.pendulum_encoder = rig.output = choose<Backend>(document, "backend", backends);
     return;
   }
   const YamlMap map = document.map("backend");
-  rig.encoders = choose<Backend>(map, "encoders", backends);
+  if (map.has("cart_encoder") || map.has("pendulum_encoder")) {
+    rig.cart_encoder = choose<Backend>(map, "cart_encoder", backends);
+    rig.pendulum_encoder = choose<Backend>(map, "pendulum_encoder", backends);
+  } else {
+    rig.cart_encoder = rig.pendulum_encoder = choose<Backend>(map, "encoders", backends);
+  }
   rig.output = choose<Backend>(map, "output", backends);
   map.finish();
+  const RigRoles simulated = roles_of(rig, Backend::simulated);
+  if (simulated.any() && !simulated.all())
+    document.fail("backend", "joins simulated to hardware, but a simulated plant moves by its own output only",
+                  "use simulated for all of it or for none");
 }
 
 bool uses(const RigFile& rig, Backend backend) {
-  return rig.encoders == backend || rig.output == backend;
+  return roles_of(rig, backend).any();
+}
+
+std::string backend_line(const RigFile& rig) {
+  const std::string cart = backend_name(rig.cart_encoder), pendulum = backend_name(rig.pendulum_encoder);
+  const std::string output = backend_name(rig.output);
+  if (cart != pendulum)
+    return "backend: {cart_encoder: " + cart + ", pendulum_encoder: " + pendulum + ", output: " + output +
+           "}\n";
+  if (cart != output) return "backend: {encoders: " + cart + ", output: " + output + "}\n";
+  return "backend: " + output + "\n";
 }
 
 std::string zero_text(const Calibration& calibration) {
@@ -307,21 +340,26 @@ std::string link_text(const ModbusRig& rig) {
          "\n";
 }
 
-std::string modbus_text(const ModbusRig& rig) {
+std::string counters_text(const ModbusRig& rig, const RigRoles& roles) {
+  std::string text = "  counters: {table: " + word_of(rig.input_registers ? 1 : 0, tables);
+  if (roles.cart) text += ", cart_address: " + std::to_string(rig.cart_address);
+  if (roles.pendulum) text += ", pendulum_address: " + std::to_string(rig.pendulum_address);
+  return text + ", registers: " + std::to_string(rig.counter.registers) +
+         ", word_order: " + word_of(rig.counter.word_order, word_orders) + "}\n";
+}
+
+std::string modbus_text(const ModbusRig& rig, const RigRoles& roles) {
   std::string text = "modbus:\n" + link_text(rig) + "  unit: " + std::to_string(rig.unit) +
                      "\n  response_timeout_s: " + exact_text(rig.response_timeout_s) +
-                     "\n  exchange: " + word_of(rig.exchange, exchanges) +
-                     "\n  counters: {table: " + word_of(rig.input_registers ? 1 : 0, tables) +
-                     ", cart_address: " + std::to_string(rig.cart_address) +
-                     ", pendulum_address: " + std::to_string(rig.pendulum_address) +
-                     ", registers: " + std::to_string(rig.counter.registers) +
-                     ", word_order: " + word_of(rig.counter.word_order, word_orders) + "}\n";
+                     "\n  exchange: " + word_of(rig.exchange, exchanges) + "\n";
+  if (roles.encoders()) text += counters_text(rig, roles);
   if (rig.boot_count_address)
     text += "  boot_count_address: " + std::to_string(*rig.boot_count_address) + "\n";
-  text += "  voltage: {address: " + std::to_string(rig.voltage_address) +
-          ", encoding: " + word_of(rig.voltage.encoding, encodings) +
-          ", word_order: " + word_of(rig.voltage.word_order, word_orders) +
-          ", counts_per_v: " + exact_text(rig.voltage.counts_per_v) + "}\n";
+  if (carries_voltage(rig, roles))
+    text += "  voltage: {address: " + std::to_string(rig.voltage_address) +
+            ", encoding: " + word_of(rig.voltage.encoding, encodings) +
+            ", word_order: " + word_of(rig.voltage.word_order, word_orders) +
+            ", counts_per_v: " + exact_text(rig.voltage.counts_per_v) + "}\n";
   if (rig.enable_address) text += "  enable_address: " + std::to_string(*rig.enable_address) + "\n";
   if (rig.watchdog)
     text += "  device_watchdog: {address: " + std::to_string(rig.watchdog->address) +
@@ -334,6 +372,22 @@ std::string modbus_text(const ModbusRig& rig) {
 
 std::string backend_name(Backend backend) {
   return word_of(backend, backends);
+}
+
+RigRoles roles_of(const RigFile& rig, Backend backend) {
+  return {rig.cart_encoder == backend, rig.pendulum_encoder == backend, rig.output == backend};
+}
+
+bool is_simulated(const RigFile& rig) {
+  return roles_of(rig, Backend::simulated).any();
+}
+
+std::string backends_text(const RigFile& rig) {
+  const std::string cart = backend_name(rig.cart_encoder), pendulum = backend_name(rig.pendulum_encoder);
+  const std::string output = backend_name(rig.output);
+  if (cart != pendulum)
+    return "cart's encoder " + cart + ", pendulum's encoder " + pendulum + ", output " + output;
+  return cart == output ? output : "encoders " + cart + ", output " + output;
 }
 
 int DeviceWatchdog::counts() const {
@@ -349,7 +403,7 @@ bool baud_is_known(int baud) {
 
 Calibration calibration_in_use(const RigFile& rig) {
   Calibration calibration = rig.calibration;
-  if (rig.encoders != Backend::simulated || !rig.simulated || rig.simulated->quantise) return calibration;
+  if (!is_simulated(rig) || !rig.simulated || rig.simulated->quantise) return calibration;
   for (EncoderCalibration* encoder : {&calibration.cart, &calibration.pendulum}) {
     encoder->per_count /= finer_without_quantisation;
     encoder->width_bits = 32;
@@ -389,9 +443,7 @@ RigFile read_rig_file(const std::filesystem::path& file) {
 }
 
 std::string rig_text(const RigFile& rig) {
-  std::string text = rig.encoders == rig.output ? "backend: " + backend_name(rig.encoders) + "\n"
-                                                : "backend: {encoders: " + backend_name(rig.encoders) +
-                                                      ", output: " + backend_name(rig.output) + "}\n";
+  std::string text = backend_line(rig);
   text += calibration_text(rig.calibration);
   text += "amplifier: {limit_v: " + exact_text(rig.amplifier.limit_v) +
           ", sign: " + std::to_string(rig.amplifier.sign) +
@@ -399,7 +451,9 @@ std::string rig_text(const RigFile& rig) {
           "}\nfall_angle_rad: " + exact_text(rig.fall_angle_rad) +
           "\nwatchdog_s: " + exact_text(rig.watchdog_s) + "\n";
   if (rig.simulated) text += simulated_text(*rig.simulated);
-  if (rig.modbus) text += modbus_text(*rig.modbus);
+  if (rig.modbus)
+    text += modbus_text(*rig.modbus, roles_of(rig, rig.modbus->device.empty() ? Backend::modbus_tcp
+                                                                              : Backend::modbus_rtu));
   return text;
 }
 

@@ -49,7 +49,7 @@ std::uint64_t default_periods_late(double period_s) {
 
 void find_zero(Rig& rig, Clock& clock, RigFile& file, double patience_s) {
   if (!file.calibration.zero_at_start) return;
-  if (file.encoders == Backend::simulated) {
+  if (is_simulated(file)) {
     // Its counters are zero at the pose that the zero names, wherever it starts.
     file.calibration.zero_at_start = false;
     return;

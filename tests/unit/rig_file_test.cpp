@@ -41,7 +41,7 @@ std::string changed(const std::string& from, const std::string& to, const char* 
 
 TEST(RigFile, ShippedFilesRead) {
   const RigFile simulated = read_rig_file(rigs / "simulated.yaml");
-  EXPECT_EQ(simulated.encoders, Backend::simulated);
+  EXPECT_EQ(simulated.cart_encoder, Backend::simulated);
   EXPECT_TRUE(std::filesystem::exists(simulated.simulated->plant));
   const RigFile tcp = read_rig_file(rigs / "modbus-tcp.yaml");
   EXPECT_EQ(tcp.modbus->host, "127.0.0.1");
