@@ -4,6 +4,7 @@
 #include <utility>
 #include <vector>
 
+#include "comedi/comedi_rig.hpp"
 #include "joined_rig.hpp"
 #include "modbus/modbus_rig.hpp"
 #include "upright/hal/guarded_rig.hpp"
@@ -28,11 +29,12 @@ std::unique_ptr<Rig> make_part(const RigFile& rig, Backend backend, double perio
       return make_modbus(rig, period_s);
     case Backend::simulated:
       throw ConfigError("name a hardware backend: " + rig.file.string() + ":1: backend is simulated");
-    case Backend::gpio:
     case Backend::comedi:
+      return std::make_unique<ComediTransport>(rig, period_s);
+    case Backend::gpio:
       break;
   }
-  throw ConfigError("use simulated, modbus-tcp or modbus-rtu: " + rig.file.string() + ":1: backend " +
+  throw ConfigError("use simulated, modbus-tcp, modbus-rtu or comedi: " + rig.file.string() + ":1: backend " +
                     backend_name(backend) + " is not part of this build");
 }
 

@@ -7,6 +7,8 @@
 #include <utility>
 #include <vector>
 
+#include "comedi/comedi_section.hpp"
+#include "quoted.hpp"
 #include "upright/model/error.hpp"
 
 namespace upright {
@@ -198,7 +200,7 @@ void check_registers(const YamlMap& map, const ModbusRig& rig, const RigRoles& r
     all.insert(all.end(), written.begin(), written.end());
     refuse_overlap(map, all);
   }
-  int first = last_address, end = first;
+  int first = last_address, end = 0;
   for (const Block& block : read) {
     first = std::min(first, block.first);
     end = std::max(end, block.first + block.count);
@@ -228,8 +230,7 @@ ModbusRig read_modbus(const YamlMap& map, bool serial, const RigFile& rig_file) 
     rig.boot_count_address = small_integer(map, "boot_count_address", 0, last_address);
   if (carries_voltage(rig, roles)) read_voltage(map.map("voltage"), rig_file.amplifier.limit_v, rig);
   if (roles.output) {
-    if (map.has("enable_address"))
-      rig.enable_address = small_integer(map, "enable_address", 0, last_address);
+    if (map.has("enable_address")) rig.enable_address = small_integer(map, "enable_address", 0, last_address);
     if (const auto watchdog = map.optional_map("device_watchdog")) rig.watchdog = read_watchdog(*watchdog);
   }
   check_registers(map, rig, roles);
@@ -255,7 +256,8 @@ void read_backends(const YamlMap& document, RigFile& rig) {
   map.finish();
   const RigRoles simulated = roles_of(rig, Backend::simulated);
   if (simulated.any() && !simulated.all())
-    document.fail("backend", "joins simulated to hardware, but a simulated plant moves by its own output only",
+    document.fail("backend",
+                  "joins simulated to hardware, but a simulated plant moves by its own output only",
                   "use simulated for all of it or for none");
 }
 
@@ -281,16 +283,6 @@ std::string zero_text(const Calibration& calibration) {
     text += "counts, cart_counts: " + std::to_string(calibration.cart_zero_counts) +
             ", pendulum_counts: " + std::to_string(calibration.pendulum_zero_counts);
   return text + ", pose: " + word_of(calibration.zero_pose, poses) + "}";
-}
-
-/// A text in double quotes, as YAML reads it back.
-std::string quoted(const std::string& text) {
-  std::string result = "\"";
-  for (const char c : text) {
-    if (c == '"' || c == '\\') result += '\\';
-    result += c;
-  }
-  return result + "\"";
 }
 
 /// Counts per revolution whose reader gives the same radians per count, bit for bit.
@@ -434,6 +426,7 @@ RigFile read_rig(const YamlMap& document) {
   if (uses(rig, Backend::simulated) || document.has("simulated"))
     rig.simulated = read_simulated(document.map("simulated"));
   if (serial || uses(rig, Backend::modbus_tcp)) rig.modbus = read_modbus(document.map("modbus"), serial, rig);
+  if (uses(rig, Backend::comedi)) rig.comedi = read_comedi(document.map("comedi"), rig);
   document.finish();
   return rig;
 }
@@ -452,8 +445,9 @@ std::string rig_text(const RigFile& rig) {
           "\nwatchdog_s: " + exact_text(rig.watchdog_s) + "\n";
   if (rig.simulated) text += simulated_text(*rig.simulated);
   if (rig.modbus)
-    text += modbus_text(*rig.modbus, roles_of(rig, rig.modbus->device.empty() ? Backend::modbus_tcp
-                                                                              : Backend::modbus_rtu));
+    text += modbus_text(
+        *rig.modbus, roles_of(rig, rig.modbus->device.empty() ? Backend::modbus_tcp : Backend::modbus_rtu));
+  if (rig.comedi) text += comedi_text(*rig.comedi);
   return text;
 }
 

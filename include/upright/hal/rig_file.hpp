@@ -8,6 +8,7 @@
 #include <string>
 
 #include "upright/hal/calibration.hpp"
+#include "upright/hal/comedi_wiring.hpp"
 #include "upright/hal/modbus_registers.hpp"
 #include "upright/model/yaml_reader.hpp"
 
@@ -73,8 +74,8 @@ struct ModbusRig {
   int unit = 1;
   double response_timeout_s = 0.0;  ///< per exchange; the factory checks it against the period
   ModbusExchange exchange = ModbusExchange::read_write;
-  // What follows is in the file as far as the device is used: no counters where only the voltage is Modbus, no
-  // voltage where only the encoders are and `exchange` does not need one.
+  // What follows is in the file as far as the device is used: no counters where only the voltage is Modbus,
+  // no voltage where only the encoders are and `exchange` does not need one.
   bool input_registers = false;  ///< counters are input registers (0x04)
   int cart_address = 0;
   int pendulum_address = 0;
@@ -102,6 +103,7 @@ struct RigFile {
   double watchdog_s = 0.0;      ///< the motor is at zero volts this long after the last good exchange
   std::optional<SimulatedRig> simulated;
   std::optional<ModbusRig> modbus;
+  std::optional<ComediRig> comedi;
 };
 
 /// Reads a rig file. Throws ConfigError with remedy, file, line and key.
