@@ -7,6 +7,7 @@
 #include "comedi/comedi_rig.hpp"
 #include "joined_rig.hpp"
 #include "modbus/modbus_rig.hpp"
+#include "upright/hal/gpio_rig.hpp"
 #include "upright/hal/guarded_rig.hpp"
 #include "upright/model/error.hpp"
 
@@ -27,15 +28,14 @@ std::unique_ptr<Rig> make_part(const RigFile& rig, Backend backend, double perio
     case Backend::modbus_tcp:
     case Backend::modbus_rtu:
       return make_modbus(rig, period_s);
-    case Backend::simulated:
-      throw ConfigError("name a hardware backend: " + rig.file.string() + ":1: backend is simulated");
+    case Backend::gpio:
+      return make_gpio_encoders(rig, period_s);
     case Backend::comedi:
       return std::make_unique<ComediTransport>(rig, period_s);
-    case Backend::gpio:
+    case Backend::simulated:
       break;
   }
-  throw ConfigError("use simulated, modbus-tcp, modbus-rtu or comedi: " + rig.file.string() + ":1: backend " +
-                    backend_name(backend) + " is not part of this build");
+  throw ConfigError("name a hardware backend: " + rig.file.string() + ":1: backend is simulated");
 }
 
 }  // namespace
@@ -47,8 +47,9 @@ std::unique_ptr<Rig> make_rig(const RigFile& rig, const RigOptions& options) {
   std::vector<RigPart> parts;
   for (const Backend backend : backends)
     parts.push_back({make_part(rig, backend, options.period_s), roles_of(rig, backend)});
-  if (parts.size() == 1) return guarded(std::move(parts.front().rig), rig.calibration);
-  return guarded(joined(std::move(parts), options.period_s), rig.calibration);
+  std::unique_ptr<Rig> whole =
+      parts.size() == 1 ? std::move(parts.front().rig) : joined(std::move(parts), options.period_s);
+  return with_gpio_lines(guarded(std::move(whole), rig.calibration), rig);
 }
 
 }  // namespace upright

@@ -8,8 +8,10 @@
 #include <vector>
 
 #include "comedi/comedi_section.hpp"
+#include "gpio/gpio_section.hpp"
 #include "quoted.hpp"
 #include "upright/model/error.hpp"
+#include "yaml_words.hpp"
 
 namespace upright {
 
@@ -20,9 +22,6 @@ constexpr int most_registers_per_read = 125;
 constexpr int finer_without_quantisation = 1024;
 constexpr double longest_watchdog_s = 10.0;
 
-/// The words of an enumeration, in its order.
-template <std::size_t N>
-using Words = std::array<const char*, N>;
 constexpr Words<5> backends = {"simulated", "modbus-tcp", "modbus-rtu", "gpio", "comedi"};
 constexpr Words<3> parities = {"none", "even", "odd"};
 constexpr Words<2> exchanges = {"read_write", "separate"};
@@ -31,17 +30,6 @@ constexpr Words<3> encodings = {"int16", "int32", "float32"};
 constexpr Words<2> poses = {"upright", "hanging"};
 constexpr Words<2> tables = {"holding", "input"};
 constexpr Words<2> zeros = {"counts", "start"};
-
-template <class Enum, std::size_t N>
-Enum choose(const YamlMap& map, const std::string& key, const Words<N>& words) {
-  const std::string word = map.choice(key, {words.begin(), words.end()});
-  return static_cast<Enum>(std::find(words.begin(), words.end(), word) - words.begin());
-}
-
-template <class Enum, std::size_t N>
-std::string word_of(Enum value, const Words<N>& words) {
-  return words[static_cast<std::size_t>(value)];
-}
 
 int small_integer(const YamlMap& map, const std::string& key, int low, int high) {
   return static_cast<int>(map.integer(key, low, high));
@@ -265,6 +253,26 @@ bool uses(const RigFile& rig, Backend backend) {
   return roles_of(rig, backend).any();
 }
 
+/// The section `gpio` has the encoders that the rig takes from it, and no others.
+void check_gpio_roles(const YamlMap& document, const RigFile& rig) {
+  const RigRoles roles = roles_of(rig, Backend::gpio);
+  if (roles.output)
+    document.fail("backend", "gives the output to gpio, whose lines cannot carry a voltage",
+                  "name another backend as output");
+  if (!rig.gpio) return;
+  const YamlMap section = document.map("gpio");
+  const auto match = [&](const char* key, bool is_wanted, bool is_there) {
+    if (is_wanted && !is_there)
+      section.fail(key, "is missing, though backend takes its counts from gpio",
+                   std::string("add ") + key + " (its lines a and b)");
+    if (!is_wanted && is_there)
+      section.fail(key, "is not in use, since backend takes its counts from elsewhere",
+                   std::string("remove ") + key + ", or name gpio as its backend");
+  };
+  match("cart_encoder", roles.cart, rig.gpio->cart_encoder.has_value());
+  match("pendulum_encoder", roles.pendulum, rig.gpio->pendulum_encoder.has_value());
+}
+
 std::string backend_line(const RigFile& rig) {
   const std::string cart = backend_name(rig.cart_encoder), pendulum = backend_name(rig.pendulum_encoder);
   const std::string output = backend_name(rig.output);
@@ -427,6 +435,8 @@ RigFile read_rig(const YamlMap& document) {
     rig.simulated = read_simulated(document.map("simulated"));
   if (serial || uses(rig, Backend::modbus_tcp)) rig.modbus = read_modbus(document.map("modbus"), serial, rig);
   if (uses(rig, Backend::comedi)) rig.comedi = read_comedi(document.map("comedi"), rig);
+  if (uses(rig, Backend::gpio) || document.has("gpio")) rig.gpio = read_gpio(document.map("gpio"));
+  check_gpio_roles(document, rig);
   document.finish();
   return rig;
 }
@@ -448,6 +458,7 @@ std::string rig_text(const RigFile& rig) {
     text += modbus_text(
         *rig.modbus, roles_of(rig, rig.modbus->device.empty() ? Backend::modbus_tcp : Backend::modbus_rtu));
   if (rig.comedi) text += comedi_text(*rig.comedi);
+  if (rig.gpio) text += gpio_text(*rig.gpio);
   return text;
 }
 

@@ -55,10 +55,9 @@ make_kernel() {
   mkdir -p "$module/kernel"
   cp -r "$root/lib/modules/$version"/kernel/{drivers/comedi,fs/configfs} "$module/kernel"
   cp "$work"/modules/*.ko "$root/lib/modules/$version"/modules.{order,builtin} "$module"
-  busybox depmod -b "$cache/root" "$version"
-  cp "$root/boot/vmlinuz-$version" "$cache/vmlinuz"
+  busybox depmod -b "$cache/root" "$version" && cp "$root/boot/vmlinuz-$version" "$cache/vmlinuz" &&
+    echo "$version" >"$cache/version" || return 2
   rm -rf "$work"
-  echo "$version" >"$cache/version"
 }
 
 # copy FILE...: into the guest, to the same path, with the libraries it needs.

@@ -43,6 +43,8 @@ class GpioSim {
 
   /// "gpiochip0", ...
   const std::string& chip() const { return chip_; }
+  /// The chip goes, as a USB one does.
+  void unplug() { put(device_ / "live", "0"); }
   /// Drives an input line from the outside.
   void pull(int line, bool high) {
     const std::string level = high ? "pull-up" : "pull-down";

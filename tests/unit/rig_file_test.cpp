@@ -64,11 +64,15 @@ TEST(RigFile, ShippedFilesRead) {
   EXPECT_EQ(backends_text(joined), "encoders comedi, output modbus-tcp");
   EXPECT_EQ(joined.comedi->cart->lines->b, 10);
   EXPECT_FALSE(joined.comedi->output);
+  const RigFile lines = read_rig_file(rigs / "gpio-and-modbus.yaml");
+  EXPECT_EQ(lines.gpio->emergency_stop->line, 4);
+  EXPECT_EQ(lines.gpio->limit_switches.at(1).end, TrackEnd::minus_x);
+  EXPECT_EQ(lines.gpio->pendulum_encoder->bias, LineBias::pull_up);
 }
 
 TEST(RigFile, WrittenTextReadsBackExactly) {
   for (const char* name : {"simulated.yaml", "modbus-tcp.yaml", "modbus-rtu.yaml", "comedi-multiq3.yaml",
-                           "comedi-and-modbus.yaml"}) {
+                           "comedi-and-modbus.yaml", "gpio-and-modbus.yaml"}) {
     const std::string text = rig_text(read_rig_file(rigs / name));
     EXPECT_EQ(rig_text(read_rig(YamlMap::from_text(text, "again.yaml"))), text);
   }
@@ -308,6 +312,68 @@ TEST(RigFile, RefusesWhatCannotBeMeant) {
   EXPECT_NE(refusal(changed("parity: none", "parity: mark", "modbus-rtu.yaml")).find("parity"),
             std::string::npos);
   EXPECT_NE(refusal(changed("unit: 1", "unit: 0", "modbus-rtu.yaml")).find("unit"), std::string::npos);
+}
+
+TEST(RigFile, RandomLinesReadBackExactly) {
+  std::mt19937 random(8);
+  const auto whole = [&](int low, int high) { return std::uniform_int_distribution<>(low, high)(random); };
+  const auto coin = [&] { return whole(0, 1) == 1; };
+  int line = 0;
+  const auto input = [&] { return DigitalLine{line++, coin(), static_cast<LineBias>(whole(0, 2))}; };
+  for (int i = 0; i < 200; ++i) {
+    RigFile rig = read_rig_file(rigs / "gpio-and-modbus.yaml");
+    line = whole(0, 50);
+    GpioRig gpio;
+    gpio.chip = coin() ? "/dev/gpiochip1" : "a \"label\"";
+    if (coin()) gpio.emergency_stop = input();
+    for (int k = whole(0, 8); k > 0; --k)
+      gpio.limit_switches.push_back({static_cast<TrackEnd>(whole(0, 1)), input()});
+    if (coin()) gpio.amplifier_enable = DigitalLine{line++, coin(), LineBias::as_is};
+    if (coin()) gpio.heartbeat = line++;
+    gpio.pendulum_encoder = LineEncoder{line, line + 1, static_cast<LineBias>(whole(0, 2)),
+                                        std::uniform_real_distribution<>(100.0, 20000.0)(random)};
+    rig.gpio = gpio;
+    const std::string text = rig_text(rig);
+    const RigFile again = read_rig(YamlMap::from_text(text, "again.yaml"));
+    EXPECT_EQ(rig_text(again), text);
+    EXPECT_EQ(again.gpio->limit_switches.size(), gpio.limit_switches.size());
+    EXPECT_EQ(again.gpio->pendulum_encoder->fastest_edges_per_s, gpio.pendulum_encoder->fastest_edges_per_s);
+  }
+}
+
+TEST(RigFile, RefusesLinesThatCannotBeMeant) {
+  const Malformed cases[] = {
+      {"chip: gpiochip0", "chip: \"\"", "give chip a name"},
+      {"  chip: gpiochip0", "  chipp: gpiochip0", "did you mean chip"},
+      {"line: 4", "line: -1", "line"},
+      {"line: 4", "line: 5", "each its own line"},
+      {"a: 22", "a: 23", "each its own line"},
+      {"a: 22", "a: 18", "each its own line"},
+      {"line: 4, active: high", "line: 4", "add active"},
+      {"line: 4, active: high", "line: 4, active: closed", "one of"},
+      {"active: high, bias: pull_up", "active: high, bias: up", "pull_up"},
+      {"line: 17, active: high", "line: 17, active: high, bias: pull_up", "remove it"},
+      {"heartbeat: {line: 18}", "heartbeat: {line: 18, active: high}", "remove it"},
+      {"end: plus_x", "end: left", "plus_x"},
+      {"end: plus_x, ", "", "add end"},
+      {"fastest_edges_per_s: 8000.0", "fastest_edges_per_s: 0", "fastest_edges_per_s"},
+      {"fastest_edges_per_s: 8000.0", "fastest_edges_per_s: 44000", "20000"},
+      {"  pendulum_encoder: {a", "  cart_encoder: {a", "add pendulum_encoder"},
+      {"pendulum_encoder: gpio", "pendulum_encoder: modbus-tcp", "pendulum_address"},
+      {"output: modbus-tcp}", "output: gpio}", "another backend as output"},
+      {"gpio:\n", "gpoi:\n", "did you mean gpio"},
+  };
+  for (const Malformed& item : cases) {
+    const std::string sentence = refusal(changed(item.from, item.to, "gpio-and-modbus.yaml"));
+    EXPECT_NE(sentence.find(item.says), std::string::npos) << item.to << " -> " << sentence;
+    EXPECT_NE(sentence.find("rig.yaml:"), std::string::npos) << sentence;
+  }
+  const std::string none = text_of(rigs / "simulated.yaml") + "gpio: {chip: gpiochip0}\n";
+  EXPECT_NE(refusal(none).find("name a line"), std::string::npos) << refusal(none);
+  const std::string unused =
+      text_of(rigs / "simulated.yaml") +
+      "gpio: {chip: gpiochip0, pendulum_encoder: {a: 1, b: 2, fastest_edges_per_s: 5000}}\n";
+  EXPECT_NE(refusal(unused).find("remove pendulum_encoder"), std::string::npos) << refusal(unused);
 }
 
 TEST(RigFile, WithoutQuantisationCountsAreFiner) {

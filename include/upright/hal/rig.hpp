@@ -26,6 +26,11 @@ enum class RigFault : std::uint8_t {
   out_of_range,      ///< counts or volts outside what the hardware can mean
   emergency_stop,
   limit_switch,
+  limit_switch_plus,   ///< the one at the track's +x end
+  limit_switch_minus,  ///< the one at its -x end
+  line_failed,         ///< a digital line could not be read or set
+  edges_lost,          ///< an encoder's edges passed unseen: its counts are wrong from here on
+  edges_too_fast,      ///< an encoder's edges came faster than they may, so that some could be lost
 };
 
 /// One exchange with the encoders. Counts are the device's own, `width` bits wide, not unwrapped.

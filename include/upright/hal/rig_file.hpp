@@ -9,6 +9,7 @@
 
 #include "upright/hal/calibration.hpp"
 #include "upright/hal/comedi_wiring.hpp"
+#include "upright/hal/gpio.hpp"
 #include "upright/hal/modbus_registers.hpp"
 #include "upright/model/yaml_reader.hpp"
 
@@ -104,6 +105,7 @@ struct RigFile {
   std::optional<SimulatedRig> simulated;
   std::optional<ModbusRig> modbus;
   std::optional<ComediRig> comedi;
+  std::optional<GpioRig> gpio;
 };
 
 /// Reads a rig file. Throws ConfigError with remedy, file, line and key.
