@@ -227,7 +227,16 @@ const std::string serial_rig =
     with(with(modbus_rig, "modbus-tcp", "modbus-rtu"), "  host: 127.0.0.1\n  port: 1502\n",
          "  device: /dev/ttyUSB0\n  baud: 921600\n  parity: none\n  stop_bits: 1\n");
 
+const std::string comedi_rig =
+    "backend: comedi\n" + rig_head +
+    "comedi:\n"
+    "  device: /dev/comedi0\n"
+    "  cart: {kind: analog_input, subdevice: 0, channel: 0, range_v: [-10, 10], counts_per_v: 1000}\n"
+    "  pendulum: {kind: counter, subdevice: 4, channel: 1, lines: {a: 3, b: 11}}\n"
+    "  output: {subdevice: 1, channel: 0, range_v: [-5, 5], amplifier_gain: 3}\n";
+
 std::vector<Malformed> malformed_rigs() {
+  const std::string& comedi = comedi_rig;
   const std::string& sim = simulated_rig;
   const std::string& tcp = modbus_rig;
   const std::string& rtu = serial_rig;
@@ -310,6 +319,27 @@ std::vector<Malformed> malformed_rigs() {
       {"baud_is_text", with(rtu, "921600", "fast"), 12, "baud", "number"},
       {"parity_unknown", with(rtu, "parity: none", "parity: N"), 13, "parity", "even"},
       {"stop_bits_three", with(rtu, "stop_bits: 1", "stop_bits: 3"), 14, "stop_bits", "from 1 to 2"},
+      {"half_simulated", with(comedi, "backend: comedi", "backend: {encoders: comedi, output: simulated}"), 1,
+       "backend", "simulated for all of it or for none"},
+      {"backend_of_one_encoder",
+       with(comedi, "backend: comedi", "backend: {cart_encoder: comedi, output: comedi}"), 1,
+       "pendulum_encoder", "add pendulum_encoder"},
+      {"comedi_section_missing", comedi.substr(0, comedi.find("comedi:\n")) + "comedy:\n  a: 1\n", 10,
+       "comedy", "did you mean comedi?"},
+      {"comedi_without_device", with(comedi, "  device: /dev/comedi0\n", ""), 11, "device", "add device"},
+      {"comedi_kind_misspelt", with(comedi, "analog_input", "analog_imput"), 12, "kind",
+       "did you mean analog_input?"},
+      {"comedi_subdevice_negative", with(comedi, "subdevice: 4", "subdevice: -4"), 13, "subdevice", "from 0"},
+      {"comedi_range_of_one_end", with(comedi, "[-5, 5]", "[-5]"), 14, "range_v", "upper end"},
+      {"comedi_range_of_one_sign", with(comedi, "[-5, 5]", "[0, 5]"), 14, "range_v", "both signs"},
+      {"comedi_range_too_small", with(comedi, "amplifier_gain: 3", "amplifier_gain: 2"), 14, "range_v",
+       "limit_v at most 10"},
+      {"comedi_gain_missing", with(comedi, ", amplifier_gain: 3", ""), 14, "amplifier_gain", "add"},
+      {"comedi_lines_the_same", with(comedi, "b: 11", "b: 3"), 13, "b", "a line each"},
+      {"comedi_scale_zero", with(comedi, "counts_per_v: 1000", "counts_per_v: 0"), 12, "counts_per_v",
+       "number"},
+      {"comedi_range_of_a_counter", with(comedi, "lines: {a: 3, b: 11}", "range_v: [-5, 5]"), 13, "range_v",
+       "remove it"},
       {"rig_second_document", sim + "---\nbackend: simulated\n", 16, "second", "keep one"},
   };
 }
