@@ -132,7 +132,7 @@ write_init
 trap 'rm -rf "$guest" "$guest.gz" "$console"' EXIT
 
 timeout "$patience_s" qemu-system-x86_64 -accel tcg -M q35 -cpu max -smp 1 -m 1024 \
-  -kernel "$cache/vmlinuz" -initrd "$guest.gz" -append "console=ttyS0 quiet panic=-1" \
+  -kernel "$cache/vmlinuz" -initrd "$guest.gz" -append "console=ttyS0 quiet panic=-1 comedi.comedi_num_legacy_minors=4" \
   -nodefaults -nographic -no-reboot -serial stdio </dev/null | tr -d '\r' | tee "$console" || true
 status=$(sed -n 's/^guest: exit \([0-9]*\)$/\1/p' "$console")
 [ -n "$status" ] || { echo "look at the lines above: the guest did not end within $patience_s s" >&2; exit 1; }
