@@ -95,6 +95,8 @@ const std::string modbus_counters =
 const std::string modbus_output =
     "modbus: {host: 10.0.0.1, port: 502, unit: 1, response_timeout_s: 0.001, exchange: read_write,\n"
     "         voltage: {address: 3, encoding: int16, counts_per_v: 1000}, enable_address: 9}\n";
+const std::string gpio_pendulum =
+    "gpio: {chip: gpiochip0, pendulum_encoder: {a: 1, b: 2, fastest_edges_per_s: 5000}}\n";
 const std::string output_and_cart =
     "comedi:\n"
     "  device: /dev/comedi0\n"
@@ -110,7 +112,7 @@ TEST(RigFile, RigsOfPartsReadBackExactly) {
                      modbus_counters),
         of_parts("{cart_encoder: comedi, pendulum_encoder: gpio, output: modbus-tcp}",
                  "comedi: {device: /dev/comedi0, cart: {kind: plain_counter, subdevice: 3, channel: 1}}\n" +
-                     modbus_output),
+                     modbus_output + gpio_pendulum),
         of_parts("{cart_encoder: comedi, pendulum_encoder: modbus-tcp, output: comedi}",
                  output_and_cart + "modbus: {host: 10.0.0.1, port: 502, unit: 1, response_timeout_s: 0.001, "
                                    "exchange: separate, counters: {table: holding, pendulum_address: 1, "
@@ -166,7 +168,7 @@ TEST(RigFile, RefusesPartsThatDoNotFit) {
     EXPECT_NE(sentence.find(item.says), std::string::npos) << item.backend << " -> " << sentence;
     EXPECT_NE(sentence.find("rig.yaml:"), std::string::npos) << sentence;
   }
-  EXPECT_EQ(refusal(of_parts(good, output_and_cart)), "");
+  EXPECT_EQ(refusal(of_parts(good, output_and_cart + gpio_pendulum)), "");
 }
 
 TEST(RigFile, RefusesWhatComediCannotMean) {
