@@ -93,7 +93,6 @@ GpioRig read_gpio(const YamlMap& map) {
   GpioRig rig;
   TakenLines taken;
   rig.chip = map.text("chip");
-  if (rig.chip.empty()) map.fail("chip", "is empty", "give chip a name such as gpiochip0, or a path");
   if (const auto stop = map.optional_map("emergency_stop"))
     rig.emergency_stop = read_line(*stop, true, taken);
   if (map.has("limit_switches")) rig.limit_switches = read_limit_switches(map, taken);

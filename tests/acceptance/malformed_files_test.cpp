@@ -235,6 +235,60 @@ const std::string comedi_rig =
     "  pendulum: {kind: counter, subdevice: 4, channel: 1, lines: {a: 3, b: 11}}\n"
     "  output: {subdevice: 1, channel: 0, range_v: [-5, 5], amplifier_gain: 3}\n";
 
+const std::string rig_with_lines = simulated_rig +
+                                   "gpio:\n"
+                                   "  chip: gpiochip0\n"
+                                   "  emergency_stop: {line: 4, active: high, bias: pull_up}\n"
+                                   "  limit_switches:\n"
+                                   "    - {end: plus_x, line: 5, active: high}\n"
+                                   "    - {end: minus_x, line: 6, active: high}\n"
+                                   "  amplifier_enable: {line: 17, active: low}\n"
+                                   "  heartbeat: {line: 18}\n";
+
+const std::string rig_with_line_encoder =
+    with(with(modbus_rig, "backend: modbus-tcp",
+              "backend: {cart_encoder: modbus-tcp, pendulum_encoder: gpio, output: modbus-tcp}"),
+         "pendulum_address: 2, ", "") +
+    "gpio:\n"
+    "  chip: /dev/gpiochip0\n"
+    "  pendulum_encoder: {a: 22, b: 23, fastest_edges_per_s: 8000}\n";
+
+std::vector<Malformed> malformed_lines() {
+  const std::string& lines = rig_with_lines;
+  const std::string& encoder = rig_with_line_encoder;
+  return {
+      {"chip_missing", with(lines, "  chip: gpiochip0\n", ""), 17, "chip", "add chip"},
+      {"chip_is_list", with(lines, "gpiochip0", "[0]"), 17, "chip", "text"},
+      {"stop_without_line", with(lines, "line: 4, ", ""), 18, "line", "add line"},
+      {"line_negative", with(lines, "line: 4", "line: -4"), 18, "line", "from 0"},
+      {"line_in_text", with(lines, "line: 4", "line: GPIO4"), 18, "line", "number"},
+      {"line_used_twice", with(lines, "line: 6", "line: 5"), 21, "line", "own line"},
+      {"active_missing", with(lines, "line: 4, active: high", "line: 4"), 18, "active", "add active"},
+      {"active_unknown", with(lines, "active: low", "active: closed"), 22, "active", "high"},
+      {"bias_unknown", with(lines, "pull_up", "pullup"), 18, "bias", "did you mean pull_up?"},
+      {"end_unknown", with(lines, "plus_x", "left"), 20, "end", "minus_x"},
+      {"switches_are_a_map", with(lines, "    - {end: plus_x, line: 5, active: high}\n    - {", "    x: {"),
+       19, "limit_switches", "list"},
+      {"heartbeat_is_number", with(lines, "heartbeat: {line: 18}", "heartbeat: 18"), 23, "heartbeat", "map"},
+      {"lines_unknown_key", lines + "  emergancy: {line: 9, active: low}\n", 24, "emergancy", "remove it"},
+      {"lines_encoder_not_in_use", lines + "  cart_encoder: {a: 1, b: 2, fastest_edges_per_s: 5000}\n", 24,
+       "cart_encoder", "remove cart_encoder"},
+      {"encoder_missing",
+       with(encoder, "  pendulum_encoder: {a: 22, b: 23, fastest_edges_per_s: 8000}\n",
+            "  heartbeat: {line: 1}\n"),
+       24, "pendulum_encoder", "add pendulum_encoder"},
+      {"encoder_on_one_line", with(encoder, "b: 23", "b: 22"), 24, "b", "own line"},
+      {"edges_too_fast", with(encoder, "8000", "44000"), 24, "fastest_edges_per_s", "20000"},
+      {"edges_in_text", with(encoder, "8000", "fast"), 24, "fastest_edges_per_s", "number"},
+      {"gpio_as_output",
+       with(with(encoder, "output: modbus-tcp", "output: gpio"),
+            "  voltage: {address: 16, encoding: int16, counts_per_v: 1000.0}\n  enable_address: 17\n  "
+            "device_watchdog: {address: 18, time_s: 0.12, seconds_per_count: 0.001}\n",
+            "  voltage: {address: 16, encoding: int16, counts_per_v: 1000.0}\n"),
+       1, "backend", "another backend"},
+  };
+}
+
 std::vector<Malformed> malformed_rigs() {
   const std::string& comedi = comedi_rig;
   const std::string& sim = simulated_rig;
@@ -371,13 +425,17 @@ INSTANTIATE_TEST_SUITE_P(Gains, MalformedFile, ::testing::ValuesIn(malformed_gai
 
 INSTANTIATE_TEST_SUITE_P(Rig, MalformedFile, ::testing::ValuesIn(malformed_rigs()), name_of_test);
 
+INSTANTIATE_TEST_SUITE_P(Lines, MalformedFile, ::testing::ValuesIn(malformed_lines()), name_of_test);
+
 TEST(WellFormedFile, IsAccepted) {
   const TemporaryFolder folder;
   for (const auto& [name, text] : {std::pair{"plant.yaml", plant},
                                    {"gains.yaml", gains},
                                    {"sim.yaml", simulated_rig},
                                    {"tcp.yaml", modbus_rig},
-                                   {"rtu.yaml", serial_rig}}) {
+                                   {"rtu.yaml", serial_rig},
+                                   {"lines.yaml", rig_with_lines},
+                                   {"line_encoder.yaml", rig_with_line_encoder}}) {
     const CommandResult result = run_upright("check " + folder.write(name, text).string());
     EXPECT_EQ(result.exit_code, 0) << result.err;
   }

@@ -345,7 +345,7 @@ TEST(RigFile, RandomLinesReadBackExactly) {
 
 TEST(RigFile, RefusesLinesThatCannotBeMeant) {
   const Malformed cases[] = {
-      {"chip: gpiochip0", "chip: \"\"", "give chip a name"},
+      {"chip: gpiochip0", "chip: \"\"", "give chip a text"},
       {"  chip: gpiochip0", "  chipp: gpiochip0", "did you mean chip"},
       {"line: 4", "line: -1", "line"},
       {"line: 4", "line: 5", "each its own line"},
@@ -360,10 +360,11 @@ TEST(RigFile, RefusesLinesThatCannotBeMeant) {
       {"end: plus_x, ", "", "add end"},
       {"fastest_edges_per_s: 8000.0", "fastest_edges_per_s: 0", "fastest_edges_per_s"},
       {"fastest_edges_per_s: 8000.0", "fastest_edges_per_s: 44000", "20000"},
-      {"  pendulum_encoder: {a", "  cart_encoder: {a", "add pendulum_encoder"},
+      {"  pendulum_encoder: {a: 22, b: 23, bias: pull_up, fastest_edges_per_s: 8000.0}\n", "",
+       "add pendulum_encoder"},
+      {"  pendulum_encoder: {a", "  cart_encoder: {a", "remove cart_encoder"},
       {"pendulum_encoder: gpio", "pendulum_encoder: modbus-tcp", "pendulum_address"},
-      {"output: modbus-tcp}", "output: gpio}", "another backend as output"},
-      {"gpio:\n", "gpoi:\n", "did you mean gpio"},
+      {"gpio:\n", "gpoi:\n", "gpio"},
   };
   for (const Malformed& item : cases) {
     const std::string sentence = refusal(changed(item.from, item.to, "gpio-and-modbus.yaml"));
@@ -376,6 +377,8 @@ TEST(RigFile, RefusesLinesThatCannotBeMeant) {
       text_of(rigs / "simulated.yaml") +
       "gpio: {chip: gpiochip0, pendulum_encoder: {a: 1, b: 2, fastest_edges_per_s: 5000}}\n";
   EXPECT_NE(refusal(unused).find("remove pendulum_encoder"), std::string::npos) << refusal(unused);
+  const std::string alone = of_parts("gpio", gpio_pendulum);
+  EXPECT_NE(refusal(alone).find("another backend as output"), std::string::npos) << refusal(alone);
 }
 
 TEST(RigFile, WithoutQuantisationCountsAreFiner) {
