@@ -193,7 +193,7 @@ TEST_F(ComediTest, KeepsOthersAwayWhileItRuns) {
 }
 
 /// What happens to an encoder, for good.
-enum class Mishap { none, cart_jumps, cart_has_no_contact, pendulum_sticks };
+enum class Mishap { none, cart_jumps, cart_has_no_contact, cart_sticks, pendulum_sticks, pendulum_turned };
 
 /// The rig as physics: takes the motor's voltage off the first card a thousand times a second, and shows cart
 /// and pendulum on the second. Held until the first voltage.
@@ -239,8 +239,10 @@ class PlantOnCards {
     const Mishap mishap = mishap_;
     if (mishap == Mishap::cart_jumps)
       counts.cart += 15000;  // further than the cart can go while a busy machine misses some periods
+    if (mishap == Mishap::pendulum_turned) counts.pendulum = -counts.pendulum;
     const double cart_v = static_cast<double>(counts.cart) / cart_counts_per_v;
-    encoders_.put(0, mishap == Mishap::cart_has_no_contact ? Card::top : datum_of(cart_v));
+    if (mishap != Mishap::cart_sticks)
+      encoders_.put(0, mishap == Mishap::cart_has_no_contact ? Card::top : datum_of(cart_v));
     if (mishap == Mishap::pendulum_sticks) return;
     encoders_.put(1, datum_of(static_cast<double>(counts.pendulum) / pendulum_counts_per_v));
   }
@@ -343,13 +345,32 @@ TEST_P(ComediMishap, EndsAtZeroVoltsWithItsCauseNamed) {
   EXPECT_LT(last_voltage_s, at_s + GetParam().within_s);
 }
 
-INSTANTIATE_TEST_SUITE_P(Encoders, ComediMishap,
-                         testing::Values(Case{"cart_jumps", Mishap::cart_jumps, "the counts jumped", 0.1},
-                                         Case{"cart_has_no_contact", Mishap::cart_has_no_contact,
-                                              "counts the hardware cannot mean", 0.25},
-                                         Case{"pendulum_sticks", Mishap::pendulum_sticks,
-                                              "check the pendulum's encoder", 1.5}),
-                         [](const auto& item) { return std::string(item.param.name); });
+INSTANTIATE_TEST_SUITE_P(
+    Encoders, ComediMishap,
+    testing::Values(Case{"cart_jumps", Mishap::cart_jumps, "the counts jumped", 0.1},
+                    Case{"cart_has_no_contact", Mishap::cart_has_no_contact,
+                         "counts the hardware cannot mean", 0.25},
+                    Case{"cart_sticks", Mishap::cart_sticks, "check the cart's encoder", 1.5},
+                    Case{"pendulum_sticks", Mishap::pendulum_sticks, "check the pendulum's encoder", 1.5}),
+    [](const auto& item) { return std::string(item.param.name); });
+
+TEST_F(ComediRun, AWrongSignIsCaughtBeforeTheEndOfTheTrack) {
+  plant->suffer(Mishap::pendulum_turned);
+  Process run(run_for("10"));
+  const std::string said = run.rest();
+  EXPECT_EQ(run.wait(), 3) << said;
+  EXPECT_TRUE(says(said, "check the signs of encoders and amplifier")) << said;
+  EXPECT_EQ(output.seen(0), Card::middle);
+  constexpr double end_of_track_m = 0.407;
+  double furthest_m = 0.0, last_voltage_s = 0.0, at_s = 0.0;
+  for (const TraceRow& row : record()) {
+    if (row.held) at_s = row.time_s;
+    if (row.voltage_v != 0.0) last_voltage_s = row.time_s;
+    if (row.time_s < last_voltage_s + 0.1) furthest_m = std::max(furthest_m, std::abs(row.cart_m));
+  }
+  EXPECT_GT(last_voltage_s, at_s);
+  EXPECT_LT(furthest_m, end_of_track_m);
+}
 
 TEST_F(ComediRun, LeavesZeroVoltsBehindWhenTerminated) {
   Process run(run_for("60"));
