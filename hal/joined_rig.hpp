@@ -19,12 +19,12 @@ struct RigPart {
 /// that the counts are as new as can be when the voltage follows; a part without an encoder is asked for its
 /// health only.
 ///
-/// A reading is worth what its worst part is worth. It carries the time of the older of its counts; counts taken
-/// further apart than half a `period_s` do not belong together and are stale. A part that calls counts fresh
-/// without a new sequence number is stale too.
+/// A reading is worth what its worst part is worth. It carries the time of the older of its counts; counts
+/// taken further apart than half a `period_s` do not belong together and are stale. A part that calls counts
+/// fresh without a new sequence number is stale too.
 ///
-/// `open` begins with the output and stops every part when one does not open. `stop` stops them all, the output
-/// first.
+/// `open` begins with the output and stops every part when one does not open. `stop` stops them all, the
+/// output first.
 std::unique_ptr<Rig> joined(std::vector<RigPart> parts, double period_s);
 
 }  // namespace upright
