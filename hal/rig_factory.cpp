@@ -45,8 +45,11 @@ std::unique_ptr<Rig> make_rig(const RigFile& rig, const RigOptions& options) {
   for (const Backend backend : {rig.output, rig.cart_encoder, rig.pendulum_encoder})
     if (std::find(backends.begin(), backends.end(), backend) == backends.end()) backends.push_back(backend);
   std::vector<RigPart> parts;
-  for (const Backend backend : backends)
-    parts.push_back({make_part(rig, backend, options.period_s), roles_of(rig, backend)});
+  parts.reserve(backends.size());
+  for (const Backend backend : backends) {
+    std::unique_ptr<Rig> part = make_part(rig, backend, options.period_s);
+    parts.push_back({std::move(part), roles_of(rig, backend)});
+  }
   std::unique_ptr<Rig> whole =
       parts.size() == 1 ? std::move(parts.front().rig) : joined(std::move(parts), options.period_s);
   return with_gpio_lines(guarded(std::move(whole), rig.calibration), rig);
