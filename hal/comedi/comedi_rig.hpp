@@ -3,11 +3,11 @@
 // Each call is an ioctl in the loop's own thread; what is known of how long it takes: libcomedi adds neither
 // memory nor locks. The kernel takes the device's mutex, so that another program's call to the same device is
 // waited for, and runs the driver. Counters and analog outputs of the drivers in the table are register
-// accesses, microseconds each on ISA and PCI. An analog input is waited for until its conversion is over,
-// tens of microseconds; where the hardware does not answer, drivers give up after a second
-// (COMEDI_TIMEOUT_MS) at the latest. So a reading that took longer than most of a period is stale; and a card
-// that hangs makes a cycle late by up to a second for each of its channels, which the loop counts as missed
-// periods and ends at zero volts, but cannot prevent.
+// accesses, which wait for nothing but the bus. An analog input is waited for until its conversion is over;
+// where the hardware does not answer, drivers give up after a second (COMEDI_TIMEOUT_MS) at the latest. So a
+// reading that took longer than most of a period is stale; and a card that hangs makes a cycle late by up to
+// a second for each of its channels, which the loop counts as missed periods and ends at zero volts, but
+// cannot prevent.
 #pragma once
 
 #include <comedilib.h>

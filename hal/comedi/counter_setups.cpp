@@ -51,10 +51,10 @@ constexpr std::array ni_660x_steps = {reset, load, load_a, load_b, no_gate, no_s
 // multiq3 sets its counters up when it is attached, and shows the reset value in the middle of the range;
 // they are left alone here, so that they go on counting from run to run.
 constexpr std::array<CounterSetup, 4> setups = {{
-    {"multiq3", 24, 0x800000, false, false, false, {}},
-    {"s626", 24, 0, true, false, false, s626_steps},
-    {"ni_pcimio", 32, 0, true, true, true, ni_pcimio_steps},
-    {"ni_660x", 32, 0, true, false, true, ni_660x_steps},
+    {"multiq3", 0x800000, false, false, false, {}},
+    {"s626", 0, true, false, false, s626_steps},
+    {"ni_pcimio", 0, true, true, true, ni_pcimio_steps},
+    {"ni_660x", 0, true, false, true, ni_660x_steps},
 }};
 
 }  // namespace

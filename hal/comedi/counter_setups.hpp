@@ -27,7 +27,6 @@ struct CounterStep {
 
 struct CounterSetup {
   const char* driver;  ///< as comedi_get_driver_name gives it
-  int width_bits;      ///< of what a reading holds
   std::int64_t zero;   ///< the reading of a counter that has counted nothing
   bool begins_anew;    ///< the steps clear the counter
   bool has_lines;      ///< A and B are chosen in the rig file
