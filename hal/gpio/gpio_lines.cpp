@@ -156,6 +156,10 @@ class GpioLinesRig final : public Rig {
     rig_->stop();
   }
 
+  SafetyInputs safety_inputs() const noexcept override {
+    return {config_.emergency_stop.has_value(), static_cast<int>(config_.limit_switches.size())};
+  }
+
  private:
   void rest() noexcept {
     rests_ = true;

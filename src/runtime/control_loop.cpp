@@ -114,11 +114,6 @@ const char* words_for(RigFault fault) {
   return "unknown fault";
 }
 
-bool of_limit_switch(RigFault fault) {
-  return fault == RigFault::limit_switch || fault == RigFault::limit_switch_plus ||
-         fault == RigFault::limit_switch_minus;
-}
-
 /// What to do about a fault of the rig, before anything else.
 const char* remedy_for(RigFault fault) {
   switch (fault) {
@@ -178,7 +173,7 @@ std::string sentence_of(const LoopOutcome& o, const LoopLimits& limits) {
     case StopReason::rig_fault:
       return std::string(remedy_for(o.fault)) + ": " + words_for(o.fault) + when;
     case StopReason::track_limit:
-      return of_limit_switch(o.fault)
+      return is_limit_switch(o.fault)
                  ? std::string("bring the cart back to the middle: ") + words_for(o.fault) + when
                  : first_check(o.time_s) +
                        "bring the cart back to the middle: it reached the track limit of " +

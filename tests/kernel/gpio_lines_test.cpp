@@ -101,6 +101,12 @@ TEST_F(GpioLines, EachInputIsItsOwnFaultAtItsOwnLevelWhileItIsActive) {
   }
 }
 
+TEST_F(GpioLines, AreKnownToWhoeverAsks) {
+  const auto rig = opened();
+  EXPECT_TRUE(rig->safety_inputs().emergency_stop);
+  EXPECT_EQ(rig->safety_inputs().limit_switches, 2);
+}
+
 TEST_F(GpioLines, ACutWireOfANormallyClosedStopIsAStop) {
   const auto rig = made();
   rig->open();
