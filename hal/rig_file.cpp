@@ -7,7 +7,11 @@
 #include <utility>
 #include <vector>
 
+#include "comedi/comedi_section.hpp"
+#include "gpio/gpio_section.hpp"
+#include "quoted.hpp"
 #include "upright/model/error.hpp"
+#include "yaml_words.hpp"
 
 namespace upright {
 
@@ -18,9 +22,6 @@ constexpr int most_registers_per_read = 125;
 constexpr int finer_without_quantisation = 1024;
 constexpr double longest_watchdog_s = 10.0;
 
-/// The words of an enumeration, in its order.
-template <std::size_t N>
-using Words = std::array<const char*, N>;
 constexpr Words<5> backends = {"simulated", "modbus-tcp", "modbus-rtu", "gpio", "comedi"};
 constexpr Words<3> parities = {"none", "even", "odd"};
 constexpr Words<2> exchanges = {"read_write", "separate"};
@@ -29,17 +30,6 @@ constexpr Words<3> encodings = {"int16", "int32", "float32"};
 constexpr Words<2> poses = {"upright", "hanging"};
 constexpr Words<2> tables = {"holding", "input"};
 constexpr Words<2> zeros = {"counts", "start"};
-
-template <class Enum, std::size_t N>
-Enum choose(const YamlMap& map, const std::string& key, const Words<N>& words) {
-  const std::string word = map.choice(key, {words.begin(), words.end()});
-  return static_cast<Enum>(std::find(words.begin(), words.end(), word) - words.begin());
-}
-
-template <class Enum, std::size_t N>
-std::string word_of(Enum value, const Words<N>& words) {
-  return words[static_cast<std::size_t>(value)];
-}
 
 int small_integer(const YamlMap& map, const std::string& key, int low, int high) {
   return static_cast<int>(map.integer(key, low, high));
@@ -124,15 +114,17 @@ void read_serial_line(const YamlMap& map, ModbusRig& rig) {
   rig.stop_bits = small_integer(map, "stop_bits", 1, 2);
 }
 
-void read_counters(const YamlMap& map, const Calibration& calibration, ModbusRig& rig) {
+void read_counters(const YamlMap& map, const Calibration& calibration, const RigRoles& roles,
+                   ModbusRig& rig) {
   rig.input_registers = choose<int>(map, "table", tables) == 1;
-  rig.cart_address = small_integer(map, "cart_address", 0, last_address);
-  rig.pendulum_address = small_integer(map, "pendulum_address", 0, last_address);
+  if (roles.cart) rig.cart_address = small_integer(map, "cart_address", 0, last_address);
+  if (roles.pendulum) rig.pendulum_address = small_integer(map, "pendulum_address", 0, last_address);
   rig.counter.registers = small_integer(map, "registers", 1, 2);
   rig.counter.word_order = rig.counter.registers == 2 || map.has("word_order")
                                ? choose<WordOrder>(map, "word_order", word_orders)
                                : WordOrder::high_first;
-  const int widest = std::max(calibration.cart.width_bits, calibration.pendulum.width_bits);
+  const int widest = std::max(roles.cart ? calibration.cart.width_bits : 0,
+                              roles.pendulum ? calibration.pendulum.width_bits : 0);
   if (widest > 16 * rig.counter.registers)
     map.fail("registers", "is 1, for counters of " + std::to_string(widest) + " bits",
              "give registers 2, or width_bits 16 in the calibration");
@@ -173,11 +165,19 @@ void refuse_overlap(const YamlMap& map, const std::vector<Block>& blocks) {
   }
 }
 
-void check_registers(const YamlMap& map, const ModbusRig& rig) {
-  std::vector<Block> read = {{"counters", rig.cart_address, rig.counter.registers},
-                             {"counters", rig.pendulum_address, rig.counter.registers}};
+/// With function 0x17 every request carries a voltage, which is zero where another backend has the output.
+bool carries_voltage(const ModbusRig& rig, const RigRoles& roles) {
+  return roles.output || rig.exchange == ModbusExchange::read_write;
+}
+
+void check_registers(const YamlMap& map, const ModbusRig& rig, const RigRoles& roles) {
+  std::vector<Block> read;
+  if (roles.cart) read.push_back({"counters", rig.cart_address, rig.counter.registers});
+  if (roles.pendulum) read.push_back({"counters", rig.pendulum_address, rig.counter.registers});
   if (rig.boot_count_address) read.push_back({"boot_count_address", *rig.boot_count_address, 1});
-  std::vector<Block> written = {{"voltage", rig.voltage_address, rig.voltage.registers()}};
+  std::vector<Block> written;
+  if (carries_voltage(rig, roles))
+    written.push_back({"voltage", rig.voltage_address, rig.voltage.registers()});
   if (rig.enable_address) written.push_back({"enable_address", *rig.enable_address, 1});
   if (rig.watchdog) written.push_back({"device_watchdog", rig.watchdog->address, 1});
   refuse_overlap(map, read);
@@ -212,13 +212,16 @@ ModbusRig read_modbus(const YamlMap& map, bool serial, const RigFile& rig_file) 
   rig.unit = small_integer(map, "unit", serial ? 1 : 0, serial ? 247 : 255);
   rig.response_timeout_s = map.number("response_timeout_s", Range{1e-4, 1.0});
   rig.exchange = choose<ModbusExchange>(map, "exchange", exchanges);
-  read_counters(map.map("counters"), rig_file.calibration, rig);
+  const RigRoles roles = roles_of(rig_file, serial ? Backend::modbus_rtu : Backend::modbus_tcp);
+  if (roles.encoders()) read_counters(map.map("counters"), rig_file.calibration, roles, rig);
   if (map.has("boot_count_address"))
     rig.boot_count_address = small_integer(map, "boot_count_address", 0, last_address);
-  read_voltage(map.map("voltage"), rig_file.amplifier.limit_v, rig);
-  if (map.has("enable_address")) rig.enable_address = small_integer(map, "enable_address", 0, last_address);
-  if (const auto watchdog = map.optional_map("device_watchdog")) rig.watchdog = read_watchdog(*watchdog);
-  check_registers(map, rig);
+  if (carries_voltage(rig, roles)) read_voltage(map.map("voltage"), rig_file.amplifier.limit_v, rig);
+  if (roles.output) {
+    if (map.has("enable_address")) rig.enable_address = small_integer(map, "enable_address", 0, last_address);
+    if (const auto watchdog = map.optional_map("device_watchdog")) rig.watchdog = read_watchdog(*watchdog);
+  }
+  check_registers(map, rig, roles);
   if (rig.response_timeout_s >= rig_file.watchdog_s)
     map.fail("response_timeout_s", "is not below watchdog_s", "give it less than the watchdog's time");
   map.finish();
@@ -227,17 +230,57 @@ ModbusRig read_modbus(const YamlMap& map, bool serial, const RigFile& rig_file) 
 
 void read_backends(const YamlMap& document, RigFile& rig) {
   if (!document.is_map("backend")) {
-    rig.encoders = rig.output = choose<Backend>(document, "backend", backends);
+    rig.cart_encoder = rig.pendulum_encoder = rig.output = choose<Backend>(document, "backend", backends);
     return;
   }
   const YamlMap map = document.map("backend");
-  rig.encoders = choose<Backend>(map, "encoders", backends);
+  if (map.has("cart_encoder") || map.has("pendulum_encoder")) {
+    rig.cart_encoder = choose<Backend>(map, "cart_encoder", backends);
+    rig.pendulum_encoder = choose<Backend>(map, "pendulum_encoder", backends);
+  } else {
+    rig.cart_encoder = rig.pendulum_encoder = choose<Backend>(map, "encoders", backends);
+  }
   rig.output = choose<Backend>(map, "output", backends);
   map.finish();
+  const RigRoles simulated = roles_of(rig, Backend::simulated);
+  if (simulated.any() && !simulated.all())
+    document.fail("backend",
+                  "joins simulated to hardware, but a simulated plant moves by its own output only",
+                  "use simulated for all of it or for none");
 }
 
 bool uses(const RigFile& rig, Backend backend) {
-  return rig.encoders == backend || rig.output == backend;
+  return roles_of(rig, backend).any();
+}
+
+/// The section `gpio` has the encoders that the rig takes from it, and no others.
+void check_gpio_roles(const YamlMap& document, const RigFile& rig) {
+  const RigRoles roles = roles_of(rig, Backend::gpio);
+  if (roles.output)
+    document.fail("backend", "gives the output to gpio, whose lines cannot carry a voltage",
+                  "name another backend as output");
+  if (!rig.gpio) return;
+  const YamlMap section = document.map("gpio");
+  const auto match = [&](const char* key, bool is_wanted, bool is_there) {
+    if (is_wanted && !is_there)
+      section.fail(key, "is missing, though backend takes its counts from gpio",
+                   std::string("add ") + key + " (its lines a and b)");
+    if (!is_wanted && is_there)
+      section.fail(key, "is not in use, since backend takes its counts from elsewhere",
+                   std::string("remove ") + key + ", or name gpio as its backend");
+  };
+  match("cart_encoder", roles.cart, rig.gpio->cart_encoder.has_value());
+  match("pendulum_encoder", roles.pendulum, rig.gpio->pendulum_encoder.has_value());
+}
+
+std::string backend_line(const RigFile& rig) {
+  const std::string cart = backend_name(rig.cart_encoder), pendulum = backend_name(rig.pendulum_encoder);
+  const std::string output = backend_name(rig.output);
+  if (cart != pendulum)
+    return "backend: {cart_encoder: " + cart + ", pendulum_encoder: " + pendulum + ", output: " + output +
+           "}\n";
+  if (cart != output) return "backend: {encoders: " + cart + ", output: " + output + "}\n";
+  return "backend: " + output + "\n";
 }
 
 std::string zero_text(const Calibration& calibration) {
@@ -248,16 +291,6 @@ std::string zero_text(const Calibration& calibration) {
     text += "counts, cart_counts: " + std::to_string(calibration.cart_zero_counts) +
             ", pendulum_counts: " + std::to_string(calibration.pendulum_zero_counts);
   return text + ", pose: " + word_of(calibration.zero_pose, poses) + "}";
-}
-
-/// A text in double quotes, as YAML reads it back.
-std::string quoted(const std::string& text) {
-  std::string result = "\"";
-  for (const char c : text) {
-    if (c == '"' || c == '\\') result += '\\';
-    result += c;
-  }
-  return result + "\"";
 }
 
 /// Counts per revolution whose reader gives the same radians per count, bit for bit.
@@ -307,21 +340,26 @@ std::string link_text(const ModbusRig& rig) {
          "\n";
 }
 
-std::string modbus_text(const ModbusRig& rig) {
+std::string counters_text(const ModbusRig& rig, const RigRoles& roles) {
+  std::string text = "  counters: {table: " + word_of(rig.input_registers ? 1 : 0, tables);
+  if (roles.cart) text += ", cart_address: " + std::to_string(rig.cart_address);
+  if (roles.pendulum) text += ", pendulum_address: " + std::to_string(rig.pendulum_address);
+  return text + ", registers: " + std::to_string(rig.counter.registers) +
+         ", word_order: " + word_of(rig.counter.word_order, word_orders) + "}\n";
+}
+
+std::string modbus_text(const ModbusRig& rig, const RigRoles& roles) {
   std::string text = "modbus:\n" + link_text(rig) + "  unit: " + std::to_string(rig.unit) +
                      "\n  response_timeout_s: " + exact_text(rig.response_timeout_s) +
-                     "\n  exchange: " + word_of(rig.exchange, exchanges) +
-                     "\n  counters: {table: " + word_of(rig.input_registers ? 1 : 0, tables) +
-                     ", cart_address: " + std::to_string(rig.cart_address) +
-                     ", pendulum_address: " + std::to_string(rig.pendulum_address) +
-                     ", registers: " + std::to_string(rig.counter.registers) +
-                     ", word_order: " + word_of(rig.counter.word_order, word_orders) + "}\n";
+                     "\n  exchange: " + word_of(rig.exchange, exchanges) + "\n";
+  if (roles.encoders()) text += counters_text(rig, roles);
   if (rig.boot_count_address)
     text += "  boot_count_address: " + std::to_string(*rig.boot_count_address) + "\n";
-  text += "  voltage: {address: " + std::to_string(rig.voltage_address) +
-          ", encoding: " + word_of(rig.voltage.encoding, encodings) +
-          ", word_order: " + word_of(rig.voltage.word_order, word_orders) +
-          ", counts_per_v: " + exact_text(rig.voltage.counts_per_v) + "}\n";
+  if (carries_voltage(rig, roles))
+    text += "  voltage: {address: " + std::to_string(rig.voltage_address) +
+            ", encoding: " + word_of(rig.voltage.encoding, encodings) +
+            ", word_order: " + word_of(rig.voltage.word_order, word_orders) +
+            ", counts_per_v: " + exact_text(rig.voltage.counts_per_v) + "}\n";
   if (rig.enable_address) text += "  enable_address: " + std::to_string(*rig.enable_address) + "\n";
   if (rig.watchdog)
     text += "  device_watchdog: {address: " + std::to_string(rig.watchdog->address) +
@@ -334,6 +372,22 @@ std::string modbus_text(const ModbusRig& rig) {
 
 std::string backend_name(Backend backend) {
   return word_of(backend, backends);
+}
+
+RigRoles roles_of(const RigFile& rig, Backend backend) {
+  return {rig.cart_encoder == backend, rig.pendulum_encoder == backend, rig.output == backend};
+}
+
+bool is_simulated(const RigFile& rig) {
+  return roles_of(rig, Backend::simulated).any();
+}
+
+std::string backends_text(const RigFile& rig) {
+  const std::string cart = backend_name(rig.cart_encoder), pendulum = backend_name(rig.pendulum_encoder);
+  const std::string output = backend_name(rig.output);
+  if (cart != pendulum)
+    return "cart's encoder " + cart + ", pendulum's encoder " + pendulum + ", output " + output;
+  return cart == output ? output : "encoders " + cart + ", output " + output;
 }
 
 int DeviceWatchdog::counts() const {
@@ -349,7 +403,7 @@ bool baud_is_known(int baud) {
 
 Calibration calibration_in_use(const RigFile& rig) {
   Calibration calibration = rig.calibration;
-  if (rig.encoders != Backend::simulated || !rig.simulated || rig.simulated->quantise) return calibration;
+  if (!is_simulated(rig) || !rig.simulated || rig.simulated->quantise) return calibration;
   for (EncoderCalibration* encoder : {&calibration.cart, &calibration.pendulum}) {
     encoder->per_count /= finer_without_quantisation;
     encoder->width_bits = 32;
@@ -380,6 +434,9 @@ RigFile read_rig(const YamlMap& document) {
   if (uses(rig, Backend::simulated) || document.has("simulated"))
     rig.simulated = read_simulated(document.map("simulated"));
   if (serial || uses(rig, Backend::modbus_tcp)) rig.modbus = read_modbus(document.map("modbus"), serial, rig);
+  if (uses(rig, Backend::comedi)) rig.comedi = read_comedi(document.map("comedi"), rig);
+  if (uses(rig, Backend::gpio) || document.has("gpio")) rig.gpio = read_gpio(document.map("gpio"));
+  check_gpio_roles(document, rig);
   document.finish();
   return rig;
 }
@@ -389,9 +446,7 @@ RigFile read_rig_file(const std::filesystem::path& file) {
 }
 
 std::string rig_text(const RigFile& rig) {
-  std::string text = rig.encoders == rig.output ? "backend: " + backend_name(rig.encoders) + "\n"
-                                                : "backend: {encoders: " + backend_name(rig.encoders) +
-                                                      ", output: " + backend_name(rig.output) + "}\n";
+  std::string text = backend_line(rig);
   text += calibration_text(rig.calibration);
   text += "amplifier: {limit_v: " + exact_text(rig.amplifier.limit_v) +
           ", sign: " + std::to_string(rig.amplifier.sign) +
@@ -399,7 +454,11 @@ std::string rig_text(const RigFile& rig) {
           "}\nfall_angle_rad: " + exact_text(rig.fall_angle_rad) +
           "\nwatchdog_s: " + exact_text(rig.watchdog_s) + "\n";
   if (rig.simulated) text += simulated_text(*rig.simulated);
-  if (rig.modbus) text += modbus_text(*rig.modbus);
+  if (rig.modbus)
+    text += modbus_text(
+        *rig.modbus, roles_of(rig, rig.modbus->device.empty() ? Backend::modbus_tcp : Backend::modbus_rtu));
+  if (rig.comedi) text += comedi_text(*rig.comedi);
+  if (rig.gpio) text += gpio_text(*rig.gpio);
   return text;
 }
 

@@ -2,25 +2,28 @@
 # Installs the Debian 12 packages that upright is built from. Quiet and quick when all are there.
 #   scripts/install-deps.sh         what building and the demo need
 #   scripts/install-deps.sh --test  also the browser that the live page is tested in
-#   scripts/install-deps.sh --dev   also what .ci/run needs: clang's formatter, linter, sanitizers, fuzzer; ccache
+#   scripts/install-deps.sh --kernel  also what boots a kernel for the tests of GPIO and Comedi
+#   scripts/install-deps.sh --dev   also what .ci/run needs: all these, and clang's formatter, linter, sanitizers, fuzzer; ccache
 set -euo pipefail
 
 packages=(
   build-essential cmake ninja-build git ca-certificates
-  libeigen3-dev libsundials-dev libmodbus-dev libyaml-cpp-dev libcli11-dev libboost-dev nlohmann-json3-dev
+  libeigen3-dev libsundials-dev libmodbus-dev libcomedi-dev libgpiod-dev libyaml-cpp-dev libcli11-dev libboost-dev nlohmann-json3-dev
   libcpp-httplib-dev libxsimd-dev libceres-dev libopenmpi-dev openmpi-bin
   libgtest-dev libbenchmark-dev
   gnuplot-nox python3-venv
 )
 test_packages=(chromium chromium-driver)
+kernel_packages=(qemu-system-x86 busybox-static libelf1)
 development_packages=(
   clang-14 clang-format-14 clang-tidy-14 clang-tools-14 libclang-rt-14-dev libomp-14-dev ccache
 )
 case "${1:-}" in
   '') ;;
   --test) packages+=("${test_packages[@]}") ;;
-  --dev) packages+=("${test_packages[@]}" "${development_packages[@]}") ;;
-  *) echo "usage: scripts/install-deps.sh [--test | --dev]" >&2; exit 2 ;;
+  --kernel) packages+=("${kernel_packages[@]}") ;;
+  --dev) packages+=("${test_packages[@]}" "${kernel_packages[@]}" "${development_packages[@]}") ;;
+  *) echo "usage: scripts/install-deps.sh [--test | --kernel | --dev]" >&2; exit 2 ;;
 esac
 
 command -v apt-get >/dev/null || {

@@ -74,21 +74,37 @@ void ask_for_low_latency(int descriptor) noexcept {
 ModbusLink::ModbusLink(const RigFile& rig)
     : config_(*rig.modbus),
       amplifier_sign_(rig.amplifier.sign),
-      serial_(rig.encoders == Backend::modbus_rtu || rig.output == Backend::modbus_rtu),
+      serial_(roles_of(rig, Backend::modbus_rtu).any()),
+      roles_(roles_of(rig, serial_ ? Backend::modbus_rtu : Backend::modbus_tcp)),
       address_(serial_ ? std::string() : address_of(config_.host)),
       name_(name_of(config_, address_)),
       context_(new_context(config_, address_)) {
   if (!context_) throw DeviceError(std::string("check the link's settings: ") + modbus_strerror(errno));
-  first_ = std::min(config_.cart_address, config_.pendulum_address);
-  int end = std::max(config_.cart_address, config_.pendulum_address) + config_.counter.registers;
-  if (config_.boot_count_address) {
-    first_ = std::min(first_, *config_.boot_count_address);
-    end = std::max(end, *config_.boot_count_address + 1);
-  }
-  block_ = end - first_;
+  find_block();
   modbus_set_slave(context_.get(), config_.unit);
   modbus_set_error_recovery(context_.get(), MODBUS_ERROR_RECOVERY_NONE);
   modbus_set_byte_timeout(context_.get(), 0, 0);
+}
+
+void ModbusLink::find_block() noexcept {
+  int end = 0;
+  const auto include = [&](int address, int registers) {
+    first_ = end == 0 ? address : std::min(first_, address);
+    end = std::max(end, address + registers);
+  };
+  if (roles_.cart) include(config_.cart_address, config_.counter.registers);
+  if (roles_.pendulum) include(config_.pendulum_address, config_.counter.registers);
+  if (config_.boot_count_address) include(*config_.boot_count_address, 1);
+  // Function 0x17 has to read something: without counters it is the voltage it has just written.
+  if (end == 0 && config_.exchange == ModbusExchange::read_write)
+    include(config_.voltage_address, config_.voltage.registers());
+  block_ = end - first_;
+  const int counter = config_.counter.registers;
+  other_block_ = block_ > counter ? counter : block_ > 1 ? 1 : 2;
+}
+
+std::array<std::uint16_t, 2> ModbusLink::voltage_words(double voltage_v) const noexcept {
+  return encode_voltage(roles_.output ? amplifier_sign_ * voltage_v : 0.0, config_.voltage);
 }
 
 RigFault ModbusLink::connect(double patience_s) noexcept {
@@ -129,7 +145,7 @@ RigFault ModbusLink::read_block(int registers, double held_v) noexcept {
   modbus_t* context = context_.get();
   modbus_flush(context);
   if (config_.exchange == ModbusExchange::read_write) {
-    const auto words = encode_voltage(amplifier_sign_ * held_v, config_.voltage);
+    const auto words = voltage_words(held_v);
     return result(
         modbus_write_and_read_registers(context, config_.voltage_address, config_.voltage.registers(),
                                         words.data(), first_, registers, registers_.data()),
@@ -140,12 +156,14 @@ RigFault ModbusLink::read_block(int registers, double held_v) noexcept {
 }
 
 RigFault ModbusLink::read(double held_v, DeviceReading& reading) noexcept {
+  if (block_ == 0) return write_voltage(held_v);
   if (const RigFault fault = read_block(block_, held_v); fault != RigFault::none) return fault;
   const auto at = [&](int address) {
     return std::span<const std::uint16_t>(registers_).subspan(static_cast<std::size_t>(address - first_), 2);
   };
-  reading.cart_counts = decode_counter(at(config_.cart_address), config_.counter);
-  reading.pendulum_counts = decode_counter(at(config_.pendulum_address), config_.counter);
+  if (roles_.cart) reading.cart_counts = decode_counter(at(config_.cart_address), config_.counter);
+  if (roles_.pendulum)
+    reading.pendulum_counts = decode_counter(at(config_.pendulum_address), config_.counter);
   reading.boot_count = config_.boot_count_address ? at(*config_.boot_count_address)[0] : 0;
   return RigFault::none;
 }
@@ -154,7 +172,7 @@ RigFault ModbusLink::write_voltage(double voltage_v) noexcept {
   if (config_.exchange == ModbusExchange::read_write) return read_block(block_, voltage_v);
   if (!connected_) return RigFault::link_lost;
   modbus_flush(context_.get());
-  const auto words = encode_voltage(amplifier_sign_ * voltage_v, config_.voltage);
+  const auto words = voltage_words(voltage_v);
   const int count = config_.voltage.registers();
   return result(modbus_write_registers(context_.get(), config_.voltage_address, count, words.data()), count);
 }
@@ -176,7 +194,9 @@ RigFault ModbusLink::read_register(int address, int& value) noexcept {
 }
 
 RigFault ModbusLink::resynchronise(double held_v) noexcept {
-  const RigFault fault = read_block(config_.counter.registers, held_v);
+  int value = 0;
+  const RigFault fault =
+      block_ == 0 ? read_register(config_.voltage_address, value) : read_block(other_block_, held_v);
   if (fault == RigFault::none) in_step_ = true;
   return fault;
 }

@@ -33,8 +33,10 @@ class ModbusLink {
   bool connected() const noexcept { return connected_; }
 
   /// Reads the counters. With function 0x17 `held_v`, the voltage already commanded, goes out in the same
-  /// exchange.
+  /// exchange. Where only the output is Modbus there are no counters: the exchange then shows that the device
+  /// answers, and repeats the voltage.
   RigFault read(double held_v, DeviceReading& reading) noexcept;
+  /// Where another backend has the output, zero goes out, whatever is asked for.
   RigFault write_voltage(double voltage_v) noexcept;
   RigFault write_register(int address, int value) noexcept;
   RigFault read_register(int address, int& value) noexcept;
@@ -49,18 +51,22 @@ class ModbusLink {
   };
   static constexpr int most_registers = 125;
 
+  void find_block() noexcept;
+  std::array<std::uint16_t, 2> voltage_words(double voltage_v) const noexcept;
   RigFault result(int count, int expected) noexcept;
   RigFault read_block(int registers, double held_v) noexcept;
 
   ModbusRig config_;
   int amplifier_sign_;
   bool serial_;
+  RigRoles roles_;
   std::string address_;  // of a TCP device, as a number
   std::string name_;
   bool connected_ = false;
   bool in_step_ = false;
   int first_ = 0;
-  int block_ = 0;
+  int block_ = 0;         // registers that read() asks for; 0: there is nothing to read
+  int other_block_ = 0;   // asked for to tell an answer from those to earlier requests
   std::unique_ptr<modbus_t, Free> context_;
   std::array<std::uint16_t, most_registers> registers_{};
 };

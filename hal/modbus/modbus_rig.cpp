@@ -61,6 +61,8 @@ const char* words_for(RigFault fault) {
 
 ModbusTransport::ModbusTransport(const RigFile& rig, double period_s)
     : rig_(rig),
+      roles_(roles_of(rig, rig.modbus->device.empty() ? Backend::modbus_tcp : Backend::modbus_rtu)),
+      writes_(roles_.output || rig.modbus->exchange == ModbusExchange::read_write),
       patience_ns_(static_cast<std::int64_t>(
           1e9 * std::max(rig.modbus->response_timeout_s, share_of_period * period_s))),
       link_(rig) {}
@@ -97,7 +99,8 @@ void ModbusTransport::open() {
     if (!link_.connected()) link_.connect(open_patience_s);
     fault = link_.resynchronise(0.0);
   }
-  must(fault, "reading the counters");
+  const std::string reading_it = roles_.encoders() ? "reading the counters" : "asking for an answer";
+  must(fault, reading_it);
   const ModbusRig& modbus = *rig_.modbus;
   const auto retried = [&](auto exchange, const std::string& doing) {
     RigFault last = RigFault::link_lost;
@@ -108,7 +111,7 @@ void ModbusTransport::open() {
     }
     must(last, doing);
   };
-  retried([&] { return link_.write_voltage(0.0); }, "writing zero volts");
+  if (writes_) retried([&] { return link_.write_voltage(0.0); }, "writing zero volts");
   if (modbus.enable_address)
     retried([&] { return link_.write_register(*modbus.enable_address, 0); }, "disabling the amplifier");
   if (modbus.watchdog) {
@@ -120,7 +123,7 @@ void ModbusTransport::open() {
     if (back != modbus.watchdog->counts()) fail(RigFault::none, "reading back the device's watchdog");
   }
   DeviceReading reading;
-  retried([&] { return link_.read(0.0, reading); }, "reading the counters");
+  retried([&] { return link_.read(0.0, reading); }, reading_it);
   boot_count_ = reading.boot_count;
 
   read_wanted_ = write_wanted_ = answered_ = 0;
@@ -162,6 +165,7 @@ RigReading ModbusTransport::read() noexcept {
 }
 
 RigFault ModbusTransport::write(double voltage_v) noexcept {
+  if (!roles_.output) return RigFault::device_refused;
   if (stopping_.load(std::memory_order_relaxed)) return RigFault::none;
   voltage_v_.store(safe_voltage(voltage_v, rig_.amplifier.limit_v), std::memory_order_relaxed);
   write_wanted_.fetch_add(1, std::memory_order_release);
@@ -278,7 +282,7 @@ void ModbusTransport::serve_stop() noexcept {
   for (;;) {
     RigFault fault = link_.connected() ? RigFault::none : link_.connect(connect_patience_s);
     if (fault == RigFault::none && !link_.in_step()) fault = link_.resynchronise(0.0);
-    if (fault == RigFault::none) fault = link_.write_voltage(0.0);
+    if (fault == RigFault::none && writes_) fault = link_.write_voltage(0.0);
     if (fault == RigFault::none && rig_.modbus->enable_address)
       fault = link_.write_register(*rig_.modbus->enable_address, 0);
     if (fault == RigFault::none || now_ns() > until_ns) return;

@@ -6,6 +6,9 @@
 // period later, which is what a single exchange per period would mean. With function 0x17 both exchanges
 // carry both directions: that of read() repeats the voltage that is already on, which also keeps the device's
 // watchdog fed when a write was lost.
+//
+// In a joined rig the device has a part of this only. As encoders it is never sent a voltage but zero, and with
+// separate exchanges none at all; as output its readings have no counts and show that it answers.
 #pragma once
 
 #include <atomic>
@@ -42,6 +45,8 @@ class ModbusTransport final : public Rig {
   [[noreturn]] void fail(RigFault fault, const std::string& doing);
 
   RigFile rig_;
+  RigRoles roles_;
+  bool writes_;  // a voltage, be it always zero
   RigLock lock_;
   std::int64_t patience_ns_;  // how long read() waits at most
   ModbusLink link_;

@@ -305,9 +305,9 @@ class Server {
 
 void serve_virtual_rig(const RigFile& rig, const Plant& plant, const VirtualRigOptions& options,
                        const std::atomic<bool>& stopped) {
-  if (!rig.modbus)
-    throw ConfigError("give a rig file of backend modbus-tcp or modbus-rtu: " + rig.file.string() +
-                      ":1: modbus is missing");
+  if (!roles_of(rig, Backend::modbus_tcp).all() && !roles_of(rig, Backend::modbus_rtu).all())
+    throw ConfigError("give a rig file of backend modbus-tcp or modbus-rtu alone: " + rig.file.string() +
+                      ":1: backend is " + backends_text(rig));
   Server server(rig, plant, options);
   const sched_param parameters{server_priority};
   pthread_setschedparam(pthread_self(), SCHED_FIFO, &parameters);  // where allowed

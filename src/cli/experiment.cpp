@@ -20,6 +20,7 @@
 #include "live.hpp"
 #include "options.hpp"
 #include "signals.hpp"
+#include "upright/hal/gpio_rig.hpp"
 #include "upright/hal/rig_factory.hpp"
 #include "upright/model/error.hpp"
 #include "upright/runtime/sign_check.hpp"
@@ -233,13 +234,15 @@ ExperimentResult perform(const Arguments& arguments, const ExperimentSetup& setu
   MonotonicClock real_clock;
   VirtualClock virtual_clock;
   Clock& clock = arguments.fast ? static_cast<Clock&>(virtual_clock) : real_clock;
-  std::unique_ptr<SimulatedRigWithHand> hand;
-  std::unique_ptr<Rig> link;
-  if (simulated)
-    hand = make_simulated_rig(setup.rig, clock, {arguments.seed.value_or(1), {}});
-  else
-    link = make_rig(setup.rig, {setup.control.period_s()});
-  Rig& rig = simulated ? static_cast<Rig&>(*hand) : *link;
+  SimulatedRigWithHand* hand = nullptr;
+  std::unique_ptr<Rig> rig;
+  if (simulated) {
+    auto plant = make_simulated_rig(setup.rig, clock, {arguments.seed.value_or(1), {}});
+    hand = plant.get();
+    rig = with_gpio_lines(std::move(plant), setup.rig);
+  } else {
+    rig = make_rig(setup.rig, {setup.control.period_s()});
+  }
 
   ExperimentOptions options;
   options.folder = folder;
@@ -269,7 +272,7 @@ ExperimentResult perform(const Arguments& arguments, const ExperimentSetup& setu
       if (on_terminal) show_live(live, phase);
       if (view != nullptr) view->say(state_of(current.first, current.second, phase, simulated));
     };
-  ExperimentResult result = run_experiment(setup, pieces, rig, hand.get(), clock, signal, options);
+  ExperimentResult result = run_experiment(setup, pieces, *rig, hand, clock, signal, options);
   if (view != nullptr)
     view->end({result.complete ? LiveState::Kind::completed : LiveState::Kind::stopped,
                (result.complete ? "every piece is done" : result.sentence) + ". The runs are in " +

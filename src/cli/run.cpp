@@ -16,6 +16,7 @@
 #include "signals.hpp"
 #include "upright/analysis/delay_margin.hpp"
 #include "upright/control/predictor.hpp"
+#include "upright/hal/gpio_rig.hpp"
 #include "upright/hal/guarded_rig.hpp"
 #include "upright/hal/rig_factory.hpp"
 #include "upright/hal/simulated_rig.hpp"
@@ -115,8 +116,9 @@ std::string delay_line(const ControlConfig& control) {
 
 std::unique_ptr<Rig> make(const RunSetup& setup, Clock& clock) {
   if (is_simulated(setup.rig))
-    return guarded(make_simulated_rig(setup.rig, clock, {setup.seed, setup.theta0_rad}),
-                   calibration_in_use(setup.rig));
+    return with_gpio_lines(guarded(make_simulated_rig(setup.rig, clock, {setup.seed, setup.theta0_rad}),
+                                   calibration_in_use(setup.rig)),
+                           setup.rig);
   return make_rig(setup.rig, {setup.control.period_s()});
 }
 

@@ -49,8 +49,4 @@ std::string command_line() {
   return text;
 }
 
-bool is_simulated(const RigFile& rig) {
-  return rig.encoders == Backend::simulated && rig.output == Backend::simulated;
-}
-
 }  // namespace upright::cli

@@ -18,6 +18,4 @@ void press_stop_button() noexcept;
 /// The command as it was typed.
 std::string command_line();
 
-bool is_simulated(const RigFile& rig);
-
 }  // namespace upright::cli

@@ -98,9 +98,7 @@ void gather_provenance(const RunRecord& record, RunData& data) {
   };
   add("command", plain(run, "command"));
   add("started (UTC)", record.started_utc);
-  add("rig", record.rig.encoders == record.rig.output
-                 ? backend_name(record.rig.encoders)
-                 : backend_name(record.rig.encoders) + " and " + backend_name(record.rig.output));
+  add("rig", backends_text(record.rig));
   add("sample rate", number_text(record.control.sample_rate_hz, 6) + " Hz");
   add("delay", number_text(record.control.delay_s, 6) + " s");
   add("seed", plain(run, "seed"));
@@ -139,7 +137,7 @@ RunData load_run_data(const std::filesystem::path& run_directory) {
   const RunRecord record = read_run(run_directory);
   RunData data;
   data.name = std::filesystem::absolute(run_directory / "").parent_path().filename().string();
-  data.origin = "started " + record.started_utc + " on the " + backend_name(record.rig.output) + " rig";
+  data.origin = "started " + record.started_utc + " on the " + backends_text(record.rig) + " rig";
   data.period_s = record.control.period_s();
   data.amplifier_limit_v = record.rig.amplifier.limit_v;
   data.run_yaml = read_text(run_directory / "run.yaml");

@@ -50,12 +50,17 @@ StopReason reason_for(RigFault fault) {
     case RigFault::emergency_stop:
       return StopReason::emergency_stop;
     case RigFault::limit_switch:
+    case RigFault::limit_switch_plus:
+    case RigFault::limit_switch_minus:
       return StopReason::track_limit;
     case RigFault::not_finite:
       return StopReason::not_finite;
     case RigFault::device_restarted:
     case RigFault::counts_jumped:
     case RigFault::device_refused:
+    case RigFault::line_failed:
+    case RigFault::edges_lost:
+    case RigFault::edges_too_fast:
       return StopReason::rig_fault;
     case RigFault::link_timeout:
     case RigFault::link_lost:
@@ -94,9 +99,34 @@ const char* words_for(RigFault fault) {
     case RigFault::emergency_stop:
       return "emergency stop";
     case RigFault::limit_switch:
-      return "limit switch";
+      return "a limit switch was hit";
+    case RigFault::limit_switch_plus:
+      return "the limit switch at the +x end was hit";
+    case RigFault::limit_switch_minus:
+      return "the limit switch at the -x end was hit";
+    case RigFault::line_failed:
+      return "a digital line could not be read or set";
+    case RigFault::edges_lost:
+      return "edges of an encoder were lost, its counts are wrong";
+    case RigFault::edges_too_fast:
+      return "an encoder's edges came faster than fastest_edges_per_s, some may be lost";
   }
   return "unknown fault";
+}
+
+/// What to do about a fault of the rig, before anything else.
+const char* remedy_for(RigFault fault) {
+  switch (fault) {
+    case RigFault::line_failed:
+      return "check the GPIO chip and its driver";
+    case RigFault::edges_lost:
+      return "check the encoder's wiring and that nothing delays the kernel's interrupts, then take the zero "
+             "again";
+    case RigFault::edges_too_fast:
+      return "let the encoder turn more slowly or use a hardware counter, then take the zero again";
+    default:
+      return "reset the device and start again";
+  }
 }
 
 /// A run that ends as soon as it began has most often a sign wrong.
@@ -141,10 +171,10 @@ std::string sentence_of(const LoopOutcome& o, const LoopLimits& limits) {
       return "check cable, address and device: the link failed for more than the watchdog's " +
              brief(limits.watchdog_s * 1e3) + " ms (" + words_for(o.fault) + "), first" + when;
     case StopReason::rig_fault:
-      return std::string("reset the device and start again: ") + words_for(o.fault) + when;
+      return std::string(remedy_for(o.fault)) + ": " + words_for(o.fault) + when;
     case StopReason::track_limit:
-      return o.fault == RigFault::limit_switch
-                 ? "bring the cart back to the middle: a limit switch was hit" + when
+      return is_limit_switch(o.fault)
+                 ? std::string("bring the cart back to the middle: ") + words_for(o.fault) + when
                  : first_check(o.time_s) +
                        "bring the cart back to the middle: it reached the track limit of " +
                        brief(limits.track_limit_m) +

@@ -147,7 +147,7 @@ ExperimentSetup resolve_experiment(const std::filesystem::path& file, const std:
   setup.experiment = read_experiment_file(file);
   setup.rig = read_rig_file(rig);
   const Experiment& e = setup.experiment;
-  const bool simulated = setup.rig.encoders == Backend::simulated && setup.rig.output == Backend::simulated;
+  const bool simulated = is_simulated(setup.rig);
   if (simulated) setup.simulated = read_plant_file(setup.rig.simulated->plant);
   if (!plant.empty())
     setup.plant = read_plant_file(plant);
@@ -178,7 +178,7 @@ Rehearsal rehearse(const Piece& piece, const ExperimentSetup& setup) {
 
 Rehearsal rehearse(const Piece& piece, const ExperimentSetup& setup, const Plant& real) {
   RigFile rig = setup.rig;
-  rig.encoders = rig.output = Backend::simulated;
+  rig.cart_encoder = rig.pendulum_encoder = rig.output = Backend::simulated;
   rig.calibration.zero_at_start = false;
   rig.simulated = SimulatedRig{};
   rig.simulated->initial = {0.0, std::numbers::pi};

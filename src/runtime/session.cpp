@@ -49,15 +49,17 @@ std::uint64_t default_periods_late(double period_s) {
 
 void find_zero(Rig& rig, Clock& clock, RigFile& file, double patience_s) {
   if (!file.calibration.zero_at_start) return;
-  if (file.encoders == Backend::simulated) {
+  if (is_simulated(file)) {
     // Its counters are zero at the pose that the zero names, wherever it starts.
     file.calibration.zero_at_start = false;
     return;
   }
   constexpr std::int64_t pause_ns = 1'000'000;
   const std::int64_t until_ns = clock.now_ns() + static_cast<std::int64_t>(patience_s * 1e9);
+  RigFault last_fault = RigFault::none;
   for (;;) {
     const RigReading reading = rig.read();
+    last_fault = reading.fault;
     if (reading.status == RigStatus::fresh) {
       file.calibration.cart_zero_counts = reading.cart_counts;
       file.calibration.pendulum_zero_counts = reading.pendulum_counts;
@@ -68,6 +70,10 @@ void find_zero(Rig& rig, Clock& clock, RigFile& file, double patience_s) {
     if (now_ns > until_ns) break;
     clock.sleep_until(now_ns + pause_ns);
   }
+  if (is_emergency_stop(last_fault))
+    throw DeviceError("release the emergency stop when it is safe: it is pressed, or its wire is cut");
+  if (is_limit_switch(last_fault))
+    throw DeviceError("bring the cart to the middle: a limit switch is active, or its wire is cut");
   throw DeviceError("check the encoders' link: no fresh counts came to take the zero from");
 }
 

@@ -84,6 +84,34 @@ TEST(CommandLine, EveryFileOfTheRepositoryIsValid) {
   EXPECT_EQ(result.exit_code, 0) << result.err;
 }
 
+TEST(CommandLine, ACardThatIsNotThereIsADeviceErrorWithItsRemedy) {
+  const TemporaryFolder folder;
+  const std::string rig = read_text(UPRIGHT_SOURCE_DIR "/config/rigs/comedi-multiq3.yaml");
+  const std::string device = "/dev/comedi0";
+  const std::string nowhere = (folder.path() / "card").string();
+  const auto file =
+      folder.write("rig.yaml", std::string(rig).replace(rig.find(device), device.size(), nowhere));
+  const CommandResult result = run_upright("run --rig " + shell_quoted(file.string()) + " --gains " +
+                                           shell_quoted(UPRIGHT_SOURCE_DIR "/config/gains/exponential.yaml") +
+                                           " --out " + shell_quoted(folder.path() / "runs"));
+  EXPECT_EQ(result.exit_code, 4);
+  EXPECT_NE(result.err.find("load the card's driver"), std::string::npos) << result.err;
+  EXPECT_NE(result.err.find(nowhere), std::string::npos) << result.err;
+  EXPECT_FALSE(std::filesystem::exists(folder.path() / "runs")) << "nothing ran";
+}
+
+TEST(CommandLine, TheVirtualRigServesModbusOnly) {
+  for (const char* rig : {"comedi-multiq3.yaml", "comedi-and-modbus.yaml"}) {
+    const CommandResult result =
+        run_upright(std::string("virtual-rig --tcp 127.0.0.1:0 --rig ") +
+                    shell_quoted(UPRIGHT_SOURCE_DIR "/config/rigs/") + rig + " --plant " +
+                    shell_quoted(UPRIGHT_SOURCE_DIR "/config/plants/viscous.yaml"));
+    EXPECT_EQ(result.exit_code, 2);
+    EXPECT_NE(result.err.find("give a rig file of backend modbus-tcp or modbus-rtu alone"), std::string::npos)
+        << result.err;
+  }
+}
+
 TEST(CommandLine, AFullDiskUnderTheOutputIsAnError) {
   const CommandResult result = run_upright("effects >/dev/full");
   EXPECT_EQ(result.exit_code, 4);

@@ -227,7 +227,70 @@ const std::string serial_rig =
     with(with(modbus_rig, "modbus-tcp", "modbus-rtu"), "  host: 127.0.0.1\n  port: 1502\n",
          "  device: /dev/ttyUSB0\n  baud: 921600\n  parity: none\n  stop_bits: 1\n");
 
+const std::string comedi_rig =
+    "backend: comedi\n" + rig_head +
+    "comedi:\n"
+    "  device: /dev/comedi0\n"
+    "  cart: {kind: analog_input, subdevice: 0, channel: 0, range_v: [-10, 10], counts_per_v: 1000}\n"
+    "  pendulum: {kind: counter, subdevice: 4, channel: 1, lines: {a: 3, b: 11}}\n"
+    "  output: {subdevice: 1, channel: 0, range_v: [-5, 5], amplifier_gain: 3}\n";
+
+const std::string rig_with_lines = simulated_rig +
+                                   "gpio:\n"
+                                   "  chip: gpiochip0\n"
+                                   "  emergency_stop: {line: 4, active: high, bias: pull_up}\n"
+                                   "  limit_switches:\n"
+                                   "    - {end: plus_x, line: 5, active: high}\n"
+                                   "    - {end: minus_x, line: 6, active: high}\n"
+                                   "  amplifier_enable: {line: 17, active: low}\n"
+                                   "  heartbeat: {line: 18}\n";
+
+const std::string rig_with_line_encoder =
+    with(with(modbus_rig, "backend: modbus-tcp",
+              "backend: {cart_encoder: modbus-tcp, pendulum_encoder: gpio, output: modbus-tcp}"),
+         "pendulum_address: 2, ", "") +
+    "gpio:\n"
+    "  chip: /dev/gpiochip0\n"
+    "  pendulum_encoder: {a: 22, b: 23, fastest_edges_per_s: 8000}\n";
+
+std::vector<Malformed> malformed_lines() {
+  const std::string& lines = rig_with_lines;
+  const std::string& encoder = rig_with_line_encoder;
+  return {
+      {"chip_missing", with(lines, "  chip: gpiochip0\n", ""), 17, "chip", "add chip"},
+      {"chip_is_list", with(lines, "gpiochip0", "[0]"), 17, "chip", "text"},
+      {"stop_without_line", with(lines, "line: 4, ", ""), 18, "line", "add line"},
+      {"line_negative", with(lines, "line: 4", "line: -4"), 18, "line", "from 0"},
+      {"line_in_text", with(lines, "line: 4", "line: GPIO4"), 18, "line", "number"},
+      {"line_used_twice", with(lines, "line: 6", "line: 5"), 21, "line", "own line"},
+      {"active_missing", with(lines, "line: 4, active: high", "line: 4"), 18, "active", "add active"},
+      {"active_unknown", with(lines, "active: low", "active: closed"), 22, "active", "high"},
+      {"bias_unknown", with(lines, "pull_up", "pullup"), 18, "bias", "did you mean pull_up?"},
+      {"end_unknown", with(lines, "plus_x", "left"), 20, "end", "minus_x"},
+      {"switches_are_a_map", with(lines, "    - {end: plus_x, line: 5, active: high}\n    - {", "    x: {"),
+       19, "limit_switches", "list"},
+      {"heartbeat_is_number", with(lines, "heartbeat: {line: 18}", "heartbeat: 18"), 23, "heartbeat", "map"},
+      {"lines_unknown_key", lines + "  emergancy: {line: 9, active: low}\n", 24, "emergancy", "remove it"},
+      {"lines_encoder_not_in_use", lines + "  cart_encoder: {a: 1, b: 2, fastest_edges_per_s: 5000}\n", 24,
+       "cart_encoder", "remove cart_encoder"},
+      {"encoder_missing",
+       with(encoder, "  pendulum_encoder: {a: 22, b: 23, fastest_edges_per_s: 8000}\n",
+            "  heartbeat: {line: 1}\n"),
+       22, "pendulum_encoder", "add pendulum_encoder"},
+      {"encoder_on_one_line", with(encoder, "b: 23", "b: 22"), 23, "b", "own line"},
+      {"edges_too_fast", with(encoder, "8000", "44000"), 23, "fastest_edges_per_s", "20000"},
+      {"edges_in_text", with(encoder, "8000", "fast"), 23, "fastest_edges_per_s", "number"},
+      {"gpio_as_output",
+       with(with(encoder, "output: modbus-tcp", "output: gpio"),
+            "  voltage: {address: 16, encoding: int16, counts_per_v: 1000.0}\n  enable_address: 17\n  "
+            "device_watchdog: {address: 18, time_s: 0.12, seconds_per_count: 0.001}\n",
+            "  voltage: {address: 16, encoding: int16, counts_per_v: 1000.0}\n"),
+       1, "backend", "another backend"},
+  };
+}
+
 std::vector<Malformed> malformed_rigs() {
+  const std::string& comedi = comedi_rig;
   const std::string& sim = simulated_rig;
   const std::string& tcp = modbus_rig;
   const std::string& rtu = serial_rig;
@@ -310,6 +373,27 @@ std::vector<Malformed> malformed_rigs() {
       {"baud_is_text", with(rtu, "921600", "fast"), 12, "baud", "number"},
       {"parity_unknown", with(rtu, "parity: none", "parity: N"), 13, "parity", "even"},
       {"stop_bits_three", with(rtu, "stop_bits: 1", "stop_bits: 3"), 14, "stop_bits", "from 1 to 2"},
+      {"half_simulated", with(comedi, "backend: comedi", "backend: {encoders: comedi, output: simulated}"), 1,
+       "backend", "simulated for all of it or for none"},
+      {"backend_of_one_encoder",
+       with(comedi, "backend: comedi", "backend: {cart_encoder: comedi, output: comedi}"), 1,
+       "pendulum_encoder", "add pendulum_encoder"},
+      {"comedi_section_missing", comedi.substr(0, comedi.find("comedi:\n")) + "comedy:\n  a: 1\n", 10,
+       "comedy", "did you mean comedi?"},
+      {"comedi_without_device", with(comedi, "  device: /dev/comedi0\n", ""), 11, "device", "add device"},
+      {"comedi_kind_misspelt", with(comedi, "analog_input", "analog_imput"), 12, "kind",
+       "did you mean analog_input?"},
+      {"comedi_subdevice_negative", with(comedi, "subdevice: 4", "subdevice: -4"), 13, "subdevice", "from 0"},
+      {"comedi_range_of_one_end", with(comedi, "[-5, 5]", "[-5]"), 14, "range_v", "upper end"},
+      {"comedi_range_of_one_sign", with(comedi, "[-5, 5]", "[0, 5]"), 14, "range_v", "both signs"},
+      {"comedi_range_too_small", with(comedi, "amplifier_gain: 3", "amplifier_gain: 2"), 14, "range_v",
+       "limit_v at most 10"},
+      {"comedi_gain_missing", with(comedi, ", amplifier_gain: 3", ""), 14, "amplifier_gain", "add"},
+      {"comedi_lines_the_same", with(comedi, "b: 11", "b: 3"), 13, "b", "a line each"},
+      {"comedi_scale_zero", with(comedi, "counts_per_v: 1000", "counts_per_v: 0"), 12, "counts_per_v",
+       "number"},
+      {"comedi_range_of_a_counter", with(comedi, "lines: {a: 3, b: 11}", "range_v: [-5, 5]"), 13, "range_v",
+       "remove it"},
       {"rig_second_document", sim + "---\nbackend: simulated\n", 16, "second", "keep one"},
   };
 }
@@ -341,13 +425,17 @@ INSTANTIATE_TEST_SUITE_P(Gains, MalformedFile, ::testing::ValuesIn(malformed_gai
 
 INSTANTIATE_TEST_SUITE_P(Rig, MalformedFile, ::testing::ValuesIn(malformed_rigs()), name_of_test);
 
+INSTANTIATE_TEST_SUITE_P(Lines, MalformedFile, ::testing::ValuesIn(malformed_lines()), name_of_test);
+
 TEST(WellFormedFile, IsAccepted) {
   const TemporaryFolder folder;
   for (const auto& [name, text] : {std::pair{"plant.yaml", plant},
                                    {"gains.yaml", gains},
                                    {"sim.yaml", simulated_rig},
                                    {"tcp.yaml", modbus_rig},
-                                   {"rtu.yaml", serial_rig}}) {
+                                   {"rtu.yaml", serial_rig},
+                                   {"lines.yaml", rig_with_lines},
+                                   {"line_encoder.yaml", rig_with_line_encoder}}) {
     const CommandResult result = run_upright("check " + folder.write(name, text).string());
     EXPECT_EQ(result.exit_code, 0) << result.err;
   }

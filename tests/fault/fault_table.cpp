@@ -48,6 +48,9 @@ const std::vector<Fault>& faults() {
       {"restart", "the device restarts"},
       {"emergency_stop", "the emergency stop is pressed"},
       {"limit_switch", "a limit switch is hit"},
+      {"line_failed", "a digital line cannot be read any more"},
+      {"edges_lost", "edges of a line encoder are lost"},
+      {"edges_too_fast", "edges of a line encoder come too fast"},
       {"disk_full", "the disk is full"},
       {"slow_disk", "each write and sync of the log takes 0.3 s"},
       {"dead_disk", "one write of the log takes 3 s"},
@@ -101,6 +104,11 @@ std::string page_of(const std::filesystem::path& records) {
       "`watchdog_s: 0.1`. A dash: not tried there, since virtual time knows nothing of the machine, a "
       "simulated plant ends\n"
       "with its program, and the Modbus register map has no bits for emergency stop and limit switches.\n\n"
+      "Emergency stop and limit switches as digital lines, edges that are lost or come too fast, a GPIO chip "
+      "that goes,\n"
+      "and the faults of Comedi cards need a kernel with simulated chips and cards: they are put in by "
+      "`scripts/test-kernel.sh`\n"
+      "(`tests/kernel`), in a guest, and judged by the plant's record as well.\n\n"
       "| fault | simulated, virtual time | simulated, real time | modbus-tcp | modbus-rtu |\n"
       "|---|---|---|---|---|\n";
   for (const Fault& fault : faults()) {

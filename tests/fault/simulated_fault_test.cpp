@@ -226,6 +226,15 @@ std::vector<Case> link_cases() {
       {.fault = "limit_switch",
        .expectation = stops({"track_limit"}, period_s),
        .tamper = every(1, RigStatus::fault, RigFault::limit_switch)},
+      {.fault = "line_failed",
+       .expectation = stops({"rig_fault"}, period_s),
+       .tamper = every(1, RigStatus::fault, RigFault::line_failed)},
+      {.fault = "edges_lost",
+       .expectation = stops({"rig_fault"}, period_s),
+       .tamper = every(1, RigStatus::fault, RigFault::edges_lost)},
+      {.fault = "edges_too_fast",
+       .expectation = stops({"rig_fault"}, period_s),
+       .tamper = every(1, RigStatus::fault, RigFault::edges_too_fast)},
   };
 }
 

@@ -19,6 +19,7 @@
 #include <utility>
 #include <vector>
 
+#include "fake_comedi.hpp"
 #include "upright/control/predictor.hpp"
 #include "upright/hal/rig_factory.hpp"
 #include "upright/hal/simulated_rig.hpp"
@@ -191,29 +192,77 @@ TEST(RealtimeSafety, ThePredictorNeitherAllocatesNorLocks) {
   }
 }
 
-TEST(RealtimeSafety, TheModbusRigNeitherAllocatesNorLocks) {
+/// The virtual rig in a thread of its own.
+class ModbusServer {
+ public:
+  ModbusServer(const RigFile& file, double theta0_rad) {
+    VirtualRigOptions options;
+    options.tcp_host = "127.0.0.1";
+    options.theta0_rad = theta0_rad;
+    options.listening = [this](const std::string& name) { listening_.set_value(name); };
+    thread_ = std::thread([this, file, options] {
+      serve_virtual_rig(file, read_plant_file(UPRIGHT_SOURCE_DIR "/config/plants/exponential.yaml"), options,
+                        stopped_);
+    });
+    const std::string name = listening_.get_future().get();
+    port_ = std::stoi(name.substr(name.rfind(':') + 1));
+  }
+  ~ModbusServer() {
+    stopped_ = true;
+    thread_.join();
+  }
+  ModbusServer(const ModbusServer&) = delete;
+  ModbusServer& operator=(const ModbusServer&) = delete;
+  int port() const { return port_; }
+
+ private:
+  std::promise<std::string> listening_;
+  std::atomic<bool> stopped_{false};
+  std::thread thread_;
+  int port_ = 0;
+};
+
+RigFile patient_modbus() {
   RigFile file = read_rig_file(UPRIGHT_SOURCE_DIR "/config/rigs/modbus-tcp.yaml");
   file.modbus->response_timeout_s = 0.004;
+  return file;
+}
+
+ControlConfig slow_gains() {
   ControlConfig control = gains("exponential");
   control.sample_rate_hz = 200;
-  VirtualRigOptions options;
-  options.tcp_host = "127.0.0.1";
-  options.theta0_rad = 0.02;
-  std::promise<std::string> listening;
-  options.listening = [&listening](const std::string& name) { listening.set_value(name); };
-  std::atomic<bool> stopped{false};
-  std::thread server([&] {
-    serve_virtual_rig(file, read_plant_file(UPRIGHT_SOURCE_DIR "/config/plants/exponential.yaml"), options,
-                      stopped);
-  });
-  const std::string name = listening.get_future().get();
-  RigFile client = file;
-  client.modbus->port = std::stoi(name.substr(name.rfind(':') + 1));
+  return control;
+}
+
+TEST(RealtimeSafety, TheModbusRigNeitherAllocatesNorLocks) {
+  RigFile file = patient_modbus();
+  const ControlConfig control = slow_gains();
+  const ModbusServer server(file, 0.02);
+  file.modbus->port = server.port();
   MonotonicClock clock;
-  const auto rig = make_rig(client, {control.period_s()});
-  const Counted counted = count_on(*rig, client, control, clock, 1.0, [] {});
-  stopped = true;
-  server.join();
+  const auto rig = make_rig(file, {control.period_s()});
+  const Counted counted = count_on(*rig, file, control, clock, 1.0, [] {});
+  EXPECT_EQ(counted.allocations, 0);
+  EXPECT_EQ(counted.locks, 0);
+}
+
+/// The pendulum's counts over Modbus, the cart's and the voltage on a card: at rest, where everything is
+/// zero.
+TEST(RealtimeSafety, TheComediRigAndARigOfPartsNeitherAllocateNorLock) {
+  test::fake_cards()["/dev/comedi0"] = test::fake_multiq3();
+  RigFile file = patient_modbus();
+  const ControlConfig control = slow_gains();
+  const ModbusServer server(file, 0.0);
+  const RigFile card = read_rig_file(UPRIGHT_SOURCE_DIR "/config/rigs/comedi-multiq3.yaml");
+  file.modbus->port = server.port();
+  file.comedi = card.comedi;
+  file.comedi->pendulum.reset();
+  file.cart_encoder = file.output = Backend::comedi;
+  file.calibration.cart = card.calibration.cart;
+  file.amplifier = card.amplifier;
+  MonotonicClock clock;
+  const auto rig = make_rig(file, {control.period_s()});
+  const Counted counted = count_on(*rig, file, control, clock, 1.0, [] {});
   EXPECT_EQ(counted.allocations, 0);
   EXPECT_EQ(counted.locks, 0);
 }

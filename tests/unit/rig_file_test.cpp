@@ -39,9 +39,15 @@ std::string changed(const std::string& from, const std::string& to, const char* 
   return text.replace(at, from.size(), to);
 }
 
+struct Malformed {
+  const char* from;
+  const char* to;
+  const char* says;  // a part of the sentence
+};
+
 TEST(RigFile, ShippedFilesRead) {
   const RigFile simulated = read_rig_file(rigs / "simulated.yaml");
-  EXPECT_EQ(simulated.encoders, Backend::simulated);
+  EXPECT_EQ(simulated.cart_encoder, Backend::simulated);
   EXPECT_TRUE(std::filesystem::exists(simulated.simulated->plant));
   const RigFile tcp = read_rig_file(rigs / "modbus-tcp.yaml");
   EXPECT_EQ(tcp.modbus->host, "127.0.0.1");
@@ -49,12 +55,161 @@ TEST(RigFile, ShippedFilesRead) {
   const RigFile rtu = read_rig_file(rigs / "modbus-rtu.yaml");
   EXPECT_EQ(rtu.modbus->baud, 921600);
   EXPECT_DOUBLE_EQ(rtu.calibration.cart.per_count, 2.27485e-5);
+  const RigFile multiq3 = read_rig_file(rigs / "comedi-multiq3.yaml");
+  EXPECT_TRUE(roles_of(multiq3, Backend::comedi).all());
+  EXPECT_EQ(multiq3.comedi->pendulum->channel, 1);
+  EXPECT_EQ(multiq3.comedi->output->device, "/dev/comedi0");
+  EXPECT_EQ(multiq3.comedi->output->amplifier_gain, 3.0);
+  const RigFile joined = read_rig_file(rigs / "comedi-and-modbus.yaml");
+  EXPECT_EQ(backends_text(joined), "encoders comedi, output modbus-tcp");
+  EXPECT_EQ(joined.comedi->cart->lines->b, 10);
+  EXPECT_FALSE(joined.comedi->output);
+  const RigFile lines = read_rig_file(rigs / "gpio-and-modbus.yaml");
+  EXPECT_EQ(lines.gpio->emergency_stop->line, 4);
+  EXPECT_EQ(lines.gpio->limit_switches.at(1).end, TrackEnd::minus_x);
+  EXPECT_EQ(lines.gpio->pendulum_encoder->bias, LineBias::pull_up);
 }
 
 TEST(RigFile, WrittenTextReadsBackExactly) {
-  for (const char* name : {"simulated.yaml", "modbus-tcp.yaml", "modbus-rtu.yaml"}) {
+  for (const char* name : {"simulated.yaml", "modbus-tcp.yaml", "modbus-rtu.yaml", "comedi-multiq3.yaml",
+                           "comedi-and-modbus.yaml", "gpio-and-modbus.yaml"}) {
     const std::string text = rig_text(read_rig_file(rigs / name));
     EXPECT_EQ(rig_text(read_rig(YamlMap::from_text(text, "again.yaml"))), text);
+  }
+}
+
+/// A rig file of parts: the Comedi rig's, with another line for the backends and other wiring.
+std::string of_parts(const std::string& backend, const std::string& wiring) {
+  const std::string text = text_of(rigs / "comedi-multiq3.yaml");
+  const std::size_t calibration = text.find("calibration:");
+  return "backend: " + backend + "\n" + text.substr(calibration, text.find("comedi:") - calibration) + wiring;
+}
+
+const std::string potentiometer =
+    "comedi:\n"
+    "  pendulum: {kind: analog_input, device: \"/dev/comedi1\", subdevice: 0, channel: 2, range_v: [-5, 5],\n"
+    "             reference: difference, counts_per_v: 1000}\n";
+const std::string modbus_counters =
+    "modbus: {host: 10.0.0.1, port: 502, unit: 1, response_timeout_s: 0.001, exchange: separate,\n"
+    "         counters: {table: input, cart_address: 7, registers: 2, word_order: low_first}}\n";
+const std::string modbus_output =
+    "modbus: {host: 10.0.0.1, port: 502, unit: 1, response_timeout_s: 0.001, exchange: read_write,\n"
+    "         voltage: {address: 3, encoding: int16, counts_per_v: 1000}, enable_address: 9}\n";
+const std::string gpio_pendulum =
+    "gpio: {chip: gpiochip0, pendulum_encoder: {a: 1, b: 2, fastest_edges_per_s: 5000}}\n";
+const std::string output_and_cart =
+    "comedi:\n"
+    "  device: /dev/comedi0\n"
+    "  cart: {kind: plain_counter, subdevice: 3, channel: 1}\n"
+    "  output: {subdevice: 1, channel: 0, range_v: [-10, 10], amplifier_gain: 1}\n";
+
+TEST(RigFile, RigsOfPartsReadBackExactly) {
+  for (const std::string& file :
+       {of_parts("{cart_encoder: modbus-tcp, pendulum_encoder: comedi, output: comedi}",
+                 potentiometer +
+                     "  output: {device: /dev/comedi0, subdevice: 1, channel: 0, range_v: [-10, 10], "
+                     "amplifier_gain: 1}\n" +
+                     modbus_counters),
+        of_parts("{cart_encoder: comedi, pendulum_encoder: gpio, output: modbus-tcp}",
+                 "comedi: {device: /dev/comedi0, cart: {kind: plain_counter, subdevice: 3, channel: 1}}\n" +
+                     modbus_output + gpio_pendulum),
+        of_parts("{cart_encoder: comedi, pendulum_encoder: modbus-tcp, output: comedi}",
+                 output_and_cart + "modbus: {host: 10.0.0.1, port: 502, unit: 1, response_timeout_s: 0.001, "
+                                   "exchange: separate, counters: {table: holding, pendulum_address: 1, "
+                                   "registers: 2, word_order: high_first}, boot_count_address: 0}\n")}) {
+    const std::string text = rig_text(read_rig(YamlMap::from_text(file, "rig.yaml")));
+    EXPECT_EQ(rig_text(read_rig(YamlMap::from_text(text, "again.yaml"))), text);
+  }
+}
+
+TEST(RigFile, APotentiometerHasWhatItNeeds) {
+  const RigFile rig = read_rig(YamlMap::from_text(
+      of_parts("{cart_encoder: modbus-tcp, pendulum_encoder: comedi, output: modbus-tcp}",
+               potentiometer +
+                   "modbus: {host: 10.0.0.1, port: 502, unit: 1, response_timeout_s: 0.001, exchange: "
+                   "separate, counters: {table: holding, cart_address: 0, registers: 2, word_order: "
+                   "high_first}, voltage: {address: 16, encoding: int16, counts_per_v: 1000}}\n"),
+      "rig.yaml"));
+  ASSERT_TRUE(rig.comedi->pendulum);
+  EXPECT_FALSE(rig.comedi->cart);
+  EXPECT_EQ(rig.comedi->pendulum->device, "/dev/comedi1");
+  EXPECT_EQ(rig.comedi->pendulum->kind, ComediEncoderKind::analog_input);
+  EXPECT_EQ(rig.comedi->pendulum->reference, ComediReference::difference);
+  EXPECT_EQ(rig.comedi->pendulum->range.low_v, -5.0);
+  EXPECT_EQ(rig.comedi->pendulum->counts_per_v, 1000.0);
+}
+
+TEST(RigFile, RefusesPartsThatDoNotFit) {
+  const std::string good = "{cart_encoder: comedi, pendulum_encoder: gpio, output: comedi}";
+  struct Case {
+    std::string backend, wiring;
+    const char* says;
+  };
+  const Case cases[] = {
+      {"{encoders: simulated, output: comedi}", output_and_cart, "use simulated for all of it or for none"},
+      {"{cart_encoder: simulated, pendulum_encoder: simulated, output: comedi}", output_and_cart, "for none"},
+      {"{cart_encoder: comedi, output: comedi}", output_and_cart, "add pendulum_encoder"},
+      {"{encoders: comedi, cart_encoder: comedi, pendulum_encoder: gpio, output: comedi}", output_and_cart,
+       "encoders"},
+      {"{cart_encoder: comedi, pendulum_encoder: gpoi, output: comedi}", output_and_cart,
+       "did you mean gpio"},
+      {"comedi", output_and_cart, "add pendulum"},
+      {"{cart_encoder: gpio, pendulum_encoder: gpio, output: comedi}", output_and_cart, "cart"},
+      {"{encoders: gpio, output: modbus-tcp}",
+       modbus_output.substr(0, modbus_output.rfind('}')) + ", counters: {table: holding}}\n",
+       "modbus.counters is not a known key"},
+      {"{encoders: modbus-tcp, output: gpio}", modbus_output, "add counters"},
+      {"{cart_encoder: modbus-tcp, pendulum_encoder: gpio, output: gpio}",
+       modbus_counters.substr(0, modbus_counters.rfind('}')) + ", enable_address: 1}\n", "enable_address"},
+      {good, "", "add comedi"},
+  };
+  for (const Case& item : cases) {
+    const std::string sentence = refusal(of_parts(item.backend, item.wiring));
+    EXPECT_NE(sentence.find(item.says), std::string::npos) << item.backend << " -> " << sentence;
+    EXPECT_NE(sentence.find("rig.yaml:"), std::string::npos) << sentence;
+  }
+  EXPECT_EQ(refusal(of_parts(good, output_and_cart + gpio_pendulum)), "");
+}
+
+TEST(RigFile, RefusesWhatComediCannotMean) {
+  const std::string backend = "{cart_encoder: comedi, pendulum_encoder: comedi, output: comedi}";
+  const std::string wiring = output_and_cart + potentiometer.substr(potentiometer.find('\n') + 1);
+  ASSERT_EQ(refusal(of_parts(backend, wiring)), "");
+  const Malformed cases[] = {
+      {"kind: plain_counter", "kind: counters", "did you mean counter"},
+      {"kind: plain_counter, ", "", "add kind"},
+      {"subdevice: 3", "subdevice: -1", "subdevice"},
+      {"subdevice: 3, ", "", "add subdevice"},
+      {"channel: 1}", "chanel: 1}", "add channel"},
+      {"device: /dev/comedi0\n", "\n", "add device: /dev/comedi0"},
+      {"plain_counter, subdevice: 3, channel: 1",
+       "plain_counter, subdevice: 3, channel: 1, lines: {a: 1, b: 2}", "lines"},
+      {"plain_counter, subdevice: 3, channel: 1", "counter, subdevice: 3, channel: 1, lines: {a: 1, b: 1}",
+       "give A and B a line each"},
+      {"plain_counter, subdevice: 3, channel: 1", "counter, subdevice: 3, channel: 1, lines: {a: 1, b: 16}",
+       "0 to 15"},
+      {"plain_counter, subdevice: 3, channel: 1",
+       "plain_counter, device: /dev/comedi1, subdevice: 0, channel: 2", "its own channel"},
+      {"range_v: [-10, 10]", "range_v: [10, -10]", "lower and the upper end"},
+      {"range_v: [-10, 10]", "range_v: 10", "range_v"},
+      {"range_v: [-10, 10]", "range_v: [0, 10]", "range of both signs"},
+      {"range_v: [-10, 10]", "range_v: [-10, .inf]", "range_v"},
+      {"range_v: [-10, 10]", "range_v: [-5, 10]", "amplifier.limit_v at most 5"},
+      {"amplifier_gain: 1", "amplifier_gain: 0", "amplifier_gain"},
+      {"amplifier_gain: 1", "gain: 1", "add amplifier_gain"},
+      {"reference: difference", "reference: differential", "reference"},
+      {"counts_per_v: 1000", "counts_per_v: .nan", "counts_per_v"},
+      {"counts_per_v: 1000", "counts_per_v: 2e6", "counts_per_v at most 1677721"},
+      {"counts_per_v: 1000", "counts_per_v: 1000, counts: 3", "remove it"},
+  };
+  for (const Malformed& item : cases) {
+    std::string text = wiring;
+    const std::size_t at = text.find(item.from);
+    ASSERT_NE(at, std::string::npos) << item.from;
+    text.replace(at, std::string(item.from).size(), item.to);
+    const std::string sentence = refusal(of_parts(backend, text));
+    EXPECT_NE(sentence.find(item.says), std::string::npos) << item.to << " -> " << sentence;
+    EXPECT_NE(sentence.find("rig.yaml:"), std::string::npos) << sentence;
   }
 }
 
@@ -89,12 +244,6 @@ TEST(RigFile, RandomRigsReadBackExactly) {
     EXPECT_EQ(again.calibration.cart.per_count, rig.calibration.cart.per_count);
   }
 }
-
-struct Malformed {
-  const char* from;
-  const char* to;
-  const char* says;  // a part of the sentence
-};
 
 TEST(RigFile, RefusesWhatCannotBeMeant) {
   const Malformed cases[] = {
@@ -165,6 +314,71 @@ TEST(RigFile, RefusesWhatCannotBeMeant) {
   EXPECT_NE(refusal(changed("parity: none", "parity: mark", "modbus-rtu.yaml")).find("parity"),
             std::string::npos);
   EXPECT_NE(refusal(changed("unit: 1", "unit: 0", "modbus-rtu.yaml")).find("unit"), std::string::npos);
+}
+
+TEST(RigFile, RandomLinesReadBackExactly) {
+  std::mt19937 random(8);
+  const auto whole = [&](int low, int high) { return std::uniform_int_distribution<>(low, high)(random); };
+  const auto coin = [&] { return whole(0, 1) == 1; };
+  int line = 0;
+  const auto input = [&] { return DigitalLine{line++, coin(), static_cast<LineBias>(whole(0, 2))}; };
+  for (int i = 0; i < 200; ++i) {
+    RigFile rig = read_rig_file(rigs / "gpio-and-modbus.yaml");
+    line = whole(0, 50);
+    GpioRig gpio;
+    gpio.chip = coin() ? "/dev/gpiochip1" : "a \"label\"";
+    if (coin()) gpio.emergency_stop = input();
+    for (int k = whole(0, 8); k > 0; --k)
+      gpio.limit_switches.push_back({static_cast<TrackEnd>(whole(0, 1)), input()});
+    if (coin()) gpio.amplifier_enable = DigitalLine{line++, coin(), LineBias::as_is};
+    if (coin()) gpio.heartbeat = line++;
+    gpio.pendulum_encoder = LineEncoder{line, line + 1, static_cast<LineBias>(whole(0, 2)),
+                                        std::uniform_real_distribution<>(100.0, 20000.0)(random)};
+    rig.gpio = gpio;
+    const std::string text = rig_text(rig);
+    const RigFile again = read_rig(YamlMap::from_text(text, "again.yaml"));
+    EXPECT_EQ(rig_text(again), text);
+    EXPECT_EQ(again.gpio->limit_switches.size(), gpio.limit_switches.size());
+    EXPECT_EQ(again.gpio->pendulum_encoder->fastest_edges_per_s, gpio.pendulum_encoder->fastest_edges_per_s);
+  }
+}
+
+TEST(RigFile, RefusesLinesThatCannotBeMeant) {
+  const Malformed cases[] = {
+      {"chip: gpiochip0", "chip: \"\"", "give chip a text"},
+      {"  chip: gpiochip0", "  chipp: gpiochip0", "did you mean chip"},
+      {"line: 4", "line: -1", "line"},
+      {"line: 4", "line: 5", "each its own line"},
+      {"a: 22", "a: 23", "each its own line"},
+      {"a: 22", "a: 18", "each its own line"},
+      {"line: 4, active: high", "line: 4", "add active"},
+      {"line: 4, active: high", "line: 4, active: closed", "one of"},
+      {"active: high, bias: pull_up", "active: high, bias: up", "pull_up"},
+      {"line: 17, active: high", "line: 17, active: high, bias: pull_up", "remove it"},
+      {"heartbeat: {line: 18}", "heartbeat: {line: 18, active: high}", "remove it"},
+      {"end: plus_x", "end: left", "plus_x"},
+      {"end: plus_x, ", "", "add end"},
+      {"fastest_edges_per_s: 8000.0", "fastest_edges_per_s: 0", "fastest_edges_per_s"},
+      {"fastest_edges_per_s: 8000.0", "fastest_edges_per_s: 44000", "20000"},
+      {"  pendulum_encoder: {a: 22, b: 23, bias: pull_up, fastest_edges_per_s: 8000.0}\n", "",
+       "add pendulum_encoder"},
+      {"  pendulum_encoder: {a", "  cart_encoder: {a", "remove cart_encoder"},
+      {"pendulum_encoder: gpio", "pendulum_encoder: modbus-tcp", "pendulum_address"},
+      {"gpio:\n", "gpoi:\n", "gpio"},
+  };
+  for (const Malformed& item : cases) {
+    const std::string sentence = refusal(changed(item.from, item.to, "gpio-and-modbus.yaml"));
+    EXPECT_NE(sentence.find(item.says), std::string::npos) << item.to << " -> " << sentence;
+    EXPECT_NE(sentence.find("rig.yaml:"), std::string::npos) << sentence;
+  }
+  const std::string none = text_of(rigs / "simulated.yaml") + "gpio: {chip: gpiochip0}\n";
+  EXPECT_NE(refusal(none).find("name a line"), std::string::npos) << refusal(none);
+  const std::string unused =
+      text_of(rigs / "simulated.yaml") +
+      "gpio: {chip: gpiochip0, pendulum_encoder: {a: 1, b: 2, fastest_edges_per_s: 5000}}\n";
+  EXPECT_NE(refusal(unused).find("remove pendulum_encoder"), std::string::npos) << refusal(unused);
+  const std::string alone = of_parts("gpio", gpio_pendulum);
+  EXPECT_NE(refusal(alone).find("another backend as output"), std::string::npos) << refusal(alone);
 }
 
 TEST(RigFile, WithoutQuantisationCountsAreFiner) {

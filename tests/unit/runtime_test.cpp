@@ -354,6 +354,22 @@ struct Trouble {
   std::function<void(TamperedRig&, Clock&)> tamper;
 };
 
+TEST(Session, ARigsFaultIsNamedWithItsOwnRemedy) {
+  LoopOutcome outcome;
+  const auto says = [&](StopReason reason, RigFault fault, const char* words) {
+    outcome.reason = reason;
+    outcome.fault = fault;
+    const std::string sentence = sentence_of(outcome, {});
+    EXPECT_NE(sentence.find(words), std::string::npos) << sentence;
+  };
+  says(StopReason::track_limit, RigFault::limit_switch_plus, "the limit switch at the +x end");
+  says(StopReason::track_limit, RigFault::limit_switch_minus, "the limit switch at the -x end");
+  says(StopReason::rig_fault, RigFault::line_failed, "check the GPIO chip");
+  says(StopReason::rig_fault, RigFault::edges_lost, "edges of an encoder were lost");
+  says(StopReason::rig_fault, RigFault::edges_too_fast, "turn more slowly");
+  says(StopReason::rig_fault, RigFault::device_restarted, "reset the device");
+}
+
 TEST(Session, EveryTroubleEndsInZeroVoltsWithItsReasonAndItsCycle) {
   constexpr int bad = 300;
   const auto always = [](RigStatus status, RigFault fault) {
@@ -373,6 +389,11 @@ TEST(Session, EveryTroubleEndsInZeroVoltsWithItsReasonAndItsCycle) {
       {"restarted", StopReason::rig_fault, always(RigStatus::fault, RigFault::device_restarted)},
       {"e-stop", StopReason::emergency_stop, always(RigStatus::fault, RigFault::emergency_stop)},
       {"limit switch", StopReason::track_limit, always(RigStatus::fault, RigFault::limit_switch)},
+      {"limit switch at +x", StopReason::track_limit, always(RigStatus::fault, RigFault::limit_switch_plus)},
+      {"limit switch at -x", StopReason::track_limit, always(RigStatus::fault, RigFault::limit_switch_minus)},
+      {"line", StopReason::rig_fault, always(RigStatus::fault, RigFault::line_failed)},
+      {"edges lost", StopReason::rig_fault, always(RigStatus::fault, RigFault::edges_lost)},
+      {"edges too fast", StopReason::rig_fault, always(RigStatus::fault, RigFault::edges_too_fast)},
       {"track", StopReason::track_limit,
        [](TamperedRig& rig, Clock&) {
          rig.on_read = [](int i, RigReading& reading) {

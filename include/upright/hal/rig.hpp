@@ -26,7 +26,26 @@ enum class RigFault : std::uint8_t {
   out_of_range,      ///< counts or volts outside what the hardware can mean
   emergency_stop,
   limit_switch,
+  limit_switch_plus,   ///< the one at the track's +x end
+  limit_switch_minus,  ///< the one at its -x end
+  line_failed,         ///< a digital line could not be read or set
+  edges_lost,          ///< an encoder's edges passed unseen: its counts are wrong from here on
+  edges_too_fast,      ///< an encoder's edges came faster than they may, so that some could be lost
 };
+
+constexpr bool is_emergency_stop(RigFault fault) noexcept {
+  return fault == RigFault::emergency_stop;
+}
+
+constexpr bool is_limit_switch(RigFault fault) noexcept {
+  return fault == RigFault::limit_switch || fault == RigFault::limit_switch_plus ||
+         fault == RigFault::limit_switch_minus;
+}
+
+/// Somebody, or the cart, stopped the rig through one of its inputs: nothing is wrong with its link.
+constexpr bool is_safety_input(RigFault fault) noexcept {
+  return is_emergency_stop(fault) || is_limit_switch(fault);
+}
 
 /// One exchange with the encoders. Counts are the device's own, `width` bits wide, not unwrapped.
 struct RigReading {
@@ -36,6 +55,13 @@ struct RigReading {
   std::uint64_t sequence = 0;  ///< grows with each fresh reading
   RigStatus status = RigStatus::fault;
   RigFault fault = RigFault::none;
+};
+
+/// Which digital inputs a rig has that stop the motor. While one is active every reading is a fault that
+/// names it.
+struct SafetyInputs {
+  bool emergency_stop = false;
+  int limit_switches = 0;
 };
 
 /// A rig as the loop sees it. `open` may throw Error and take its time; everything else is called from the
@@ -53,6 +79,8 @@ class Rig {
   /// Zero volts and output disabled, by every means the backend has. May be called again and from a signal's
   /// aftermath.
   virtual void stop() noexcept = 0;
+  /// What is wired, of an open rig. A rig around another one passes on that one's.
+  virtual SafetyInputs safety_inputs() const noexcept { return {}; }
 };
 
 }  // namespace upright

@@ -8,6 +8,8 @@
 #include <string>
 
 #include "upright/hal/calibration.hpp"
+#include "upright/hal/comedi_wiring.hpp"
+#include "upright/hal/gpio.hpp"
 #include "upright/hal/modbus_registers.hpp"
 #include "upright/model/yaml_reader.hpp"
 
@@ -17,6 +19,17 @@ enum class Backend : std::uint8_t { simulated, modbus_tcp, modbus_rtu, gpio, com
 
 /// "simulated", "modbus-tcp", ...
 std::string backend_name(Backend backend);
+
+/// What a backend does for a rig.
+struct RigRoles {
+  bool cart = false;      ///< counts the cart's encoder
+  bool pendulum = false;  ///< counts the pendulum's encoder
+  bool output = false;    ///< puts out the voltage
+
+  bool encoders() const noexcept { return cart || pendulum; }
+  bool any() const noexcept { return encoders() || output; }
+  bool all() const noexcept { return cart && pendulum && output; }
+};
 
 struct Amplifier {
   double limit_v = 0.0;  ///< symmetric; commands are clamped to it
@@ -62,6 +75,8 @@ struct ModbusRig {
   int unit = 1;
   double response_timeout_s = 0.0;  ///< per exchange; the factory checks it against the period
   ModbusExchange exchange = ModbusExchange::read_write;
+  // What follows is in the file as far as the device is used: no counters where only the voltage is Modbus,
+  // no voltage where only the encoders are and `exchange` does not need one.
   bool input_registers = false;  ///< counters are input registers (0x04)
   int cart_address = 0;
   int pendulum_address = 0;
@@ -75,8 +90,10 @@ struct ModbusRig {
 
 struct RigFile {
   std::filesystem::path file;
-  Backend encoders = Backend::simulated;  ///< where the counts come from
-  Backend output = Backend::simulated;    ///< where the voltage goes: the same, or another
+  // Where the counts come from and where the voltage goes. Simulated is all of them or none.
+  Backend cart_encoder = Backend::simulated;
+  Backend pendulum_encoder = Backend::simulated;
+  Backend output = Backend::simulated;
   Calibration calibration;
   Amplifier amplifier;
   double track_limit_m = 0.0;  ///< the loop stops where |x| reaches it
@@ -87,11 +104,18 @@ struct RigFile {
   double watchdog_s = 0.0;      ///< the motor is at zero volts this long after the last good exchange
   std::optional<SimulatedRig> simulated;
   std::optional<ModbusRig> modbus;
+  std::optional<ComediRig> comedi;
+  std::optional<GpioRig> gpio;
 };
 
 /// Reads a rig file. Throws ConfigError with remedy, file, line and key.
 RigFile read_rig_file(const std::filesystem::path& file);
 RigFile read_rig(const YamlMap& document);
+
+RigRoles roles_of(const RigFile& rig, Backend backend);
+bool is_simulated(const RigFile& rig);
+/// For people: "modbus-tcp", or "encoders comedi, output modbus-tcp", ...
+std::string backends_text(const RigFile& rig);
 
 /// The calibration the counts of a reading follow. It is the file's, except for a simulated rig without
 /// quantisation: its encoders count 1024 times as finely, in 32 bits.

@@ -1,0 +1,18 @@
+// Section `comedi` of a rig file, read and written.
+#pragma once
+
+#include <string>
+
+#include "upright/hal/comedi_wiring.hpp"
+#include "upright/hal/rig_file.hpp"
+#include "upright/model/yaml_reader.hpp"
+
+namespace upright {
+
+/// `rig` has been read as far as backends, calibration and amplifier. What the device offers is checked when
+/// it is opened. Throws ConfigError.
+ComediRig read_comedi(const YamlMap& map, const RigFile& rig);
+
+std::string comedi_text(const ComediRig& rig);
+
+}  // namespace upright

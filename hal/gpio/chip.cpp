@@ -1,0 +1,53 @@
+#include "chip.hpp"
+
+#include <cerrno>
+#include <cstring>
+
+#include "upright/model/error.hpp"
+
+namespace upright {
+
+GpioChip::GpioChip(const std::string& chip, const std::string& file)
+    : file_(file), chip_(gpiod_chip_open_lookup(chip.c_str())) {
+  if (!chip_)
+    throw DeviceError("check gpio.chip in " + file +
+                      " against the output of gpiodetect, and who may open it: " + chip +
+                      " cannot be opened (" + std::strerror(errno) + ")");
+}
+
+std::string GpioChip::path() const {
+  return std::string("/dev/") + gpiod_chip_name(chip_.get());
+}
+
+gpiod_line* GpioChip::line(int number, const std::string& use) const {
+  const unsigned lines = gpiod_chip_num_lines(chip_.get());
+  if (static_cast<unsigned>(number) >= lines)
+    throw DeviceError("give gpio." + use + " in " + file_ + " a line below " + std::to_string(lines) + ": " +
+                      path() + " has no line " + std::to_string(number));
+  gpiod_line* line = gpiod_chip_get_line(chip_.get(), static_cast<unsigned>(number));
+  if (line == nullptr) refuse(number, use);
+  return line;
+}
+
+void GpioChip::refuse(int number, const std::string& use) const {
+  const int problem = errno;
+  const std::string line =
+      "line " + std::to_string(number) + " of " + path() + " (gpio." + use + " in " + file_ + ")";
+  if (problem == EBUSY) throw DeviceError("end the other program first: " + line + " is in use");
+  throw DeviceError("check that the chip can do what gpio." + use + " asks of it, a bias included: " + line +
+                    " cannot be had (" + std::strerror(problem) + ")");
+}
+
+int bias_flag(LineBias bias) noexcept {
+  switch (bias) {
+    case LineBias::pull_up:
+      return GPIOD_LINE_REQUEST_FLAG_BIAS_PULL_UP;
+    case LineBias::pull_down:
+      return GPIOD_LINE_REQUEST_FLAG_BIAS_PULL_DOWN;
+    case LineBias::as_is:
+      break;
+  }
+  return 0;
+}
+
+}  // namespace upright

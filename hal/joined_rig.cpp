@@ -1,0 +1,104 @@
+#include "joined_rig.hpp"
+
+#include <algorithm>
+#include <cstdlib>
+#include <utility>
+
+namespace upright {
+
+namespace {
+
+constexpr double most_skew_periods = 0.5;
+
+bool of_link(RigFault fault) noexcept {
+  return fault == RigFault::link_timeout || fault == RigFault::link_lost || fault == RigFault::corrupt_reply;
+}
+
+struct Part {
+  std::unique_ptr<Rig> rig;
+  RigRoles roles;
+  std::uint64_t sequence = 0;  // of its last fresh reading
+};
+
+class JoinedRig final : public Rig {
+ public:
+  JoinedRig(std::vector<RigPart> parts, double period_s)
+      : most_skew_ns_(static_cast<std::int64_t>(1e9 * most_skew_periods * period_s)) {
+    std::stable_partition(parts.begin(), parts.end(), [](const RigPart& part) { return part.roles.output; });
+    for (RigPart& part : parts) parts_.push_back({std::move(part.rig), part.roles, 0});
+  }
+
+  void open() override {
+    try {
+      for (Part& part : parts_) {
+        part.rig->open();
+        part.sequence = 0;
+      }
+    } catch (...) {
+      stop();
+      throw;
+    }
+    sequence_ = 0;
+  }
+
+  RigReading read() noexcept override {
+    RigReading reading;
+    reading.status = RigStatus::fresh;
+    std::int64_t cart_ns = 0, pendulum_ns = 0;
+    for (Part& part : parts_) {
+      const RigReading of_part = read_part(part);
+      worsen(reading, of_part.status, of_part.fault);
+      if (part.roles.cart) {
+        reading.cart_counts = of_part.cart_counts;
+        cart_ns = of_part.time_ns;
+      }
+      if (part.roles.pendulum) {
+        reading.pendulum_counts = of_part.pendulum_counts;
+        pendulum_ns = of_part.time_ns;
+      }
+    }
+    reading.time_ns = std::min(cart_ns, pendulum_ns);
+    if (std::abs(cart_ns - pendulum_ns) > most_skew_ns_)
+      worsen(reading, RigStatus::stale, RigFault::link_timeout);
+    if (reading.status == RigStatus::fresh) reading.sequence = ++sequence_;
+    return reading;
+  }
+
+  RigFault write(double voltage_v) noexcept override { return parts_.front().rig->write(voltage_v); }
+
+  void stop() noexcept override {
+    for (const Part& part : parts_) part.rig->stop();
+  }
+
+ private:
+  static RigReading read_part(Part& part) noexcept {
+    RigReading reading = part.rig->read();
+    if (reading.status != RigStatus::fresh) return reading;
+    if (reading.sequence == part.sequence) {
+      reading.status = RigStatus::stale;
+      reading.fault = RigFault::link_timeout;
+    }
+    part.sequence = reading.sequence;
+    return reading;
+  }
+
+  /// Keeps the worse of two. Of two faults a link's, which may pass, gives way to one that does not.
+  static void worsen(RigReading& reading, RigStatus status, RigFault fault) noexcept {
+    const bool graver = status == RigStatus::fault && of_link(reading.fault) && !of_link(fault);
+    if (status < reading.status || (status == reading.status && !graver)) return;
+    reading.status = status;
+    reading.fault = fault;
+  }
+
+  std::vector<Part> parts_;  // the output's first
+  std::int64_t most_skew_ns_;
+  std::uint64_t sequence_ = 0;
+};
+
+}  // namespace
+
+std::unique_ptr<Rig> joined(std::vector<RigPart> parts, double period_s) {
+  return std::make_unique<JoinedRig>(std::move(parts), period_s);
+}
+
+}  // namespace upright

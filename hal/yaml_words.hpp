@@ -1,0 +1,27 @@
+// Enumerations as words, as the sections of a rig file have them.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <string>
+
+#include "upright/model/yaml_reader.hpp"
+
+namespace upright {
+
+/// The words of an enumeration, in its order.
+template <std::size_t N>
+using Words = std::array<const char*, N>;
+
+template <class Enum, std::size_t N>
+Enum choose(const YamlMap& map, const std::string& key, const Words<N>& words) {
+  const std::string word = map.choice(key, {words.begin(), words.end()});
+  return static_cast<Enum>(std::find(words.begin(), words.end(), word) - words.begin());
+}
+
+template <class Enum, std::size_t N>
+std::string word_of(Enum value, const Words<N>& words) {
+  return words[static_cast<std::size_t>(value)];
+}
+
+}  // namespace upright
