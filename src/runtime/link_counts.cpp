@@ -23,11 +23,6 @@ LinkTrouble trouble_of(const RigReading& reading) noexcept {
   }
 }
 
-/// Somebody stopped the rig: nothing is wrong with its link.
-bool is_safety_input(RigFault fault) noexcept {
-  return fault == RigFault::emergency_stop || fault == RigFault::limit_switch;
-}
-
 std::string counted(std::uint64_t count, const char* one, const char* several) {
   return std::to_string(count) + " " + (count == 1 ? one : several);
 }

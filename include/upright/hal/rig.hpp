@@ -28,6 +28,19 @@ enum class RigFault : std::uint8_t {
   limit_switch,
 };
 
+constexpr bool is_emergency_stop(RigFault fault) noexcept {
+  return fault == RigFault::emergency_stop;
+}
+
+constexpr bool is_limit_switch(RigFault fault) noexcept {
+  return fault == RigFault::limit_switch;
+}
+
+/// Somebody, or the cart, stopped the rig through one of its inputs: nothing is wrong with its link.
+constexpr bool is_safety_input(RigFault fault) noexcept {
+  return is_emergency_stop(fault) || is_limit_switch(fault);
+}
+
 /// One exchange with the encoders. Counts are the device's own, `width` bits wide, not unwrapped.
 struct RigReading {
   std::int64_t cart_counts = 0;
@@ -38,6 +51,13 @@ struct RigReading {
   std::uint32_t recoveries = 0;
   RigStatus status = RigStatus::fault;
   RigFault fault = RigFault::none;
+};
+
+/// Which digital inputs a rig has that stop the motor. While one is active every reading is a fault that
+/// names it.
+struct SafetyInputs {
+  bool emergency_stop = false;
+  int limit_switches = 0;
 };
 
 /// A rig as the loop sees it. `open` may throw Error and take its time; everything else is called from the
@@ -55,6 +75,8 @@ class Rig {
   /// Zero volts and output disabled, by every means the backend has. May be called again and from a signal's
   /// aftermath.
   virtual void stop() noexcept = 0;
+  /// What is wired, of an open rig. A rig around another one passes on that one's.
+  virtual SafetyInputs safety_inputs() const noexcept { return {}; }
 };
 
 }  // namespace upright
