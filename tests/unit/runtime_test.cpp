@@ -188,6 +188,34 @@ TEST(ReadSamples, LeavesOutALastLineThatWasCutAndWhatAPowerCutLeaves) {
   EXPECT_THROW(read_samples(file), ConfigError);
 }
 
+/// More than fits into the reader's buffer at once.
+TEST(SampleReader, ReadsALongFileRowByRow) {
+  TemporaryFolder folder;
+  const fs::path file = folder.path() / "samples.csv";
+  constexpr std::uint64_t count = 60'000;
+  std::string text = std::string(sample_columns) + "\n";
+  for (std::uint64_t i = 0; i < count; ++i)
+    text += std::to_string(i) + ",0.001,1,2,0,0,0,0,1.5,1.25" + (i % 7 == 0 ? "" : "0000") + ",0,0,0,0,0,1\n";
+  const auto write = [&](const std::string& end) { std::ofstream(file, std::ios::binary) << text << end; };
+  const auto count_rows = [&](bool truncated) {
+    SampleReader reader(file);
+    std::uint64_t rows = 0;
+    for (LogRecord row; reader.next(row); ++rows)
+      if (row.tick != rows || row.voltage_v != 1.25) return std::uint64_t{0};
+    EXPECT_EQ(reader.truncated(), truncated);
+    return rows;
+  };
+  write("");
+  ASSERT_GT(fs::file_size(file), 2u << 20);
+  EXPECT_EQ(count_rows(false), count);
+  write("60000,0.0");
+  EXPECT_EQ(count_rows(true), count);
+  write(std::string(3 << 20, '\0'));
+  EXPECT_EQ(count_rows(true), count);
+  write(std::string(3 << 20, 'x') + "\n");
+  EXPECT_THROW(count_rows(true), ConfigError);
+}
+
 RigFile simulated_file(const std::string& plant = "exponential") {
   RigFile rig = read_rig_file(UPRIGHT_SOURCE_DIR "/config/rigs/simulated.yaml");
   rig.simulated->plant = UPRIGHT_SOURCE_DIR "/config/plants/" + plant + ".yaml";
