@@ -20,6 +20,7 @@ class GuardedRig final : public Rig {
   }
   RigFault write(double voltage_v) noexcept override { return rig_->write(voltage_v); }
   void stop() noexcept override { rig_->stop(); }
+  SafetyInputs safety_inputs() const noexcept override { return rig_->safety_inputs(); }
 
   RigReading read() noexcept override {
     RigReading reading = rig_->read();

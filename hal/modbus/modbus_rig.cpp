@@ -134,6 +134,7 @@ void ModbusTransport::open() {
   stop_served_ = enabled_ = restarted_ = false;
   verified_ = true;
   other_boots_in_a_row_ = 0;
+  recoveries_ = 0;
   pause_ns_ = first_pause_ns;
   next_attempt_ns_ = 0;
   thread_ = std::thread([this] { serve(); });
@@ -211,6 +212,7 @@ RigFault ModbusTransport::ready() noexcept {
   if (!verified_) {
     if (const RigFault fault = verify(); fault != RigFault::none) return fault;
     verified_ = true;
+    ++recoveries_;
   }
   pause_ns_ = first_pause_ns;
   return RigFault::none;
@@ -255,6 +257,7 @@ void ModbusTransport::serve_read(std::uint32_t number) noexcept {
       answer.status = RigStatus::fresh;
     }
   }
+  answer.recoveries = recoveries_;
   read_served_ = number;
   reading_ = answer;
   answered_.store(number, std::memory_order_release);

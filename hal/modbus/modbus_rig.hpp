@@ -74,6 +74,7 @@ class ModbusTransport final : public Rig {
   int boot_count_ = 0;
   int other_boots_in_a_row_ = 0;
   std::uint64_t sequence_ = 0;
+  std::uint32_t recoveries_ = 0;
   std::int64_t pause_ns_ = 0;
   std::int64_t next_attempt_ns_ = 0;
 };

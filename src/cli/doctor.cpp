@@ -15,6 +15,7 @@
 #include "upright/control/gain_file.hpp"
 #include "upright/hal/rig_factory.hpp"
 #include "upright/model/error.hpp"
+#include "upright/runtime/histogram_text.hpp"
 #include "upright/runtime/machine_check.hpp"
 #include "upright/runtime/rig_check.hpp"
 #include "upright/runtime/wake_probe.hpp"
@@ -65,18 +66,23 @@ void examine_timing(const Arguments& arguments, Page& page) {
   page.findings.push_back(judge_wake_ups("wake-ups, loaded", loaded.late, 1.0 / page.rate_hz));
 }
 
+void ask_operator(const std::string& words) {
+  std::fprintf(stderr, "upright: with the amplifier off, %s\n", words.c_str());
+}
+
 void examine_hand(const Arguments& arguments, const RigFile& file, Rig& rig, Clock& clock,
                   const SignalFlag& signal, Page& page) {
-  if (!arguments.by_hand) {
+  const SafetyInputs inputs = rig.safety_inputs();
+  if (arguments.by_hand) {
+    append(page.findings, examine_signs_by_hand(rig, clock, calibration_in_use(file), arguments.hand_s,
+                                                signal, ask_operator));
+    append(page.findings, examine_safety_inputs_by_hand(rig, clock, arguments.hand_s, signal, ask_operator));
+  } else {
     page.findings.push_back({"encoder signs", Health::not_examined, "nobody moved cart and pendulum",
                              "switch the amplifier off and run it with --by-hand"});
-    return;
+    append(page.findings, judge_safety_inputs(inputs, *page.link));
   }
-  append(page.findings, examine_signs_by_hand(rig, clock, calibration_in_use(file), arguments.hand_s, signal,
-                                              [](const std::string& words) {
-                                                std::fprintf(stderr, "upright: with the amplifier off, %s\n",
-                                                             words.c_str());
-                                              }));
+  append(page.findings, name_missing_inputs(inputs));
 }
 
 void examine_rig(const Arguments& arguments, const RigFile& file, Page& page) {
@@ -93,8 +99,6 @@ void examine_rig(const Arguments& arguments, const RigFile& file, Page& page) {
   page.findings.push_back(judge_link(*page.link, page.rate_hz));
   page.findings.push_back(judge_zero(page.link->counts, calibration_in_use(file)));
   examine_hand(arguments, file, *rig, clock, signal, page);
-  page.findings.push_back({"emergency stop, limit switches", Health::not_examined, "the rig file names none",
-                           "let the emergency stop cut the amplifier's supply: the program does not see it"});
   rig->stop();
 }
 
@@ -142,11 +146,21 @@ Json json_of(const Page& page, Health verdict) {
   return document;
 }
 
+void print_histograms(const Page& page) {
+  std::vector<NamedHistogram> histograms{{"late, idle", page.idle}, {"late, loaded", page.loaded}};
+  if (page.link) histograms.push_back({"link round trip", page.link->round_trip});
+  std::printf("\nWake-ups at %.4g Hz%s, how many took how long (bars: logarithm of the count)\n",
+              page.rate_hz, page.link ? " and round trips of the link" : "");
+  for (const std::string& line : histogram_lines(histograms)) std::printf("%s\n", line.c_str());
+  std::printf("\n");
+}
+
 void print(const Page& page, Health verdict) {
   for (const Finding& f : page.findings) {
     std::printf("%-13s %s: %s\n", name_of(f.health), f.subject.c_str(), f.what.c_str());
     if (!f.remedy.empty()) std::printf("              -> %s\n", f.remedy.c_str());
   }
+  print_histograms(page);
   std::printf("Verdict: %s.\n", sentence_for(verdict));
   std::fflush(stdout);
 }
@@ -184,7 +198,9 @@ void add_doctor(CLI::App& app, int& exit_code) {
   constexpr double longest_s = 3600.0;
   command->add_option("--seconds", a->seconds, "How long to measure each [s] (10)")
       ->check(number_in({0.0, longest_s, true}));
-  command->add_flag("--by-hand", a->by_hand, "Check the encoders' signs: asks you to move cart and pendulum");
+  command->add_flag(
+      "--by-hand", a->by_hand,
+      "Check encoders' signs, emergency stop and limit switches: asks you to move and press them");
   command->add_option("--hand-wait", a->hand_s, "How long to wait for each move [s] (30)")
       ->check(number_in({0.0, longest_s, true}));
   command->add_flag("--json", a->as_json, "One JSON document");

@@ -18,11 +18,11 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-Json json_of(const RunRecord& run, const ReplayResult& result) {
+Json json_of(const RunRecord& run, const ReplayResult& result, bool truncated) {
   Json document{{"run_directory", run.path.string()},
                 {"exact", !result.first_mismatch.has_value()},
                 {"rows", result.rows},
-                {"truncated", run.samples.truncated},
+                {"truncated", truncated},
                 {"first_mismatch", nullptr}};
   if (result.first_mismatch) {
     const ReplayMismatch& m = *result.first_mismatch;
@@ -35,7 +35,7 @@ Json json_of(const RunRecord& run, const ReplayResult& result) {
   return document;
 }
 
-void print(const RunRecord& run, const ReplayResult& result) {
+void print(const ReplayResult& result, bool truncated) {
   if (result.first_mismatch) {
     const ReplayMismatch& m = *result.first_mismatch;
     std::cout << "Differs first at tick " << m.tick << ": the log has " << exact_text(m.logged_v)
@@ -47,17 +47,19 @@ void print(const RunRecord& run, const ReplayResult& result) {
     return;
   }
   std::cout << "All " << result.rows << " voltages came out bit for bit.\n";
-  if (run.samples.truncated) std::cout << "The last line of the log was cut and left out.\n";
+  if (truncated) std::cout << "The last line of the log was cut and left out.\n";
 }
 
 ExitCode replay_run(const std::string& directory, bool as_json) {
-  const RunRecord run = read_run(directory);
+  const RunRecord run = read_run_without_samples(directory);
+  SampleReader rows(run.path / "samples.csv");
   const std::unique_ptr<CommandSource> script = script_of(run);
-  const ReplayResult result = replay(run, make_compensator(run.control), script.get());
+  const ReplayResult result = replay(run, rows, make_compensator(run.control), script.get());
   if (as_json)
-    std::cout << json_of(run, result).dump(2, ' ', false, Json::error_handler_t::replace) << "\n";
+    std::cout << json_of(run, result, rows.truncated()).dump(2, ' ', false, Json::error_handler_t::replace)
+              << "\n";
   else
-    print(run, result);
+    print(result, rows.truncated());
   return result.first_mismatch ? ExitCode::stopped : ExitCode::done;
 }
 

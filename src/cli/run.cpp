@@ -172,6 +172,15 @@ Json json_of(const std::optional<OverrunTolerance>& tolerance) {
           {"sentence", tolerance->sentence}};
 }
 
+Json json_of(const LinkCounts& link) {
+  Json document;
+  for (std::size_t i = 0; i < LinkCounts::kinds; ++i)
+    document[name_of(static_cast<LinkTrouble>(i))] = link.cycles[i];
+  document["longest"] = link.longest;
+  document["recoveries"] = link.recoveries;
+  return document;
+}
+
 Json json_of(const SessionResult& result, const LoopLimits& limits,
              const std::optional<OverrunTolerance>& tolerance) {
   const LoopOutcome& o = result.outcome;
@@ -200,6 +209,7 @@ Json json_of(const SessionResult& result, const LoopLimits& limits,
             {"saturated", c.saturated},
             {"writes_failed", c.writes_failed},
             {"page_faults", c.page_faults}}},
+          {"link", json_of(c.link)},
           {"timing",
            {{"wake_late", json_of(o.wake_late)},
             {"read", json_of(o.read)},
@@ -210,6 +220,14 @@ Json json_of(const SessionResult& result, const LoopLimits& limits,
           {"most_periods_late", limits.most_periods_late},
           {"scheduling", result.scheduling.note},
           {"elapsed_s", result.elapsed_s}};
+}
+
+void print_link(const LoopOutcome& o) {
+  std::string troubles = sentence_of(o.counts.link);
+  if (o.counts.writes_failed > 0)
+    troubles += (troubles.empty() ? "" : "; ") + std::to_string(o.counts.writes_failed) + " failed writes";
+  if (troubles.empty()) return;
+  std::printf("Link: %s%s.\n", o.reason == StopReason::duration ? "went on after " : "", troubles.c_str());
 }
 
 void print_summary(const SessionResult& result, const LoopLimits& limits, bool fast) {
@@ -237,10 +255,7 @@ void print_summary(const SessionResult& result, const LoopLimits& limits, bool f
     std::printf("Scheduling: %s; %llu page faults while it ran.\n", result.scheduling.note.c_str(),
                 static_cast<unsigned long long>(c.page_faults));
   }
-  if (c.stale + c.faults + c.writes_failed > 0)
-    std::printf("Link: %llu stale and %llu failed readings, %llu failed writes.\n",
-                static_cast<unsigned long long>(c.stale), static_cast<unsigned long long>(c.faults),
-                static_cast<unsigned long long>(c.writes_failed));
+  print_link(o);
   if (result.log.rows_dropped > 0)
     std::printf("Log: %llu rows were dropped, the disk was too slow.\n",
                 static_cast<unsigned long long>(result.log.rows_dropped));

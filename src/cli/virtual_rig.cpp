@@ -43,6 +43,16 @@ void take_address(const std::string& text, VirtualRigOptions& options) {
                       "' has none");
 }
 
+/// Modbus asks nobody who he is: whoever reaches the port moves the rig.
+void say_listening(const std::string& name, bool everybody) {
+  std::cout << "listening on " << name << std::endl;
+  if (everybody)
+    std::cerr
+        << "upright: give --tcp 127.0.0.1:PORT unless other machines are meant to drive this rig: whoever "
+           "reaches "
+        << name << " can" << std::endl;
+}
+
 Plant plant_for(const Flags& flags, const RigFile& rig) {
   if (!flags.plant.empty()) return read_plant_file(flags.plant);
   if (rig.simulated) return read_plant_file(rig.simulated->plant);
@@ -69,7 +79,8 @@ void serve(const Flags& flags) {
   options.faults = flags.faults;
   options.faults.late_s = flags.late_ms * 1e-3;
   options.faults.stick_cart = flags.stuck_encoder == "cart";
-  options.listening = [](const std::string& name) { std::cout << "listening on " << name << std::endl; };
+  const bool everybody = !options.tcp_host.empty() && options.tcp_host.rfind("127.", 0) != 0;
+  options.listening = [everybody](const std::string& name) { say_listening(name, everybody); };
   const Plant plant = plant_for(flags, rig);
   std::signal(SIGINT, stop_on_signal);
   std::signal(SIGTERM, stop_on_signal);
@@ -86,7 +97,9 @@ void add_virtual_rig(CLI::App& app, int& exit_code) {
       "prints 'listening on 127.0.0.1:1502' and serves until interrupted. The pendulum is held until the\n"
       "controller takes over. Faults are injected into replies from then on.");
   command->add_option("--rig", flags->rig, "Rig file with the register map")->required();
-  command->add_option("--tcp", flags->tcp, "HOST:PORT to listen on; port 0 takes a free one");
+  command->add_option(
+      "--tcp", flags->tcp,
+      "HOST:PORT to listen on; without HOST this machine only (127.0.0.1); port 0 takes a free one");
   command->add_option("--rtu", flags->rtu,
                       "Serial line; where nothing exists, a pseudo-terminal gets this name");
   CLI::Option* theta0 = command->add_option("--theta0-deg", flags->theta0_deg, "Initial angle, 0 upright")

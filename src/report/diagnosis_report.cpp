@@ -47,7 +47,10 @@ void add_answer(HtmlPage& page, const json& d) {
       {"no_discrepancy", {Tone::good, "No discrepancy: the model says what the data say"}},
       {"unexplained", {Tone::warning, "Unexplained: something is missing that no known effect accounts for"}},
       {"not_excited", {Tone::neutral, "Not excited: too little moves in these data to show anything"}}};
-  const auto& [tone, headline] = headlines.at(verdict);
+  const auto known = headlines.find(verdict);
+  if (known == headlines.end())
+    throw ConfigError("make the diagnosis anew: its diagnosis.json has a verdict that is none");
+  const auto& [tone, headline] = known->second;
   page.answer(
       tone, headline,
       "Gap on held-out data, in units of the noise: " + number_text(number(d.at("gap").at("before"))) +
@@ -214,6 +217,8 @@ std::string difference(const std::string& from, const std::string& to) {
     return lines;
   };
   const std::vector<std::string> a = lines_of(from), b = lines_of(to);
+  constexpr std::size_t most_pairs = 4'000'000;  // far more than plant files have
+  if (b.size() > 0 && a.size() > most_pairs / b.size()) return "too long to be compared\n";
   std::vector<std::vector<std::size_t>> common(a.size() + 1, std::vector<std::size_t>(b.size() + 1, 0));
   for (std::size_t i = a.size(); i-- > 0;)
     for (std::size_t j = b.size(); j-- > 0;)

@@ -97,7 +97,7 @@ double first_of(const std::vector<TrialResult>& trials, int repeat, bool fall) {
 
 void add_sweep(HtmlPage& page, const std::filesystem::path& folder, const Piece& piece,
                const std::vector<TrialResult>& trials) {
-  const RunRecord run = read_run(folder / trials.front().run_directory);
+  const RunRecord run = read_run_without_samples(folder / trials.front().run_directory);
   const Plant plant = read_plant_file(folder / "plan_plant.yaml");
   const std::vector<SweepRun> simulated = simulate(plant, run, trials, piece.duration_s);
   Plot plot;

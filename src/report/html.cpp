@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <fstream>
 #include <string_view>
+#include <system_error>
 
 #include "upright/model/error.hpp"
 
@@ -195,15 +195,19 @@ void HtmlPage::write(const std::filesystem::path& file) const {
   std::filesystem::path part = file;
   part += ".part";
   std::error_code problem;
-  {
-    std::ofstream out(part, std::ios::binary);
-    out << text();
-    out.close();
-    if (out) std::filesystem::rename(part, file, problem);
-    if (out && !problem) return;
+  // What stands there may be a link that came with somebody else's folder: a new file, never through it.
+  std::filesystem::remove(part, problem);
+  if (std::FILE* out = std::fopen(part.c_str(), "wbx"); out != nullptr) {
+    const std::string page = text();
+    const bool whole = std::fwrite(page.data(), 1, page.size(), out) == page.size();
+    if (std::fclose(out) == 0 && whole)
+      std::filesystem::rename(part, file, problem);
+    else
+      problem = std::make_error_code(std::errc::io_error);
+    if (!problem) return;
+    std::error_code ignored;
+    std::filesystem::remove(part, ignored);
   }
-  std::error_code ignored;
-  std::filesystem::remove(part, ignored);
   throw Error(ExitCode::usage,
               "check the folder, its permissions and its free space: cannot write " + file.string());
 }

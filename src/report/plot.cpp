@@ -378,22 +378,21 @@ std::vector<std::size_t> thinned(const std::vector<double>& x, const std::vector
   return kept;
 }
 
-Series histogram(const std::vector<double>& values, std::size_t bins, const std::string& name) {
+Series histogram(const std::vector<std::pair<double, std::uint64_t>>& values, std::size_t bins,
+                 const std::string& name) {
   Series series;
   series.name = name;
   series.style = Series::Style::bars;
-  Extent extent;
-  extent.include(values, {});
-  if (!(extent.low <= extent.high) || bins == 0) return series;
-  const double width = std::max((extent.high - extent.low) / static_cast<double>(bins),
-                                1e-9 * std::max(1.0, std::abs(extent.high)));
-  for (std::size_t i = 0; i < bins; ++i)
-    series.x.push_back(extent.low + (static_cast<double>(i) + 0.5) * width);
+  if (values.empty() || bins == 0) return series;
+  const auto [least, most] = std::minmax_element(values.begin(), values.end());
+  const double low = least->first, high = most->first;
+  const double width =
+      std::max((high - low) / static_cast<double>(bins), 1e-9 * std::max(1.0, std::abs(high)));
+  for (std::size_t i = 0; i < bins; ++i) series.x.push_back(low + (static_cast<double>(i) + 0.5) * width);
   series.y.assign(bins, 0.0);
-  for (const double value : values) {
-    if (!std::isfinite(value)) continue;
-    const auto bin = static_cast<std::size_t>((value - extent.low) / width);
-    series.y[std::min(bin, bins - 1)] += 1.0;
+  for (const auto& [value, times] : values) {
+    const auto bin = static_cast<std::size_t>((value - low) / width);
+    series.y[std::min(bin, bins - 1)] += static_cast<double>(times);
   }
   return series;
 }

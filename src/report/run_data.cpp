@@ -1,13 +1,20 @@
 #include "run_data.hpp"
 
+#include <array>
+#include <deque>
 #include <fstream>
 #include <iterator>
 
+#include "row_thinner.hpp"
 #include "upright/runtime/run_reader.hpp"
 
 namespace upright {
 
 namespace {
+
+double seconds_of(const LogRecord& row) {
+  return 1e-9 * static_cast<double>(row.time_ns);
+}
 
 std::string seconds(double value) {
   return number_text(value) + " s";
@@ -31,7 +38,7 @@ std::string sentence(std::string text) {
 }
 
 void tell_outcome(const RunRecord& record, RunData& data) {
-  const double end_s = data.time_s.empty() ? 0.0 : data.time_s.back();
+  const double end_s = data.closing.empty() ? 0.0 : seconds_of(data.closing.back());
   if (!record.outcome) {
     data.tone = Tone::warning;
     data.headline = "Cut short after " + seconds(end_s);
@@ -53,31 +60,65 @@ void tell_outcome(const RunRecord& record, RunData& data) {
   }
 }
 
-/// Rows of the log with any of the flags.
-std::size_t rows_with(const RunRecord& record, std::uint32_t flags) {
-  std::size_t count = 0;
-  for (const LogRecord& row : record.samples.rows) count += (row.flags & flags) != 0 ? 1 : 0;
-  return count;
+/// Something that a row's flags tell, and how often they did.
+struct Event {
+  const char* name;
+  std::uint32_t flags;
+  std::uint64_t rows = 0;
+};
+
+using Events = std::array<Event, 8>;
+
+Events events() {
+  return {{{"periods at the voltage limit", row_flag::saturated},
+           {"overruns by waking late", row_flag::overrun_wake},
+           {"overruns by reading", row_flag::overrun_read},
+           {"overruns by computing", row_flag::overrun_compute},
+           {"overruns by writing", row_flag::overrun_write},
+           {"rows after missed periods", row_flag::missed},
+           {"rows without fresh counts", row_flag::held},
+           {"failed writes", row_flag::write_failed}}};
 }
 
-void count_events(const RunRecord& record, RunData& data) {
-  const auto add = [&](const char* name, std::uint32_t flags) {
-    data.outcome_facts.emplace_back(name, std::to_string(rows_with(record, flags)));
-  };
-  add("periods at the voltage limit", row_flag::saturated);
-  add("overruns by waking late", row_flag::overrun_wake);
-  add("overruns by reading", row_flag::overrun_read);
-  add("overruns by computing", row_flag::overrun_compute);
-  add("overruns by writing", row_flag::overrun_write);
-  add("rows after missed periods", row_flag::missed);
-  add("rows without fresh counts", row_flag::held);
-  add("failed writes", row_flag::write_failed);
+void add_to_statistics(const LogRecord& row, RunData& data) {
+  ++data.rows;
+  data.theta_rad.add(row.theta_rad);
+  data.cart_m.add(row.cart_m);
+  data.voltage_requested_v.add(row.voltage_requested_v);
+  data.voltage_v.add(row.voltage_v);
+  data.wake_late_ns.add(row.wake_late_ns);
+  data.read_ns.add(row.read_ns);
+  data.compute_ns.add(row.compute_ns);
+  data.write_ns.add(row.write_ns);
 }
 
-void gather_warnings(const RunRecord& record, RunData& data) {
-  if (data.time_s.empty()) data.warnings.emplace_back("The log holds no row.");
-  if (record.samples.truncated)
-    data.warnings.emplace_back("The last line of samples.csv was cut; it is left out.");
+/// Reads all rows once. Returns whether the last line was cut.
+bool gather_rows(const std::filesystem::path& samples, RunData& data) {
+  SampleReader reader(samples);
+  RowThinner thinner;
+  std::deque<LogRecord> closing;
+  Events seen = events();
+  double first_s = 0.0;
+  for (LogRecord row; reader.next(row); row = {}) {
+    if (data.rows == 0) first_s = seconds_of(row);
+    add_to_statistics(row, data);
+    for (Event& event : seen) event.rows += (row.flags & event.flags) != 0 ? 1 : 0;
+    thinner.add(row);
+    closing.push_back(row);
+    while (seconds_of(closing.front()) < seconds_of(row) - closing_s ||
+           closing.size() > RowThinner::most_rows)
+      closing.pop_front();
+  }
+  for (const Event& event : seen) data.outcome_facts.emplace_back(event.name, std::to_string(event.rows));
+  data.drawn = thinner.take();
+  data.closing.assign(closing.begin(), closing.end());
+  if (!closing.empty()) data.duration_s = seconds_of(closing.back()) - first_s;
+  return reader.truncated();
+}
+
+void gather_warnings(const RunRecord& record, bool truncated, RunData& data) {
+  if (data.rows == 0) data.warnings.emplace_back("The log holds no row.");
+  if (truncated) data.warnings.emplace_back("The last line of samples.csv was cut; it is left out.");
   const std::string dropped = plain(record.outcome, "rows_dropped");
   if (!dropped.empty() && dropped != "0")
     data.warnings.push_back(dropped + " rows never reached the disk: it was too slow.");
@@ -110,22 +151,6 @@ void gather_provenance(const RunRecord& record, RunData& data) {
   for (const char* name : {"compiler", "host", "kernel", "machine"}) add(name, plain(provenance, name));
 }
 
-void gather_columns(const std::vector<LogRecord>& rows, RunData& data) {
-  constexpr double s_per_ns = 1e-9;
-  constexpr double us_per_ns = 1e-3;
-  for (const LogRecord& row : rows) {
-    data.time_s.push_back(static_cast<double>(row.time_ns) * s_per_ns);
-    data.cart_m.push_back(row.cart_m);
-    data.theta_rad.push_back(row.theta_rad);
-    data.voltage_requested_v.push_back(row.voltage_requested_v);
-    data.voltage_v.push_back(row.voltage_v);
-    data.wake_late_us.push_back(static_cast<double>(row.wake_late_ns) * us_per_ns);
-    data.read_us.push_back(static_cast<double>(row.read_ns) * us_per_ns);
-    data.compute_us.push_back(static_cast<double>(row.compute_ns) * us_per_ns);
-    data.write_us.push_back(static_cast<double>(row.write_ns) * us_per_ns);
-  }
-}
-
 std::string read_text(const std::filesystem::path& file) {
   std::ifstream in(file, std::ios::binary);
   return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
@@ -134,17 +159,16 @@ std::string read_text(const std::filesystem::path& file) {
 }  // namespace
 
 RunData load_run_data(const std::filesystem::path& run_directory) {
-  const RunRecord record = read_run(run_directory);
+  const RunRecord record = read_run_without_samples(run_directory);
   RunData data;
   data.name = std::filesystem::absolute(run_directory / "").parent_path().filename().string();
   data.origin = "started " + record.started_utc + " on the " + backends_text(record.rig) + " rig";
   data.period_s = record.control.period_s();
   data.amplifier_limit_v = record.rig.amplifier.limit_v;
   data.run_yaml = read_text(run_directory / "run.yaml");
-  gather_columns(record.samples.rows, data);
+  const bool truncated = gather_rows(run_directory / "samples.csv", data);
   tell_outcome(record, data);
-  count_events(record, data);
-  gather_warnings(record, data);
+  gather_warnings(record, truncated, data);
   gather_provenance(record, data);
   return data;
 }

@@ -1,6 +1,7 @@
-// A run as its report needs it: columns by name, and the words for its outcome.
+// A run as its report needs it: rows to draw, statistics of all of them, and the words for its outcome.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -8,6 +9,8 @@
 #include <vector>
 
 #include "upright/report/html.hpp"
+#include "upright/report/statistics.hpp"
+#include "upright/runtime/log_record.hpp"
 
 namespace upright {
 
@@ -24,11 +27,17 @@ struct RunData {
   std::optional<double> period_s;
   std::optional<double> amplifier_limit_v;
 
-  std::vector<double> time_s, cart_m, theta_rad, voltage_requested_v, voltage_v;
-  std::vector<double> wake_late_us, read_us, compute_us, write_us;
+  std::uint64_t rows = 0;
+  double duration_s = 0.0;  ///< from the first row to the last
+  Magnitude theta_rad, cart_m, voltage_requested_v, voltage_v;
+  ValueCounts wake_late_ns, read_ns, compute_ns, write_ns;
+  std::vector<LogRecord> drawn;    ///< all rows of a short run; of a long one those that a plot can show
+  std::vector<LogRecord> closing;  ///< all rows of the last `closing_s`
 };
 
-/// Throws Error when the directory is not a run.
+inline constexpr double closing_s = 3.0;
+
+/// Needs the same memory however long the run was. Throws Error when the directory is not a run.
 RunData load_run_data(const std::filesystem::path& run_directory);
 
 }  // namespace upright

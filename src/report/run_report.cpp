@@ -1,8 +1,9 @@
 #include "upright/report/run_report.hpp"
 
-#include <algorithm>
-#include <cmath>
+#include <cstdint>
 #include <numbers>
+#include <utility>
+#include <vector>
 
 #include "run_data.hpp"
 #include "upright/report/html.hpp"
@@ -12,12 +13,25 @@ namespace upright {
 
 namespace {
 
-std::vector<double> scaled(std::vector<double> values, double factor) {
-  for (double& value : values) value *= factor;
+constexpr double degrees_per_radian = 180.0 / std::numbers::pi;
+constexpr double mm_per_m = 1000.0, us_per_ns = 1e-3, s_per_ns = 1e-9;
+
+std::vector<double> times_of(const std::vector<LogRecord>& rows) {
+  std::vector<double> values;
+  values.reserve(rows.size());
+  for (const LogRecord& row : rows) values.push_back(s_per_ns * static_cast<double>(row.time_ns));
   return values;
 }
 
-constexpr double degrees_per_radian = 180.0 / std::numbers::pi;
+/// A column of rows, in another unit.
+template <class Value>
+std::vector<double> column_of(const std::vector<LogRecord>& rows, Value LogRecord::*member,
+                              double factor = 1.0) {
+  std::vector<double> values;
+  values.reserve(rows.size());
+  for (const LogRecord& row : rows) values.push_back(factor * static_cast<double>(row.*member));
+  return values;
+}
 
 /// The plots of one run share their time axis.
 Plot over_time(const RunData& run, const std::string& title, const std::string& unit) {
@@ -25,16 +39,16 @@ Plot over_time(const RunData& run, const std::string& title, const std::string& 
   plot.title = title;
   plot.x.label = "time [s]";
   plot.y.label = unit;
-  if (!run.time_s.empty()) {
-    plot.x.low = run.time_s.front();
-    plot.x.high = run.time_s.back();
+  if (!run.drawn.empty()) {
+    plot.x.low = s_per_ns * static_cast<double>(run.drawn.front().time_ns);
+    plot.x.high = s_per_ns * static_cast<double>(run.drawn.back().time_ns);
   }
   return plot;
 }
 
-Series series(const RunData& run, const std::string& name, const std::vector<double>& values,
+Series series(const RunData& run, const std::string& name, std::vector<double> values,
               Series::Style style = Series::Style::line) {
-  return {name, run.time_s, values, style, -1, false};
+  return {name, times_of(run.drawn), std::move(values), style, -1, false};
 }
 
 void add_limits(Plot& plot, const std::optional<double>& limit, const std::string& name) {
@@ -46,12 +60,13 @@ void add_limits(Plot& plot, const std::optional<double>& limit, const std::strin
 void add_motion(HtmlPage& page, const RunData& run) {
   page.section("Motion");
   Plot theta = over_time(run, "pendulum angle (0 is upright)", "theta [deg]");
-  theta.series = {series(run, "", scaled(run.theta_rad, degrees_per_radian))};
+  theta.series = {series(run, "", column_of(run.drawn, &LogRecord::theta_rad, degrees_per_radian))};
   Plot cart = over_time(run, "cart position", "x [mm]");
-  cart.series = {series(run, "", scaled(run.cart_m, 1000.0))};
+  cart.series = {series(run, "", column_of(run.drawn, &LogRecord::cart_m, mm_per_m))};
   Plot voltage = over_time(run, "voltage", "V");
-  voltage.series = {series(run, "requested", run.voltage_requested_v, Series::Style::steps),
-                    series(run, "applied", run.voltage_v, Series::Style::steps)};
+  voltage.series = {
+      series(run, "requested", column_of(run.drawn, &LogRecord::voltage_requested_v), Series::Style::steps),
+      series(run, "applied", column_of(run.drawn, &LogRecord::voltage_v), Series::Style::steps)};
   voltage.series.front().color = 5;
   voltage.series.back().color = 0;
   // A request far beyond the amplifier would flatten what was applied.
@@ -59,7 +74,7 @@ void add_motion(HtmlPage& page, const RunData& run) {
   if (run.amplifier_limit_v) {
     voltage.y.low = -1.3 * *run.amplifier_limit_v;
     voltage.y.high = 1.3 * *run.amplifier_limit_v;
-    if (largest_magnitude(run.voltage_requested_v) < 0.6 * *run.amplifier_limit_v) {
+    if (run.voltage_requested_v.largest() < 0.6 * *run.amplifier_limit_v) {
       voltage.horizontal_marks.clear();
       voltage.y = {"V", false, {}, {}};
     }
@@ -70,39 +85,41 @@ void add_motion(HtmlPage& page, const RunData& run) {
 }
 
 void add_closing_seconds(HtmlPage& page, const RunData& run) {
-  constexpr double shown_s = 3.0;
-  if (run.time_s.empty() || run.time_s.back() - run.time_s.front() < 2.0 * shown_s) return;
-  const double from = run.time_s.back() - shown_s;
-  const auto first = static_cast<std::size_t>(std::lower_bound(run.time_s.begin(), run.time_s.end(), from) -
-                                              run.time_s.begin());
-  const auto tail = [&](const std::vector<double>& values) {
-    return std::vector<double>(values.begin() + static_cast<std::ptrdiff_t>(first), values.end());
-  };
+  if (run.duration_s < 2.0 * closing_s) return;
+  const std::vector<double> theta = column_of(run.closing, &LogRecord::theta_rad, degrees_per_radian);
   Plot motion = over_time(run, "the last 3 s", "theta [deg]");
-  motion.x.low = from;
+  motion.x.low = *motion.x.high - closing_s;
   motion.width_px = 450;
   motion.height_px = 300;
-  motion.series = {{"", tail(run.time_s), scaled(tail(run.theta_rad), degrees_per_radian)}};
+  motion.series = {{"", times_of(run.closing), theta}};
   Plot cycle;
   cycle.title = "cart against angle";
   cycle.x.label = "x [mm]";
   cycle.y.label = "theta [deg]";
   cycle.width_px = 450;
   cycle.height_px = 300;
-  cycle.series = {{"", scaled(tail(run.cart_m), 1000.0), scaled(tail(run.theta_rad), degrees_per_radian)}};
+  cycle.series = {{"", column_of(run.closing, &LogRecord::cart_m, mm_per_m), theta}};
   page.figures({motion, cycle}, "What the loop settles to: a closed curve on the right is a limit cycle.");
 }
 
 struct TimingColumn {
   const char* name;
-  const std::vector<double>& values;
+  std::int64_t LogRecord::*member;
+  const ValueCounts& counts_ns;
 };
 
 std::vector<TimingColumn> timing_of(const RunData& run) {
-  return {{"wake-up late", run.wake_late_us},
-          {"read", run.read_us},
-          {"compute", run.compute_us},
-          {"write", run.write_us}};
+  return {{"wake-up late", &LogRecord::wake_late_ns, run.wake_late_ns},
+          {"read", &LogRecord::read_ns, run.read_ns},
+          {"compute", &LogRecord::compute_ns, run.compute_ns},
+          {"write", &LogRecord::write_ns, run.write_ns}};
+}
+
+std::vector<std::pair<double, std::uint64_t>> in_us(const ValueCounts& counts_ns) {
+  std::vector<std::pair<double, std::uint64_t>> values;
+  for (const auto& [ns, times] : counts_ns.sorted())
+    values.emplace_back(us_per_ns * static_cast<double>(ns), times);
+  return values;
 }
 
 void add_timing(HtmlPage& page, const RunData& run) {
@@ -115,11 +132,12 @@ void add_timing(HtmlPage& page, const RunData& run) {
   int color = 0;
   bool anything = false;
   for (const TimingColumn& column : timing_of(run)) {
-    const Spread spread = spread_of(column.values);
-    table.rows.push_back({column.name, number_text(spread.median), number_text(spread.p99),
-                          number_text(spread.p999), number_text(spread.largest)});
+    const Spread spread = column.counts_ns.spread();
+    table.rows.push_back({column.name, number_text(us_per_ns * spread.median),
+                          number_text(us_per_ns * spread.p99), number_text(us_per_ns * spread.p999),
+                          number_text(us_per_ns * spread.largest)});
     anything = anything || spread.largest > 0.0;
-    plot.series.push_back(series(run, column.name, column.values));
+    plot.series.push_back(series(run, column.name, column_of(run.drawn, column.member, us_per_ns)));
     Plot counts;
     counts.title = column.name;
     counts.x.label = "microseconds";
@@ -128,7 +146,7 @@ void add_timing(HtmlPage& page, const RunData& run) {
     counts.y.low = 0.5;
     counts.width_px = 450;
     counts.height_px = 220;
-    counts.series = {histogram(column.values, 60, "")};
+    counts.series = {histogram(in_us(column.counts_ns), 60, "")};
     counts.series.front().color = color++;
     histograms.push_back(counts);
   }
@@ -150,14 +168,13 @@ std::string with_unit(double value, const std::string& unit) {
 
 void add_numbers(HtmlPage& page, const RunData& run) {
   page.section("In numbers");
-  const double duration = run.time_s.empty() ? 0.0 : run.time_s.back() - run.time_s.front();
   std::vector<std::pair<std::string, std::string>> facts = {
-      {"duration", with_unit(duration, "s")},
-      {"samples", std::to_string(run.time_s.size())},
-      {"largest angle", with_unit(largest_magnitude(run.theta_rad) * degrees_per_radian, "deg")},
-      {"largest cart travel", with_unit(largest_magnitude(run.cart_m) * 1000.0, "mm")},
-      {"voltage, root mean square", with_unit(root_mean_square(run.voltage_v), "V")},
-      {"voltage, largest", with_unit(largest_magnitude(run.voltage_v), "V")},
+      {"duration", with_unit(run.duration_s, "s")},
+      {"samples", std::to_string(run.rows)},
+      {"largest angle", with_unit(run.theta_rad.largest() * degrees_per_radian, "deg")},
+      {"largest cart travel", with_unit(run.cart_m.largest() * mm_per_m, "mm")},
+      {"voltage, root mean square", with_unit(run.voltage_v.root_mean_square(), "V")},
+      {"voltage, largest", with_unit(run.voltage_v.largest(), "V")},
   };
   facts.insert(facts.end(), run.outcome_facts.begin(), run.outcome_facts.end());
   page.facts(facts);

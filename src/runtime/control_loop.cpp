@@ -135,6 +135,11 @@ std::string first_check(double time_s) {
   return time_s < soon_s ? "check the signs of encoders and amplifier with the motor off, then " : "";
 }
 
+std::string went_on_after(const LinkCounts& link) {
+  const std::string troubles = sentence_of(link);
+  return troubles.empty() ? "" : " and went on after " + troubles;
+}
+
 std::string brief(double value) {
   char text[32];
   std::snprintf(text, sizeof text, "%.4g", value);
@@ -148,7 +153,7 @@ std::string sentence_of(const LoopOutcome& o, const LoopLimits& limits) {
   const double degrees = 180.0 / std::numbers::pi;
   switch (o.reason) {
     case StopReason::duration:
-      return "the run lasted its whole time";
+      return "the run lasted its whole time" + went_on_after(o.counts.link);
     case StopReason::signal:
       return std::string("start again when ready: stopped by ") +
              (o.signal == 2    ? "SIGINT"
@@ -221,6 +226,7 @@ void ControlLoop::stop(LoopOutcome& outcome, StopReason reason, std::uint64_t fi
 /// Takes the counts of a reading, or notes that there are none to take. True: there is a pose to compute
 /// with.
 bool ControlLoop::accept(const RigReading& reading, const Wake& wake, LoopOutcome& outcome) noexcept {
+  outcome.counts.link.add(reading);
   if (reading.status == RigStatus::fresh) {
     ++outcome.counts.fresh;
     row_.cart_counts = reading.cart_counts;

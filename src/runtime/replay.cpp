@@ -2,6 +2,7 @@
 
 #include <bit>
 #include <cmath>
+#include <utility>
 
 namespace upright {
 
@@ -13,36 +14,64 @@ bool same(double a, double b) {
          (std::isnan(a) && std::isnan(b));
 }
 
+/// Takes rows in their order.
+class Replayer {
+ public:
+  Replayer(const RunRecord& run, std::unique_ptr<DelayCompensator> compensator, CommandSource* source)
+      : controller_(run.control, run.rig.amplifier.limit_v, std::move(compensator)),
+        scaler_(calibration_in_use(run.rig)) {
+    controller_.follow(source);
+  }
+
+  /// False from the first mismatch on.
+  bool take(const LogRecord& row) {
+    if (row.tick != next_tick_ && (row.flags & row_flag::missed) == 0 && !result_.first_lost_tick)
+      result_.first_lost_tick = row.tick;
+    next_tick_ = row.tick + 1;
+    if ((row.flags & row_flag::held) == 0) compute(row);
+    const double applied_v = (row.flags & row_flag::stopped) != 0 ? 0.0 : held_v_;
+    ++result_.rows;
+    if (same(requested_v_, row.voltage_requested_v) && same(applied_v, row.voltage_v)) return true;
+    result_.first_mismatch = {row.tick, row.voltage_requested_v, requested_v_, row.voltage_v, applied_v};
+    return false;
+  }
+
+  const ReplayResult& result() const { return result_; }
+
+ private:
+  void compute(const LogRecord& row) {
+    Pose pose = scaler_.scale(row.cart_counts, row.pendulum_counts);
+    if (!begun_) pose = scaler_.nearest_turn();
+    begun_ = true;
+    const ControlOutput output = controller_.step({row.tick, pose.cart_m, pose.theta_rad, 0.0});
+    requested_v_ = output.voltage_requested_v;
+    held_v_ = output.voltage_v;
+  }
+
+  Controller controller_;
+  PoseScaler scaler_;
+  ReplayResult result_;
+  bool begun_ = false;
+  double requested_v_ = 0.0, held_v_ = 0.0;
+  std::uint64_t next_tick_ = 0;
+};
+
 }  // namespace
 
 ReplayResult replay(const RunRecord& run, std::unique_ptr<DelayCompensator> compensator,
                     CommandSource* source) {
-  Controller controller(run.control, run.rig.amplifier.limit_v, std::move(compensator));
-  controller.follow(source);
-  PoseScaler scaler(calibration_in_use(run.rig));
-  ReplayResult result;
-  bool begun = false;
-  double requested_v = 0.0, held_v = 0.0;
-  std::uint64_t next_tick = 0;
-  for (const LogRecord& row : run.samples.rows) {
-    if (row.tick != next_tick && (row.flags & row_flag::missed) == 0 && !result.first_lost_tick)
-      result.first_lost_tick = row.tick;
-    next_tick = row.tick + 1;
-    if ((row.flags & row_flag::held) == 0) {
-      Pose pose = scaler.scale(row.cart_counts, row.pendulum_counts);
-      if (!begun) pose = scaler.nearest_turn();
-      begun = true;
-      const ControlOutput output = controller.step({row.tick, pose.cart_m, pose.theta_rad, 0.0});
-      requested_v = output.voltage_requested_v;
-      held_v = output.voltage_v;
-    }
-    const double applied_v = (row.flags & row_flag::stopped) != 0 ? 0.0 : held_v;
-    ++result.rows;
-    if (same(requested_v, row.voltage_requested_v) && same(applied_v, row.voltage_v)) continue;
-    result.first_mismatch = {row.tick, row.voltage_requested_v, requested_v, row.voltage_v, applied_v};
-    return result;
+  Replayer replayer(run, std::move(compensator), source);
+  for (const LogRecord& row : run.samples.rows)
+    if (!replayer.take(row)) break;
+  return replayer.result();
+}
+
+ReplayResult replay(const RunRecord& run, SampleReader& rows, std::unique_ptr<DelayCompensator> compensator,
+                    CommandSource* source) {
+  Replayer replayer(run, std::move(compensator), source);
+  for (LogRecord row; rows.next(row) && replayer.take(row); row = {}) {
   }
-  return result;
+  return replayer.result();
 }
 
 }  // namespace upright

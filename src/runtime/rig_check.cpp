@@ -72,6 +72,55 @@ Finding ask_for(const AskedMove& asked, Rig& rig, Clock& clock, PoseScaler& scal
           std::string("run it again and ") + asked.words + "; without effect, check the encoder's cable"};
 }
 
+/// Where a reading that did not come is counted.
+std::uint64_t& refused_by(LinkProbe& probe, const RigReading& reading) {
+  if (is_emergency_stop(reading.fault)) return probe.emergency_stops;
+  if (is_limit_switch(reading.fault)) return probe.limit_switches;
+  return probe.failed;
+}
+
+/// An input that somebody is asked to make active, and inactive again.
+struct AskedInput {
+  std::string subject;
+  bool (*is_it)(RigFault);
+  std::string trip, release;
+  const char* key;
+};
+
+/// Somebody beside the rig, and how long he is waited for.
+struct HandTrial {
+  Rig& rig;
+  Clock& clock;
+  double patience_s;
+  const SignalFlag& signal;
+  const std::function<void(const std::string&)>& ask;
+
+  /// Asks, and waits until the input is as asked for. Only counts show that it was released: any other fault
+  /// says nothing of it.
+  bool comes(const AskedInput& input, bool active) const {
+    constexpr std::int64_t pause_ns = 5'000'000;
+    ask(active ? input.trip : input.release);
+    const std::int64_t until_ns = clock.now_ns() + static_cast<std::int64_t>(1e9 * patience_s);
+    while (clock.now_ns() < until_ns && !signalled(signal)) {
+      const RigReading reading = rig.read();
+      if (active ? input.is_it(reading.fault) : reading.status == RigStatus::fresh) return true;
+      clock.sleep_until(clock.now_ns() + pause_ns);
+    }
+    return false;
+  }
+
+  Finding of(const AskedInput& input) const {
+    const std::string wiring = std::string("check its wire, and its active level under ") + input.key;
+    if (input.is_it(rig.read().fault) && !comes(input, false))
+      return {input.subject, Health::bad, "it is active and was not seen to be released", wiring};
+    if (!comes(input, true))
+      return {input.subject, Health::bad, "it was not seen",
+              "run it again and " + input.trip + "; without effect, " + wiring};
+    if (!comes(input, false)) return {input.subject, Health::bad, "it was seen, but not its release", wiring};
+    return {input.subject, Health::good, "seen, and its release too", ""};
+  }
+};
+
 }  // namespace
 
 LinkProbe probe_link(Rig& rig, Clock& clock, double rate_hz, double duration_s, const SignalFlag& signal) {
@@ -86,7 +135,7 @@ LinkProbe probe_link(Rig& rig, Clock& clock, double rate_hz, double duration_s, 
     const Wake wake = wake_at(phase, asked_ns);
     const RigReading reading = rig.read();
     if (reading.status != RigStatus::fresh) {
-      ++probe.failed;
+      ++refused_by(probe, reading);
       continue;
     }
     probe.round_trip.add(clock.now_ns() - asked_ns);
@@ -104,6 +153,12 @@ double highest_rate_hz(const DurationHistogram& round_trip) {
 
 Finding judge_link(const LinkProbe& probe, double rate_hz) {
   const DurationHistogram& trips = probe.round_trip;
+  if (trips.count() == 0 && probe.emergency_stops + probe.limit_switches > 0)
+    return {"link", Health::not_examined,
+            std::string(probe.emergency_stops > 0 ? "the emergency stop is pressed"
+                                                  : "a limit switch is active") +
+                ": no counts are taken",
+            "release it and run it again"};
   if (trips.count() == 0)
     return {"link", Health::bad, "no reading came", "check cable, address and response_timeout_s"};
   const double carried_hz = highest_rate_hz(trips);
@@ -129,7 +184,8 @@ Finding judge_link(const LinkProbe& probe, double rate_hz) {
 Finding judge_zero(const std::vector<EncoderCounts>& counts, const Calibration& calibration) {
   constexpr std::int64_t at_rest_counts = 2;
   constexpr double close_rad = 1.0 / degrees_per_rad;
-  if (counts.empty()) return {"zero", Health::not_examined, "no counts came", "repair the link first"};
+  if (counts.empty())
+    return {"zero", Health::not_examined, "no counts came", "follow the link's remedy first"};
   const Spread cart = spread_of(counts, &EncoderCounts::cart);
   const Spread pendulum = spread_of(counts, &EncoderCounts::pendulum);
   if (cart.high - cart.low > at_rest_counts || pendulum.high - pendulum.low > at_rest_counts)
@@ -171,6 +227,60 @@ std::vector<Finding> examine_signs_by_hand(Rig& rig, Clock& clock, const Calibra
                           "calibration.pendulum.sign"};
   return {ask_for(cart, rig, clock, scaler, patience_s, signal, ask),
           ask_for(bob, rig, clock, scaler, patience_s, signal, ask)};
+}
+
+std::vector<Finding> name_missing_inputs(const SafetyInputs& inputs) {
+  std::vector<Finding> findings;
+  if (!inputs.emergency_stop)
+    findings.push_back({"emergency stop", Health::not_examined, "no emergency stop is wired",
+                        "let it cut the amplifier's supply, and wire a contact of it as gpio.emergency_stop, "
+                        "so that the run ends too"});
+  if (inputs.limit_switches == 0)
+    findings.push_back({"limit switches", Health::not_examined, "no limit switch is wired",
+                        "wire one at each end of the track as gpio.limit_switches; until then track.limit_m "
+                        "alone guards the ends"});
+  return findings;
+}
+
+std::vector<Finding> judge_safety_inputs(const SafetyInputs& inputs, const LinkProbe& probe) {
+  std::vector<Finding> findings;
+  if (inputs.emergency_stop)
+    findings.push_back(probe.emergency_stops > 0
+                           ? Finding{"emergency stop", Health::poor, "it is pressed, or its wire is broken",
+                                     "release it when it is safe"}
+                           : Finding{"emergency stop", Health::not_examined, "wired, not pressed",
+                                     "see that it works with --by-hand"});
+  if (inputs.limit_switches > 0)
+    findings.push_back(probe.limit_switches > 0
+                           ? Finding{"limit switches", Health::poor, "one is tripped, or its wire is broken",
+                                     "bring the cart to the middle"}
+                           : Finding{"limit switches", Health::not_examined,
+                                     std::to_string(inputs.limit_switches) + " wired, none tripped",
+                                     "see that each works with --by-hand"});
+  return findings;
+}
+
+std::vector<Finding> examine_safety_inputs_by_hand(Rig& rig, Clock& clock, double patience_s,
+                                                   const SignalFlag& signal,
+                                                   const std::function<void(const std::string&)>& ask) {
+  const SafetyInputs inputs = rig.safety_inputs();
+  const HandTrial trial{rig, clock, patience_s, signal, ask};
+  std::vector<Finding> findings;
+  if (inputs.emergency_stop)
+    findings.push_back(trial.of({"emergency stop", is_emergency_stop, "press the emergency stop",
+                                 "release the emergency stop", "gpio.emergency_stop"}));
+  for (int i = 1; i <= inputs.limit_switches; ++i) {
+    std::string which;
+    if (inputs.limit_switches > 1)
+      which.append(" ")
+          .append(std::to_string(i))
+          .append(" of ")
+          .append(std::to_string(inputs.limit_switches));
+    findings.push_back(
+        trial.of({"limit switch" + which, is_limit_switch, "trip limit switch" + which + " with the cart",
+                  "move the cart off the limit switch", "gpio.limit_switches"}));
+  }
+  return findings;
 }
 
 }  // namespace upright

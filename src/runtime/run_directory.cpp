@@ -116,6 +116,14 @@ std::string histogram_text(const char* name, const DurationHistogram& h) {
   return text + "]\n      histogram_count: [" + counts + "]\n";
 }
 
+std::string link_text(const LinkCounts& link) {
+  std::string text = "  link: {";
+  for (std::size_t i = 0; i < LinkCounts::kinds; ++i)
+    text += name_of(static_cast<LinkTrouble>(i)) + std::string(": ") + std::to_string(link.cycles[i]) + ", ";
+  return text + "longest: " + std::to_string(link.longest) +
+         ", recoveries: " + std::to_string(link.recoveries) + "}\n";
+}
+
 std::string outcome_text(const LoopOutcome& o, const LoopLimits& limits, const LogSummary& log) {
   const LoopCounts& c = o.counts;
   std::string text = "outcome:\n  result: " + std::string(result_of(o)) + "\n  reason: " + name_of(o.reason) +
@@ -136,7 +144,7 @@ std::string outcome_text(const LoopOutcome& o, const LoopLimits& limits, const L
           ", overruns_write: " + std::to_string(c.overruns_write) +
           ", saturated: " + std::to_string(c.saturated) +
           ", writes_failed: " + std::to_string(c.writes_failed) +
-          ", page_faults: " + std::to_string(c.page_faults) + "}\n";
+          ", page_faults: " + std::to_string(c.page_faults) + "}\n" + link_text(c.link);
   text += "  timing:\n" + histogram_text("wake_late", o.wake_late) + histogram_text("read", o.read) +
           histogram_text("compute", o.compute) + histogram_text("write", o.write) +
           histogram_text("cycle", o.cycle);

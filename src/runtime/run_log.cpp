@@ -23,7 +23,8 @@ using namespace std::chrono_literals;
 
 constexpr auto writer_pause = 10ms;
 constexpr auto sync_pause = 50ms;
-constexpr auto full_queue_patience = 2s;  // of a loop in virtual time, whose writer may have died
+// Of a loop in virtual time: nothing but a simulation waits for a slow disk, only a dead writer ends it.
+constexpr auto full_queue_patience = 60s;
 constexpr std::size_t buffer_bytes = 64 * 1024;
 constexpr std::size_t rows_at_once = 64;
 constexpr int writer_priority = 5;  // below everything that moves the motor, above what merely computes

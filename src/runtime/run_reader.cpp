@@ -4,7 +4,8 @@
 #include <charconv>
 #include <cmath>
 #include <fstream>
-#include <iterator>
+#include <optional>
+#include <string>
 #include <string_view>
 
 #include "upright/model/error.hpp"
@@ -108,43 +109,123 @@ bool is_waste(std::string_view text) {
   return text.find_first_not_of(waste) == std::string_view::npos;
 }
 
+/// A file line by line, through a buffer that only a longer line makes grow.
+class Lines {
+ public:
+  explicit Lines(const std::filesystem::path& file) : in_(file, std::ios::binary) {
+    if (!in_) throw ConfigError("name a run directory: cannot read " + file.string());
+  }
+
+  /// Without its end; false when no further line is complete.
+  bool next(std::string_view& line) {
+    for (std::size_t searched = begin_;;) {
+      const std::size_t end = text_.find('\n', searched);
+      if (end != std::string::npos) {
+        line = std::string_view(text_).substr(begin_, end - begin_);
+        begin_ = end + 1;
+        return true;
+      }
+      searched = text_.size() - begin_;
+      if (is_too_long() || !read_more()) return false;
+    }
+  }
+
+  /// What follows is no line of ours, whether it ends or not.
+  bool is_too_long() const { return text_.size() - begin_ > longest_line; }
+
+  /// What follows the last complete line holds something, be it a cut line.
+  bool has_rest() const { return begin_ < text_.size(); }
+
+  /// Everything from here on is waste.
+  bool rest_is_waste() {
+    do {
+      if (!is_waste(std::string_view(text_).substr(begin_))) return false;
+      begin_ = text_.size();
+    } while (read_more());
+    return true;
+  }
+
+ private:
+  static constexpr std::size_t part_bytes = 1 << 20, longest_line = 1 << 20;
+
+  /// Brings the unread text to the front and appends what comes.
+  bool read_more() {
+    text_.erase(0, begin_);
+    begin_ = 0;
+    const std::size_t kept = text_.size();
+    text_.resize(kept + part_bytes);
+    in_.read(text_.data() + kept, part_bytes);
+    text_.resize(kept + static_cast<std::size_t>(in_.gcount()));
+    return text_.size() > kept;
+  }
+
+  std::ifstream in_;
+  std::string text_;
+  std::size_t begin_ = 0;
+};
+
 }  // namespace
 
+class SampleReader::Implementation {
+ public:
+  explicit Implementation(const std::filesystem::path& file) : file_(file), lines_(file) {
+    std::string_view line;
+    if (lines_.next(line))
+      header_.emplace(line, file);
+    else
+      truncated_ = true;
+  }
+
+  bool next(LogRecord& row) {
+    std::string_view line;
+    if (truncated_) return false;
+    const bool complete = lines_.next(line);
+    if (!complete && !lines_.is_too_long()) {
+      truncated_ = lines_.has_rest();
+      return false;
+    }
+    ++line_number_;
+    if (complete && header_->read(line, cells_, row)) return true;
+    if (!lines_.rest_is_waste())
+      throw ConfigError("restore the line from a copy: " + file_.string() + ":" +
+                        std::to_string(line_number_) + ": not a row of samples");
+    truncated_ = true;
+    return false;
+  }
+
+  bool truncated() const noexcept { return truncated_; }
+
+ private:
+  std::filesystem::path file_;
+  Lines lines_;
+  std::optional<Header> header_;
+  std::vector<std::string_view> cells_;
+  std::size_t line_number_ = 1;
+  bool truncated_ = false;
+};
+
+SampleReader::SampleReader(const std::filesystem::path& file)
+    : implementation_(std::make_unique<Implementation>(file)) {}
+
+SampleReader::~SampleReader() = default;
+
+bool SampleReader::next(LogRecord& row) {
+  return implementation_->next(row);
+}
+
+bool SampleReader::truncated() const noexcept {
+  return implementation_->truncated();
+}
+
 Samples read_samples(const std::filesystem::path& file) {
-  std::ifstream in(file, std::ios::binary);
-  if (!in) throw ConfigError("name a run directory: cannot read " + file.string());
-  const std::string text((std::istreambuf_iterator<char>(in)), std::istreambuf_iterator<char>());
-  const std::string_view all(text);
-  std::size_t end = all.find('\n');
+  SampleReader reader(file);
   Samples samples;
-  if (end == std::string_view::npos) {
-    samples.truncated = true;
-    return samples;
-  }
-  const Header header(all.substr(0, end), file);
-  std::vector<std::string_view> cells;
-  std::size_t line_number = 2;
-  for (std::size_t begin = end + 1; begin < all.size(); begin = end + 1, ++line_number) {
-    end = all.find('\n', begin);
-    if (end == std::string_view::npos) {
-      samples.truncated = true;
-      break;
-    }
-    LogRecord row;
-    if (header.read(all.substr(begin, end - begin), cells, row)) {
-      samples.rows.push_back(row);
-      continue;
-    }
-    if (!is_waste(all.substr(end)) && !is_waste(all.substr(begin)))
-      throw ConfigError("restore the line from a copy: " + file.string() + ":" + std::to_string(line_number) +
-                        ": not a row of samples");
-    samples.truncated = true;
-    break;
-  }
+  for (LogRecord row; reader.next(row); row = {}) samples.rows.push_back(row);
+  samples.truncated = reader.truncated();
   return samples;
 }
 
-RunRecord read_run(const std::filesystem::path& directory) {
+RunRecord read_run_without_samples(const std::filesystem::path& directory) {
   std::error_code problem;
   if (!std::filesystem::is_directory(directory, problem))
     throw ConfigError("name a run directory: " + directory.string() + " is none");
@@ -163,6 +244,11 @@ RunRecord read_run(const std::filesystem::path& directory) {
                    document.optional_map("outcome"),
                    {}};
   if (document.has("plant")) record.plant = read_plant(document);
+  return record;
+}
+
+RunRecord read_run(const std::filesystem::path& directory) {
+  RunRecord record = read_run_without_samples(directory);
   record.samples = read_samples(directory / "samples.csv");
   return record;
 }

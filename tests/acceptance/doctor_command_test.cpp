@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <sstream>
 #include <string>
 
 #include "../integration/virtual_rig_process.hpp"
@@ -60,7 +61,14 @@ TEST(Doctor, SaysOnOnePageWhatTheMachineIsGoodFor) {
                               "scheduling", "wake-ups, idle", "wake-ups, loaded"})
     EXPECT_NE(result.out.find(subject), std::string::npos) << subject << "\n" << result.out;
   EXPECT_NE(result.out.find("Verdict: "), std::string::npos);
-  EXPECT_LT(std::count(result.out.begin(), result.out.end(), '\n'), 40);
+  EXPECT_NE(result.out.find("late, idle"), std::string::npos) << result.out;
+  EXPECT_NE(result.out.find(" us to "), std::string::npos) << "histograms: " << result.out;
+  EXPECT_LT(std::count(result.out.begin(), result.out.end(), '\n'), 50);
+  std::istringstream lines(result.out);
+  for (std::string line; std::getline(lines, line);)
+    if (line.find('#') != std::string::npos) {
+      EXPECT_LE(line.size(), 100u) << line;
+    }
 }
 
 TEST(Doctor, GivesOneDocumentWhoseVerdictFollowsFromItsFindings) {
@@ -96,6 +104,8 @@ TEST(Doctor, MeasuresTheLinkAndFindsTheHangingPendulumWithTheMotorOff) {
   EXPECT_LE(document.at("link").at("p50_us"), document.at("link").at("p99_9_us"));
   EXPECT_EQ(about(document, "zero").at("health"), "good") << v.result.out;
   EXPECT_EQ(about(document, "encoder signs").at("health"), "not examined");
+  EXPECT_EQ(about(document, "emergency stop").at("what"), "no emergency stop is wired");
+  EXPECT_EQ(about(document, "limit switches").at("health"), "not examined");
   ASSERT_FALSE(v.trace.empty());
   for (const test::TraceRow& row : v.trace) {
     EXPECT_EQ(row.voltage_v, 0.0);

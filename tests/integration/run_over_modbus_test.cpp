@@ -210,6 +210,13 @@ TEST_P(RunOverModbus, BalancesOrStopsAtZeroVolts) {
     return std::stoll(outcome.run_yaml.substr(outcome.run_yaml.find(key + ": ", counts) + key.size() + 2));
   };
   EXPECT_EQ(held, counted("stale") + counted("faults")) << "each faulty cycle is marked in the log";
+  long long explained = 0;
+  for (const char* cause : {"late_reply", "no_reply", "no_connection", "wrong_reply", "refused", "other"})
+    explained += counted(cause);
+  EXPECT_EQ(held, explained) << "each has its cause";
+  if (outcome.exit_code == 0 && counted("no_reply") > 0) {
+    EXPECT_GT(counted("recoveries"), 0) << "it went on because the link came back";
+  }
   if (c.end == End::balances) {
     EXPECT_EQ(outcome.exit_code, 0) << outcome.said << outcome.run_yaml;
   }

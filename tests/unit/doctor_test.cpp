@@ -2,14 +2,17 @@
 #include <gtest/gtest.h>
 #include <stdlib.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <functional>
 #include <iterator>
 #include <numbers>
+#include <sstream>
 #include <string>
 
 #include "upright/runtime/cpu_latency.hpp"
+#include "upright/runtime/histogram_text.hpp"
 #include "upright/runtime/machine_check.hpp"
 #include "upright/runtime/rig_check.hpp"
 #include "upright/runtime/wake_probe.hpp"
@@ -213,6 +216,138 @@ TEST(SignsByHand, SayThatNobodyMovedAnything) {
       examine_signs_by_hand(rig, clock, ip02(), 1.0, signal, [](const std::string&) {});
   for (const Finding& finding : findings) EXPECT_EQ(finding.health, Health::not_examined);
   EXPECT_NEAR(static_cast<double>(clock.now_ns()) * 1e-9, 2.0, 0.1);
+}
+
+/// A rig with inputs that somebody works as asked: each wish is fulfilled a moment later, but the deaf ones.
+class WiredRig final : public Rig {
+ public:
+  explicit WiredRig(Clock& clock) : clock_(clock) {}
+  SafetyInputs inputs{true, 2};
+  bool stop_is_deaf = false;
+  RigFault active = RigFault::none;
+  std::vector<std::string> asked;
+
+  void hear(const std::string& words) {
+    asked.push_back(words);
+    const bool about_stop = words.find("emergency stop") != std::string::npos;
+    if (about_stop && stop_is_deaf) return;
+    const bool on = words.rfind("press", 0) == 0 || words.rfind("trip", 0) == 0;
+    next_ = !on ? RigFault::none : about_stop ? RigFault::emergency_stop : RigFault::limit_switch;
+    from_ns_ = clock_.now_ns() + 500'000'000;
+  }
+  void open() override {}
+  RigReading read() noexcept override {
+    if (clock_.now_ns() >= from_ns_) active = next_;
+    clock_.sleep_until(clock_.now_ns() + 1'000'000);
+    RigReading reading;
+    reading.status = active == RigFault::none ? RigStatus::fresh : RigStatus::fault;
+    reading.fault = active;
+    return reading;
+  }
+  RigFault write(double) noexcept override {
+    ADD_FAILURE() << "a voltage was written";
+    return RigFault::none;
+  }
+  void stop() noexcept override {}
+  SafetyInputs safety_inputs() const noexcept override { return inputs; }
+
+ private:
+  Clock& clock_;
+  RigFault next_ = RigFault::none;
+  std::int64_t from_ns_ = 0;
+};
+
+std::vector<Finding> by_hand(WiredRig& rig, Clock& clock) {
+  const SignalFlag signal{0};
+  return examine_safety_inputs_by_hand(rig, clock, 2.0, signal,
+                                       [&rig](const std::string& words) { rig.hear(words); });
+}
+
+TEST(SafetyInputs, AreSeenToBePressedAndReleasedByHand) {
+  VirtualClock clock;
+  WiredRig rig(clock);
+  const std::vector<Finding> findings = by_hand(rig, clock);
+  ASSERT_EQ(findings.size(), 3u) << "the emergency stop and two limit switches";
+  for (const Finding& finding : findings) EXPECT_EQ(finding.health, Health::good) << finding.what;
+  EXPECT_EQ(rig.asked.size(), 6u) << "on and off, each";
+}
+
+TEST(SafetyInputs, ThatAreNotSeenAreBad) {
+  VirtualClock clock;
+  WiredRig rig(clock);
+  rig.stop_is_deaf = true;
+  const std::vector<Finding> findings = by_hand(rig, clock);
+  EXPECT_EQ(about(findings, "emergency stop").health, Health::bad);
+  EXPECT_NE(about(findings, "emergency stop").remedy.find("gpio.emergency_stop"), std::string::npos);
+  EXPECT_EQ(about(findings, "limit switch 2 of 2").health, Health::good);
+  EXPECT_EQ(verdict_of(findings), Health::bad);
+}
+
+TEST(SafetyInputs, ThatStayActiveAreBad) {
+  VirtualClock clock;
+  WiredRig rig(clock);
+  rig.inputs = {true, 0};
+  const SignalFlag signal{0};
+  const std::vector<Finding> findings =
+      examine_safety_inputs_by_hand(rig, clock, 1.0, signal, [&rig](const std::string& words) {
+        if (words.rfind("press", 0) == 0) rig.hear(words);
+      });
+  ASSERT_EQ(findings.size(), 1u);
+  EXPECT_EQ(findings[0].health, Health::bad);
+  EXPECT_NE(findings[0].what.find("release"), std::string::npos) << findings[0].what;
+}
+
+TEST(SafetyInputs, ArePartOfThePageWithoutAHand) {
+  const std::vector<Finding> missing = name_missing_inputs({});
+  EXPECT_EQ(about(missing, "emergency stop").what, "no emergency stop is wired");
+  EXPECT_FALSE(about(missing, "emergency stop").remedy.empty());
+  EXPECT_FALSE(about(missing, "limit switches").remedy.empty());
+  EXPECT_TRUE(name_missing_inputs({true, 2}).empty());
+  EXPECT_TRUE(judge_safety_inputs({}, {}).empty());
+  for (const Finding& finding : judge_safety_inputs({true, 2}, {}))
+    EXPECT_EQ(finding.health, Health::not_examined) << finding.subject;
+}
+
+TEST(SafetyInputs, ThatAreActiveAreNamedAndNotBlamedOnTheLink) {
+  VirtualClock clock;
+  WiredRig rig(clock);
+  rig.hear("press the emergency stop");
+  const SignalFlag signal{0};
+  const LinkProbe probe = probe_link(rig, clock, 100.0, 2.0, signal);
+  EXPECT_EQ(probe.failed, 0u);
+  EXPECT_NEAR(static_cast<double>(probe.emergency_stops), 150.0, 2.0);
+  EXPECT_EQ(judge_link(probe, 100.0).health, Health::good);
+  EXPECT_EQ(about(judge_safety_inputs(rig.inputs, probe), "emergency stop").health, Health::poor);
+  // Pressed all the time, nothing can be said about the link.
+  const LinkProbe all = probe_link(rig, clock, 100.0, 1.0, signal);
+  EXPECT_EQ(judge_link(all, 100.0).health, Health::not_examined);
+}
+
+TEST(Histograms, ShowEveryCountWithinAHundredColumns) {
+  DurationHistogram narrow, wide, link;
+  for (int i = 0; i < 10000; ++i) narrow.add(30'000);
+  for (int i = 0; i < 990; ++i) wide.add(70'000 + 100 * i);
+  wide.add(9'000'000);
+  link.add(20'000'000'000);
+  const std::vector<std::string> lines =
+      histogram_lines({{"idle", narrow}, {"loaded", wide}, {"link", link}});
+  std::uint64_t counted = 0;
+  for (const std::string& line : lines) {
+    EXPECT_LE(line.size(), 100u) << line;
+    std::istringstream words(line.substr(17));
+    for (std::string word; words >> word;)
+      if (word.find_first_not_of("0123456789") == std::string::npos) counted += std::stoull(word);
+  }
+  EXPECT_EQ(counted, 10000u + 991u + 1u);
+  EXPECT_NE(lines[0].find("loaded"), std::string::npos);
+  EXPECT_NE(lines[1].find("20 us to 50 us"), std::string::npos) << lines[1];
+  EXPECT_NE(lines.back().find("above 10 s"), std::string::npos) << lines.back();
+  const auto late = std::find_if(lines.begin(), lines.end(), [](const std::string& line) {
+    return line.find("5 ms to 10 ms") != std::string::npos;
+  });
+  ASSERT_NE(late, lines.end());
+  EXPECT_NE(late->find(" 1 #"), std::string::npos) << "a single one is seen: " << *late;
+  EXPECT_TRUE(histogram_lines({{"nothing", DurationHistogram{}}}).empty());
 }
 
 TEST(CpuLatencyHold, WritesZeroMicrosecondsWhereItCan) {

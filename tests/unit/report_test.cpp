@@ -7,9 +7,11 @@
 #include <regex>
 #include <set>
 
+#include "../../src/report/row_thinner.hpp"
 #include "upright/model/error.hpp"
 #include "upright/report/html.hpp"
 #include "upright/report/plot.hpp"
+#include "upright/report/statistics.hpp"
 
 namespace upright {
 namespace {
@@ -147,14 +149,79 @@ TEST(Thinned, KeepsEveryPeakAndTheEnds) {
     EXPECT_TRUE(std::binary_search(kept.begin(), kept.end(), must)) << must;
 }
 
-TEST(Histogram, CountsEveryFiniteValueOnce) {
-  std::vector<double> values{std::numeric_limits<double>::quiet_NaN(), -3.0, 7.0};
-  for (int i = 0; i < 1000; ++i) values.push_back(std::cos(0.1 * i));
+TEST(RowThinner, KeepsEveryRowOfAShortRun) {
+  RowThinner thinner;
+  for (std::uint64_t i = 0; i < 5000; ++i) {
+    LogRecord row;
+    row.tick = i;
+    thinner.add(row);
+  }
+  const std::vector<LogRecord> rows = thinner.take();
+  ASSERT_EQ(rows.size(), 5000u);
+  for (std::uint64_t i = 0; i < rows.size(); ++i) EXPECT_EQ(rows[i].tick, i);
+}
+
+TEST(RowThinner, LosesNoPeakAndNoGapOfALongRun) {
+  constexpr std::uint64_t count = 1'500'000;
+  RowThinner thinner;
+  for (std::uint64_t i = 0; i < count; ++i) {
+    LogRecord row;
+    row.tick = i;
+    row.theta_rad = 0.01 * std::sin(0.001 * static_cast<double>(i));
+    row.cart_m = 0.02 * std::cos(0.0017 * static_cast<double>(i));
+    row.wake_late_ns = static_cast<std::int64_t>(i % 1000);
+    if (i == 777) row.theta_rad = 1.0;
+    if (i == 1'234'567) row.theta_rad = -1.0;
+    if (i == 500'001) row.read_ns = 5'000'000;
+    if (i == 900'000) row.voltage_requested_v = std::numeric_limits<double>::quiet_NaN();
+    thinner.add(row);
+  }
+  const std::vector<LogRecord> rows = thinner.take();
+  EXPECT_LE(rows.size(), RowThinner::most_rows);
+  EXPECT_GT(rows.size(), 20'000u) << "several for each column of pixels";
+  EXPECT_TRUE(std::is_sorted(rows.begin(), rows.end(),
+                             [](const LogRecord& a, const LogRecord& b) { return a.tick < b.tick; }));
+  std::uint64_t widest = 0;
+  for (std::size_t i = 1; i < rows.size(); ++i) widest = std::max(widest, rows[i].tick - rows[i - 1].tick);
+  EXPECT_LT(widest, count / 1000) << "as dense at the beginning as at the end";
+  for (const std::uint64_t must : {std::uint64_t{0}, std::uint64_t{777}, std::uint64_t{1'234'567},
+                                   std::uint64_t{500'001}, std::uint64_t{900'000}, count - 1})
+    EXPECT_TRUE(std::any_of(rows.begin(), rows.end(), [=](const LogRecord& row) { return row.tick == must; }))
+        << must;
+}
+
+TEST(ValueCounts, GiveTheQuantilesOfWhatWasCounted) {
+  ValueCounts counts;
+  EXPECT_EQ(counts.spread().largest, 0.0);
+  for (std::int64_t i = 1; i <= 10'000; ++i) counts.add(i);
+  EXPECT_EQ(counts.spread().median, 5000.0) << "small ones exactly";
+  EXPECT_EQ(counts.spread().p999, 9990.0);
+  EXPECT_EQ(counts.sorted().size(), 10'000u);
+  ValueCounts large;
+  for (std::int64_t i = 1; i <= 100'000; ++i) large.add(1'000 * i);
+  EXPECT_NEAR(large.spread().median, 5e7, 5e7 / 32768.0);
+  EXPECT_EQ(large.spread().largest, 1e8);
+  std::uint64_t total = 0;
+  for (const auto& [value, times] : large.sorted()) total += times;
+  EXPECT_EQ(total, 100'000u);
+}
+
+TEST(Magnitude, IsOfTheFiniteValues) {
+  Magnitude magnitude;
+  EXPECT_EQ(magnitude.root_mean_square(), 0.0);
+  for (const double value : {3.0, -4.0, std::numeric_limits<double>::quiet_NaN()}) magnitude.add(value);
+  EXPECT_EQ(magnitude.largest(), 4.0);
+  EXPECT_NEAR(magnitude.root_mean_square(), std::sqrt(12.5), 1e-12);
+}
+
+TEST(Histogram, CountsEveryValueAsOftenAsItCame) {
+  std::vector<std::pair<double, std::uint64_t>> values{{-3.0, 1}, {7.0, 1}};
+  for (int i = 0; i < 500; ++i) values.emplace_back(std::cos(0.1 * i), 2);
   const Series series = histogram(values, 40, "h");
   double total = 0.0;
   for (const double count : series.y) total += count;
   EXPECT_EQ(total, 1002.0);
-  EXPECT_EQ(histogram({2.0, 2.0}, 10, "h").y.front(), 2.0);
+  EXPECT_EQ(histogram({{2.0, 2}}, 10, "h").y.front(), 2.0);
   EXPECT_TRUE(histogram({}, 10, "h").x.empty());
 }
 

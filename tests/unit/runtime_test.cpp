@@ -188,6 +188,34 @@ TEST(ReadSamples, LeavesOutALastLineThatWasCutAndWhatAPowerCutLeaves) {
   EXPECT_THROW(read_samples(file), ConfigError);
 }
 
+/// More than fits into the reader's buffer at once.
+TEST(SampleReader, ReadsALongFileRowByRow) {
+  TemporaryFolder folder;
+  const fs::path file = folder.path() / "samples.csv";
+  constexpr std::uint64_t count = 60'000;
+  std::string text = std::string(sample_columns) + "\n";
+  for (std::uint64_t i = 0; i < count; ++i)
+    text += std::to_string(i) + ",0.001,1,2,0,0,0,0,1.5,1.25" + (i % 7 == 0 ? "" : "0000") + ",0,0,0,0,0,1\n";
+  const auto write = [&](const std::string& end) { std::ofstream(file, std::ios::binary) << text << end; };
+  const auto count_rows = [&](bool truncated) {
+    SampleReader reader(file);
+    std::uint64_t rows = 0;
+    for (LogRecord row; reader.next(row); ++rows)
+      if (row.tick != rows || row.voltage_v != 1.25) return std::uint64_t{0};
+    EXPECT_EQ(reader.truncated(), truncated);
+    return rows;
+  };
+  write("");
+  ASSERT_GT(fs::file_size(file), 2u << 20);
+  EXPECT_EQ(count_rows(false), count);
+  write("60000,0.0");
+  EXPECT_EQ(count_rows(true), count);
+  write(std::string(3 << 20, '\0'));
+  EXPECT_EQ(count_rows(true), count);
+  write(std::string(3 << 20, 'x') + "\n");
+  EXPECT_THROW(count_rows(true), ConfigError);
+}
+
 RigFile simulated_file(const std::string& plant = "exponential") {
   RigFile rig = read_rig_file(UPRIGHT_SOURCE_DIR "/config/rigs/simulated.yaml");
   rig.simulated->plant = UPRIGHT_SOURCE_DIR "/config/plants/" + plant + ".yaml";
@@ -455,6 +483,63 @@ TEST(Session, GoesOnThroughTroubleThatPassesWithinTheWatchdogTime) {
   });
   EXPECT_EQ(run.result.outcome.reason, StopReason::duration);
   EXPECT_EQ(run.result.outcome.counts.faults, 200u);
+}
+
+RigReading unfresh(RigStatus status, RigFault fault) {
+  RigReading reading;
+  reading.status = status;
+  reading.fault = fault;
+  return reading;
+}
+
+TEST(LinkCounts, CountByCauseWhatALinkDidWrong) {
+  LinkCounts counts;
+  RigReading fresh;
+  fresh.status = RigStatus::fresh;
+  counts.add(fresh);
+  EXPECT_EQ(sentence_of(counts), "");
+  for (int i = 0; i < 3; ++i) counts.add(unfresh(RigStatus::stale, RigFault::link_timeout));
+  counts.add(fresh);
+  counts.add(unfresh(RigStatus::fault, RigFault::corrupt_reply));
+  counts.add(unfresh(RigStatus::fault, RigFault::link_lost));
+  fresh.recoveries = 2;
+  counts.add(fresh);
+  counts.add(unfresh(RigStatus::fault, RigFault::emergency_stop));
+  EXPECT_EQ(counts.of(LinkTrouble::late), 3u);
+  EXPECT_EQ(counts.of(LinkTrouble::wrong_reply), 1u);
+  EXPECT_EQ(counts.of(LinkTrouble::no_connection), 1u);
+  EXPECT_EQ(
+      counts.of(LinkTrouble::no_reply) + counts.of(LinkTrouble::refused) + counts.of(LinkTrouble::other), 0u)
+      << "an emergency stop is no fault of the link";
+  EXPECT_EQ(counts.longest, 3u);
+  EXPECT_EQ(sentence_of(counts),
+            "3 late replies, 1 period without a connection, 1 wrong reply, at most 3 in a row; the link was "
+            "brought back 2 times");
+}
+
+TEST(Session, SaysWhatARunWentOnAfter) {
+  TemporaryFolder folder;
+  const TestRun run = run_tampered(folder, setup_for(simulated_file(), 2.0), [](TamperedRig& rig, Clock&) {
+    rig.on_read = [](int i, RigReading& reading) {
+      if (i > 1000) reading.recoveries = 1;
+      if (i == 500 || i == 501) reading.status = RigStatus::stale;
+      if (i == 800) {
+        reading.status = RigStatus::fault;
+        reading.fault = RigFault::link_timeout;
+      }
+    };
+  });
+  ASSERT_TRUE(run.record.outcome.has_value());
+  const YamlMap link = run.record.outcome->map("link");
+  EXPECT_EQ(link.number("late_reply"), 2.0);
+  EXPECT_EQ(link.number("no_reply"), 1.0);
+  EXPECT_EQ(link.number("wrong_reply"), 0.0);
+  EXPECT_EQ(link.number("longest"), 2.0);
+  EXPECT_EQ(link.number("recoveries"), 1.0);
+  EXPECT_EQ(
+      run.record.outcome->text("sentence"),
+      "the run lasted its whole time and went on after 2 late replies, 1 reply that never came, at most 2 "
+      "in a row; the link was brought back 1 time");
 }
 
 TEST(Session, AttributesAnOverrunToTheStepThatTookTheTime) {

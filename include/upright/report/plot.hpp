@@ -1,8 +1,10 @@
 // A plot as plain data, and its drawing as an SVG element by gnuplot.
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace upright {
@@ -76,7 +78,8 @@ std::string svg_file_of(const Plot& plot);
 std::vector<std::size_t> thinned(const std::vector<double>& x, const std::vector<double>& y,
                                  std::size_t columns);
 
-/// A histogram of the finite values as bars over `bins` equal bins.
-Series histogram(const std::vector<double>& values, std::size_t bins, const std::string& name);
+/// A histogram of finite values, each with how often it came, as bars over `bins` equal bins.
+Series histogram(const std::vector<std::pair<double, std::uint64_t>>& values, std::size_t bins,
+                 const std::string& name);
 
 }  // namespace upright

@@ -1,6 +1,9 @@
 // The few statistics that reports show.
 #pragma once
 
+#include <cstdint>
+#include <unordered_map>
+#include <utility>
 #include <vector>
 
 namespace upright {
@@ -12,13 +15,34 @@ struct Spread {
   double largest = 0.0;
 };
 
-/// Of the finite values; all zero when there are none.
-Spread spread_of(std::vector<double> values);
+/// Counts values that are not negative, in memory that grows with how different they are and not with how
+/// many: whole numbers up to 65536 are told apart, larger ones to 1/32768 of themselves.
+class ValueCounts {
+ public:
+  void add(std::int64_t value);
+  /// All zero when nothing was counted.
+  Spread spread() const;
+  /// Value and how many, in rising order. A value that stands for several is the largest of them that came.
+  std::vector<std::pair<std::int64_t, std::uint64_t>> sorted() const;
 
-/// Largest magnitude among the finite values; 0 when there are none.
-double largest_magnitude(const std::vector<double>& values);
+ private:
+  struct Group {
+    std::int64_t largest = 0;
+    std::uint64_t count = 0;
+  };
+  std::unordered_map<std::int64_t, Group> groups_;
+};
 
-/// Root of the mean square of the finite values; 0 when there are none.
-double root_mean_square(const std::vector<double>& values);
+/// Largest magnitude and root of the mean square of the finite values; 0 when there are none.
+class Magnitude {
+ public:
+  void add(double value);
+  double largest() const { return largest_; }
+  double root_mean_square() const;
+
+ private:
+  double largest_ = 0.0, sum_ = 0.0;
+  std::uint64_t count_ = 0;
+};
 
 }  // namespace upright

@@ -11,6 +11,7 @@
 #include "upright/hal/calibration.hpp"
 #include "upright/hal/clock.hpp"
 #include "upright/hal/rig.hpp"
+#include "upright/runtime/link_counts.hpp"
 #include "upright/runtime/run_log.hpp"
 #include "upright/runtime/sleep_policy.hpp"
 #include "upright/runtime/timing_stats.hpp"
@@ -65,6 +66,7 @@ struct LoopCounts {
   std::uint64_t overruns_wake = 0, overruns_read = 0, overruns_compute = 0, overruns_write = 0;
   std::uint64_t saturated = 0, writes_failed = 0;
   std::uint64_t page_faults = 0;  ///< of the loop's thread, none with memory locked; the session counts them
+  LinkCounts link;                ///< why readings were stale or faults
 };
 
 struct LoopOutcome {

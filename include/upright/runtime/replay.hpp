@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 
 #include "upright/control/controller.hpp"
@@ -26,5 +27,9 @@ struct ReplayResult {
 /// had one, and so is a `source`.
 ReplayResult replay(const RunRecord& run, std::unique_ptr<DelayCompensator> compensator = nullptr,
                     CommandSource* source = nullptr);
+
+/// The same with the rows of a file: `run` is read without them.
+ReplayResult replay(const RunRecord& run, SampleReader& rows,
+                    std::unique_ptr<DelayCompensator> compensator = nullptr, CommandSource* source = nullptr);
 
 }  // namespace upright

@@ -19,6 +19,8 @@ namespace upright {
 struct LinkProbe {
   DurationHistogram round_trip;  ///< of readings that came
   std::uint64_t failed = 0;
+  /// Readings that an active input refused: no fault of the link.
+  std::uint64_t emergency_stops = 0, limit_switches = 0;
   std::vector<EncoderCounts> counts;  ///< of the last second
 };
 
@@ -58,5 +60,17 @@ class HandTest {
 std::vector<Finding> examine_signs_by_hand(Rig& rig, Clock& clock, const Calibration& calibration,
                                            double patience_s, const SignalFlag& signal,
                                            const std::function<void(const std::string&)>& ask);
+
+/// Which inputs a rig does not have, and what to do about it.
+std::vector<Finding> name_missing_inputs(const SafetyInputs& inputs);
+
+/// What those that are wired showed while the link was probed.
+std::vector<Finding> judge_safety_inputs(const SafetyInputs& inputs, const LinkProbe& probe);
+
+/// Asks to press the emergency stop and to trip each limit switch, and to release each again, each with
+/// `patience_s`: was it seen? Those that are not wired are left out.
+std::vector<Finding> examine_safety_inputs_by_hand(Rig& rig, Clock& clock, double patience_s,
+                                                   const SignalFlag& signal,
+                                                   const std::function<void(const std::string&)>& ask);
 
 }  // namespace upright

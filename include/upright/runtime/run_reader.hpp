@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -22,8 +23,27 @@ struct Samples {
   bool truncated = false;       ///< the last line was cut; it is not among the rows
 };
 
-/// Throws ConfigError with file and line for a column that is missing and for a line that is not a row, other
-/// than at the end of the file.
+/// Reads a samples.csv row by row, in the same memory however long the run was.
+class SampleReader {
+ public:
+  /// Throws ConfigError for a column that is missing.
+  explicit SampleReader(const std::filesystem::path& file);
+  ~SampleReader();
+  SampleReader(const SampleReader&) = delete;
+  SampleReader& operator=(const SampleReader&) = delete;
+
+  /// False after the last row. Throws ConfigError with file and line for a line that is not a row, other than
+  /// at the end of the file.
+  bool next(LogRecord& row);
+  /// After the last row: the last line was cut and was left out.
+  bool truncated() const noexcept;
+
+ private:
+  class Implementation;
+  std::unique_ptr<Implementation> implementation_;
+};
+
+/// All rows at once. Throws what SampleReader throws.
 Samples read_samples(const std::filesystem::path& file);
 
 struct RunRecord {
@@ -41,5 +61,8 @@ struct RunRecord {
 
 /// Reads a run directory. Throws ConfigError with remedy, file, line and key.
 RunRecord read_run(const std::filesystem::path& directory);
+
+/// The same without the samples, for who reads them row by row.
+RunRecord read_run_without_samples(const std::filesystem::path& directory);
 
 }  // namespace upright

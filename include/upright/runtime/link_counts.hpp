@@ -1,0 +1,44 @@
+// What the link to a rig did wrong during a run, by cause: a run that went on says what it went on after.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <string>
+
+#include "upright/hal/rig.hpp"
+
+namespace upright {
+
+/// Why a cycle had no fresh counts.
+enum class LinkTrouble : std::uint8_t {
+  late,           ///< the reply was not there when the cycle could wait no longer
+  no_reply,       ///< none within the response timeout
+  no_connection,  ///< the connection is gone
+  wrong_reply,    ///< corrupt, of an earlier request, or counts that no motion leads to
+  refused,        ///< the device answered with an exception
+  other,          ///< a fault of the device, not of the link
+};
+
+struct LinkCounts {
+  static constexpr std::size_t kinds = 6;
+
+  std::array<std::uint64_t, kinds> cycles{};  ///< by LinkTrouble
+  std::uint64_t longest = 0;                  ///< most cycles in a row without fresh counts
+  std::uint64_t recoveries = 0;               ///< how often the link was brought back
+
+  std::uint64_t of(LinkTrouble trouble) const noexcept { return cycles[static_cast<std::size_t>(trouble)]; }
+  void add(const RigReading& reading) noexcept;
+
+ private:
+  std::uint64_t in_a_row_ = 0;
+};
+
+/// "late_reply", "no_reply", "no_connection", "wrong_reply", "refused", "other".
+const char* name_of(LinkTrouble trouble) noexcept;
+
+/// "3 late replies, 1 wrong reply, at most 2 in a row; the link was brought back 1 time"; empty when
+/// there was no trouble.
+std::string sentence_of(const LinkCounts& counts);
+
+}  // namespace upright

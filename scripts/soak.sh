@@ -1,0 +1,12 @@
+#!/usr/bin/env bash
+# A long run and what it must leave behind: no leak, no drift of the clock, no row lost, a replay to the bit and a report.
+#   scripts/soak.sh [--virtual-hours 2] [--real-minutes 10] [further options of scripts/soak.py, see its --help]
+set -euo pipefail
+cd "$(dirname "$0")/.."
+
+upright=build/release/src/cli/upright
+if [ ! -x "$upright" ]; then
+  scripts/install-deps.sh
+  scripts/build.sh release upright
+fi
+exec python3 scripts/soak.py "$@"

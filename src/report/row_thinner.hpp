@@ -1,0 +1,37 @@
+// Thins a run's rows to what a plot can show, in the same memory however long the run was.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "upright/runtime/log_record.hpp"
+
+namespace upright {
+
+/// Keeps every row of a run of up to `most_rows`. Of a longer one it keeps of each block of rows the first
+/// and the last, and for each quantity that is drawn the smallest, the largest and one that is no number: no
+/// peak and no gap is lost. Blocks grow with the run.
+class RowThinner {
+ public:
+  static constexpr std::size_t most_rows = 200'000;
+
+  void add(const LogRecord& row);
+  /// In their order.
+  std::vector<LogRecord> take();
+
+ private:
+  struct Kept {
+    std::uint64_t place;  // among all rows
+    LogRecord row;
+  };
+
+  void thin(std::size_t from);
+  std::vector<std::size_t> chosen(std::size_t begin, std::size_t end) const;
+
+  std::vector<Kept> kept_;
+  std::size_t block_begin_ = 0;  // place in kept_ of the block that grows
+  std::uint64_t rows_ = 0, block_rows_ = 1;
+};
+
+}  // namespace upright
