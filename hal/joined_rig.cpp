@@ -48,6 +48,7 @@ class JoinedRig final : public Rig {
     for (Part& part : parts_) {
       const RigReading of_part = read_part(part);
       worsen(reading, of_part.status, of_part.fault);
+      reading.recoveries += of_part.recoveries;
       if (part.roles.cart) {
         reading.cart_counts = of_part.cart_counts;
         cart_ns = of_part.time_ns;

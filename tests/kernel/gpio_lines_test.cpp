@@ -80,6 +80,8 @@ TEST_F(GpioLines, LetAReadingThroughWhileNothingIsPressed) {
   const RigReading reading = rig->read();
   EXPECT_EQ(reading.status, RigStatus::fresh);
   EXPECT_EQ(reading.cart_counts, 7);
+  EXPECT_TRUE(rig->safety_inputs().emergency_stop);
+  EXPECT_EQ(rig->safety_inputs().limit_switches, 2);
 }
 
 TEST_F(GpioLines, EachInputIsItsOwnFaultAtItsOwnLevelWhileItIsActive) {

@@ -92,7 +92,10 @@ TEST_F(JoinedRigTest, TakesEachCountFromItsPartAndTheOlderTime) {
   rig->open();
   pendulum.next.time_ns -= period_ns / 4;
   output.next.time_ns = 0;
+  cart.next.recoveries = 1;
+  output.next.recoveries = 2;
   const RigReading reading = rig->read();
+  EXPECT_EQ(reading.recoveries, 3u) << "of all links together";
   EXPECT_EQ(reading.status, RigStatus::fresh);
   EXPECT_EQ(reading.cart_counts, 11);
   EXPECT_EQ(reading.pendulum_counts, 22);

@@ -504,7 +504,9 @@ TEST(LinkCounts, CountByCauseWhatALinkDidWrong) {
   counts.add(unfresh(RigStatus::fault, RigFault::link_lost));
   fresh.recoveries = 2;
   counts.add(fresh);
-  counts.add(unfresh(RigStatus::fault, RigFault::emergency_stop));
+  for (const RigFault pressed : {RigFault::emergency_stop, RigFault::limit_switch,
+                                 RigFault::limit_switch_plus, RigFault::limit_switch_minus})
+    counts.add(unfresh(RigStatus::fault, pressed));
   EXPECT_EQ(counts.of(LinkTrouble::late), 3u);
   EXPECT_EQ(counts.of(LinkTrouble::wrong_reply), 1u);
   EXPECT_EQ(counts.of(LinkTrouble::no_connection), 1u);
