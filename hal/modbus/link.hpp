@@ -65,8 +65,8 @@ class ModbusLink {
   bool connected_ = false;
   bool in_step_ = false;
   int first_ = 0;
-  int block_ = 0;         // registers that read() asks for; 0: there is nothing to read
-  int other_block_ = 0;   // asked for to tell an answer from those to earlier requests
+  int block_ = 0;        // registers that read() asks for; 0: there is nothing to read
+  int other_block_ = 0;  // asked for to tell an answer from those to earlier requests
   std::unique_ptr<modbus_t, Free> context_;
   std::array<std::uint16_t, most_registers> registers_{};
 };

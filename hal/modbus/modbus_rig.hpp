@@ -7,8 +7,8 @@
 // carry both directions: that of read() repeats the voltage that is already on, which also keeps the device's
 // watchdog fed when a write was lost.
 //
-// In a joined rig the device has a part of this only. As encoders it is never sent a voltage but zero, and with
-// separate exchanges none at all; as output its readings have no counts and show that it answers.
+// In a joined rig the device has a part of this only. As encoders it is never sent a voltage but zero, and
+// with separate exchanges none at all; as output its readings have no counts and show that it answers.
 #pragma once
 
 #include <atomic>
