@@ -53,6 +53,8 @@ struct RigReading {
   std::int64_t pendulum_counts = 0;
   std::int64_t time_ns = 0;    ///< when the counts were taken, on the clock the loop runs on
   std::uint64_t sequence = 0;  ///< grows with each fresh reading
+  /// How often the link was brought back since the rig was opened: connected anew, or back in step.
+  std::uint32_t recoveries = 0;
   RigStatus status = RigStatus::fault;
   RigFault fault = RigFault::none;
 };
