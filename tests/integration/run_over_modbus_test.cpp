@@ -213,7 +213,9 @@ TEST_P(RunOverModbus, BalancesOrStopsAtZeroVolts) {
   long long explained = 0;
   for (const char* cause : {"late_reply", "no_reply", "no_connection", "wrong_reply", "refused", "other"})
     explained += counted(cause);
-  EXPECT_EQ(held, explained) << "each has its cause";
+  // A cycle that comes too late to be given a voltage asks the link for nothing.
+  const bool never_asked = outcome.reason() == "overrun" && rows.back().held() && rows.back().read_s == 0.0;
+  EXPECT_EQ(held - (never_asked ? 1 : 0), explained) << "each has its cause";
   if (outcome.exit_code == 0 && counted("no_reply") > 0) {
     EXPECT_GT(counted("recoveries"), 0) << "it went on because the link came back";
   }

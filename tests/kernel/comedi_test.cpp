@@ -2,19 +2,19 @@
 // runs that balance a plant through analog channels. Two cards, for a locked output keeps everybody else from
 // its neighbours.
 #include <gtest/gtest.h>
-#include <pthread.h>
-#include <sched.h>
 #include <signal.h>
 
 #include <atomic>
 #include <chrono>
 #include <cmath>
 #include <memory>
+#include <optional>
 #include <thread>
 
 #include "../../hal/virtual/virtual_plant.hpp"
 #include "../integration/virtual_rig_process.hpp"
 #include "comedi_card.hpp"
+#include "every_millisecond.hpp"
 #include "upright/hal/clock.hpp"
 #include "upright/hal/rig_factory.hpp"
 #include "upright/model/error.hpp"
@@ -204,16 +204,8 @@ class PlantOnCards {
         encoders_(encoders),
         plant_(rig_of(rig_text_for()), read_plant_file(config + "plants/exponential.yaml"), options(trace)) {
     step(MonotonicClock().now_ns());
-    thread_ = std::thread([this] { serve(); });
-    const sched_param parameters{20};  // below the controller's
-    pthread_setschedparam(thread_.native_handle(), SCHED_FIFO, &parameters);
+    thread_.emplace([this](std::int64_t now_ns) { step(now_ns); });
   }
-  ~PlantOnCards() {
-    ending_ = true;
-    thread_.join();
-  }
-  PlantOnCards(const PlantOnCards&) = delete;
-  PlantOnCards& operator=(const PlantOnCards&) = delete;
 
   void suffer(Mishap mishap) { mishap_ = mishap; }
 
@@ -247,21 +239,11 @@ class PlantOnCards {
     encoders_.put(1, datum_of(static_cast<double>(counts.pendulum) / pendulum_counts_per_v));
   }
 
-  void serve() {
-    MonotonicClock clock;
-    while (!ending_) {
-      const std::int64_t now_ns = clock.now_ns();
-      step(now_ns);
-      clock.sleep_until(now_ns + 1'000'000);
-    }
-  }
-
   const Card& output_;
   const Card& encoders_;
   VirtualPlant plant_;
-  std::atomic<bool> ending_{false};
   std::atomic<Mishap> mishap_{Mishap::none};
-  std::thread thread_;
+  std::optional<EveryMillisecond> thread_;  // gone before what it moves
 };
 
 class ComediRun : public ComediTest {

@@ -1,5 +1,4 @@
 // What the loop calls of lines and line encoders neither allocates nor locks, libgpiod included.
-#include <dlfcn.h>
 #include <gtest/gtest.h>
 #include <pthread.h>
 
@@ -8,49 +7,9 @@
 #include <utility>
 
 #include "../../hal/gpio/edge_source.hpp"
+#include "../unit/counted_calls.hpp"
 #include "shaft.hpp"
 #include "upright/hal/gpio_rig.hpp"
-
-namespace {
-
-// Only the thread that arms them counts.
-thread_local bool armed = false;
-thread_local int allocations = 0;
-thread_local int locks = 0;
-
-}  // namespace
-
-extern "C" {
-
-void* __libc_malloc(size_t size);
-void* __libc_calloc(size_t count, size_t size);
-void* __libc_realloc(void* memory, size_t size);
-void __libc_free(void* memory);
-
-void* malloc(size_t size) {
-  if (armed) ++allocations;
-  return __libc_malloc(size);
-}
-void* calloc(size_t count, size_t size) {
-  if (armed) ++allocations;
-  return __libc_calloc(count, size);
-}
-void* realloc(void* memory, size_t size) {
-  if (armed) ++allocations;
-  return __libc_realloc(memory, size);
-}
-void free(void* memory) {
-  if (armed) ++allocations;
-  __libc_free(memory);
-}
-
-int pthread_mutex_lock(pthread_mutex_t* mutex) {
-  using Function = int (*)(pthread_mutex_t*);
-  static const Function real = reinterpret_cast<Function>(dlsym(RTLD_NEXT, "pthread_mutex_lock"));
-  if (armed) ++locks;
-  return real(mutex);
-}
-}
 
 namespace upright::test {
 namespace {

@@ -2,19 +2,19 @@
 // an external watchdog on the heartbeat, and the safety inputs end the run. Cart and voltage travel over
 // comedi_test. What the plant was given is what counts.
 #include <gtest/gtest.h>
-#include <pthread.h>
-#include <sched.h>
 #include <signal.h>
 
 #include <atomic>
 #include <chrono>
 #include <cmath>
 #include <memory>
+#include <optional>
 #include <thread>
 
 #include "../../hal/virtual/virtual_plant.hpp"
 #include "../integration/virtual_rig_process.hpp"
 #include "comedi_card.hpp"
+#include "every_millisecond.hpp"
 #include "shaft.hpp"
 #include "upright/hal/rig_file.hpp"
 #include "upright/model/plant_file.hpp"
@@ -90,16 +90,8 @@ class PlantOnLines {
         plant_(read_rig(YamlMap::from_text(rig_text + lines_text + encoder_text, "rig.yaml")),
                read_plant_file(config + "plants/exponential.yaml"), options(trace)) {
     step(MonotonicClock().now_ns());
-    thread_ = std::thread([this] { serve(); });
-    const sched_param parameters{20};  // below the controller's
-    pthread_setschedparam(thread_.native_handle(), SCHED_FIFO, &parameters);
+    thread_.emplace([this](std::int64_t now_ns) { step(now_ns); });
   }
-  ~PlantOnLines() {
-    ending_ = true;
-    thread_.join();
-  }
-  PlantOnLines(const PlantOnLines&) = delete;
-  PlantOnLines& operator=(const PlantOnLines&) = delete;
 
   /// Turns the encoder by so many counts at once, forth and back, as no pendulum does.
   void rattle(int counts) { rattle_ = counts; }
@@ -139,24 +131,14 @@ class PlantOnLines {
     }
   }
 
-  void serve() {
-    MonotonicClock clock;
-    while (!ending_) {
-      const std::int64_t now_ns = clock.now_ns();
-      step(now_ns);
-      clock.sleep_until(now_ns + 1'000'000);
-    }
-  }
-
   const Card& output_;
   const Card& cart_;
   GpioSim& sim_;
   Shaft shaft_;
   VirtualPlant plant_;
   ExternalWatchdog watchdog_;
-  std::atomic<bool> ending_{false};
   std::atomic<int> rattle_{0};
-  std::thread thread_;
+  std::optional<EveryMillisecond> thread_;  // gone before what it moves
 };
 
 /// The console is for the tests' own words.

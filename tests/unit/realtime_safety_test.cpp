@@ -1,8 +1,5 @@
-// Counts what the loop's thread allocates and locks between its first cycle and its last. The counters sit in
-// front of the C library's own functions, so that whatever calls them, in any library, is seen.
-#include <dlfcn.h>
+// Counts what the loop's thread allocates and locks between its first cycle and its last.
 #include <gtest/gtest.h>
-#include <pthread.h>
 #include <stdlib.h>
 
 #include <atomic>
@@ -19,6 +16,7 @@
 #include <utility>
 #include <vector>
 
+#include "counted_calls.hpp"
 #include "fake_comedi.hpp"
 #include "upright/control/predictor.hpp"
 #include "upright/hal/rig_factory.hpp"
@@ -28,71 +26,12 @@
 #include "upright/runtime/control_loop.hpp"
 #include "upright/runtime/session.hpp"
 
-namespace {
-
-// Only the thread that arms them counts.
-thread_local bool armed = false;
-thread_local int allocations = 0;
-thread_local int locks = 0;
-
-}  // namespace
-
-extern "C" {
-
-void* __libc_malloc(size_t size);
-void* __libc_calloc(size_t count, size_t size);
-void* __libc_realloc(void* memory, size_t size);
-void* __libc_memalign(size_t alignment, size_t size);
-void __libc_free(void* memory);
-
-void* malloc(size_t size) {
-  if (armed) ++allocations;
-  return __libc_malloc(size);
-}
-void* calloc(size_t count, size_t size) {
-  if (armed) ++allocations;
-  return __libc_calloc(count, size);
-}
-void* realloc(void* memory, size_t size) {
-  if (armed) ++allocations;
-  return __libc_realloc(memory, size);
-}
-void* aligned_alloc(size_t alignment, size_t size) {
-  if (armed) ++allocations;
-  return __libc_memalign(alignment, size);
-}
-int posix_memalign(void** memory, size_t alignment, size_t size) {
-  if (armed) ++allocations;
-  *memory = __libc_memalign(alignment, size);
-  return *memory == nullptr ? 12 : 0;
-}
-void free(void* memory) {
-  if (armed) ++allocations;
-  __libc_free(memory);
-}
-
-int pthread_mutex_lock(pthread_mutex_t* mutex) {
-  using Function = int (*)(pthread_mutex_t*);
-  static const Function real = reinterpret_cast<Function>(dlsym(RTLD_NEXT, "pthread_mutex_lock"));
-  if (armed) ++locks;
-  return real(mutex);
-}
-int pthread_rwlock_wrlock(pthread_rwlock_t* lock) {
-  using Function = int (*)(pthread_rwlock_t*);
-  static const Function real = reinterpret_cast<Function>(dlsym(RTLD_NEXT, "pthread_rwlock_wrlock"));
-  if (armed) ++locks;
-  return real(lock);
-}
-int pthread_rwlock_rdlock(pthread_rwlock_t* lock) {
-  using Function = int (*)(pthread_rwlock_t*);
-  static const Function real = reinterpret_cast<Function>(dlsym(RTLD_NEXT, "pthread_rwlock_rdlock"));
-  if (armed) ++locks;
-  return real(lock);
-}
-}
-
 namespace upright {
 namespace {
+
+using test::allocations;
+using test::armed;
+using test::locks;
 
 namespace fs = std::filesystem;
 
