@@ -145,6 +145,12 @@ class Identifier {
     tell(0.05, "balance of forces");
     Model model = start();
     model = fitted(model, trial_, 8, 1);
+    // Much noise and a poor fit hold each other up: a second descent begins with little noise.
+    Model calm = model;
+    calm.fit.point.noise.force *= 0.1;
+    calm.fit.point.noise.torque *= 0.1;
+    calm = fitted(calm, trial_, 16, 1);
+    if (rank_of(calm) < rank_of(model)) model = std::move(calm);
     const bool transition = range_.cart_moves && starts_from_rest() && grow(model);
     tell(0.6, "fitting everything");
     model = fitted(model, whole_, 12, 2);
@@ -192,27 +198,45 @@ class Identifier {
     return model;
   }
 
-  std::vector<FreeParameter> parameters_of(const Model& model) const {
+  /// `mass_known_to` is a share of where the mass is now; 0: nothing is believed of it.
+  std::vector<FreeParameter> parameters_of(const Model& model, double mass_known_to = 0.0) const {
     std::vector<FreeParameter> free;
     for (const std::size_t effect : model.free)
       for (FreeParameter p : free_parameters(effect, range_)) {
         // Nothing is believed beforehand, except that a shape without data stays near 2.
         if (p.prior_sigma > 0.0) p.prior_sigma *= 4.0;
+        if (mass_known_to > 0.0 && effect == number_of("cart_mass")) {
+          p.prior_mean = model.plant.find(effect)->values[0];
+          p.prior_sigma = mass_known_to * p.prior_mean;
+        }
         free.push_back(p);
       }
     return free;
   }
 
-  Model fitted(Model model, const FitData& data, int iterations, int noise_rounds) const {
+  Model fitted(Model model, const FitData& data, int iterations, int noise_rounds,
+               double mass_known_to = 0.0) const {
     FitPoint point;
     point.plant = model.plant;
     point.noise = model.fit.covariance.size() > 0 ? model.fit.point.noise : Noise{};
     if (model.fit.covariance.size() == 0) point.noise.force = 0.01 * range_.largest_force_n;
     point.starts = guess_starts(runs_, data.segments, model.plant);
     FitOptions fit_options;
+    if (model.fit.covariance.size() > 0) {
+      // What guessed initial states leave is not noise: they follow first.
+      fit_options.starts_only = true;
+      fit_options.noise_rounds = 0;
+      fit_options.most_iterations = 6;
+      const FitResult followed = fit(data, point, {}, fit_options);
+      if (std::isfinite(followed.objective)) point.starts = followed.point.starts;
+      fit_options = {};
+    }
     fit_options.most_iterations = iterations;
     fit_options.noise_rounds = noise_rounds;
-    model.fit = fit(data, point, parameters_of(model), fit_options);
+    model.fit = fit(data, point, parameters_of(model, mass_known_to), fit_options);
+    std::fprintf(
+        stderr, "fitted: %.8g force %.4g mass %.3f\n", model.fit.objective, model.fit.point.noise.force,
+        model.fit.point.plant.find("cart_mass") ? model.fit.point.plant.find("cart_mass")->values[0] : 0.0);
     if (std::isfinite(model.fit.objective)) model.plant = model.fit.point.plant;
     return model;
   }
@@ -251,29 +275,41 @@ class Identifier {
     return std::isfinite(model.fit.objective) ? model.fit.objective : std::numeric_limits<double>::infinity();
   }
 
-  /// Fits from every start to few data, from the better ones to more, and from the best two to the end: where
-  /// friction and bristles trade with each other, the start that looks best at first may lead to a lesser
-  /// optimum.
-  Model best_of(const Model& base, const std::vector<Start>& starts) const {
+  /// A model with more effects, not fitted yet. Noise that made up for what was missing is not where to start
+  /// from.
+  static Model richer(const Model& base, const Start& start) {
+    Model model{base.plant, base.free, {}};
+    for (const Addition& addition : start) {
+      const std::size_t effect = number_of(addition.kind);
+      model.plant.set(effect, addition.values);
+      if (std::find(model.free.begin(), model.free.end(), effect) == model.free.end())
+        model.free.push_back(effect);
+    }
+    return model;
+  }
+
+  static std::vector<Model> richer(const Model& base, const std::vector<Start>& starts) {
+    std::vector<Model> models;
+    models.reserve(starts.size());
+    for (const Start& start : starts) models.push_back(richer(base, start));
+    return models;
+  }
+
+  /// Fits each to few data, the better ones to more, and the best two to the end: where friction and bristles
+  /// trade with each other, the start that looks best at first may lead to a lesser optimum. At first the
+  /// mass, which accelerations show whatever the friction, stays near where it is, and makes up for no
+  /// friction that is not right yet.
+  Model best_of(std::vector<Model> models) const {
     struct Round {
       const FitData& data;
       int iterations, noise_rounds;
+      double mass_known_to;
       std::size_t kept;
     };
-    const Round rounds[] = {{few_, 6, 1, 3}, {trial_, 8, 1, 2}, {trial_, 12, 2, 1}};
-    std::vector<Model> models;
-    models.reserve(starts.size());
-    for (const Start& start : starts) {
-      // Noise that made up for what was missing is not where to start from.
-      Model richer{base.plant, base.free, {}};
-      for (const Addition& addition : start) {
-        richer.plant.set(number_of(addition.kind), addition.values);
-        richer.free.push_back(number_of(addition.kind));
-      }
-      models.push_back(std::move(richer));
-    }
+    const Round rounds[] = {{few_, 6, 1, 0.02, 3}, {trial_, 8, 1, 0.05, 2}, {trial_, 12, 2, 0.0, 1}};
     for (const Round& round : rounds) {
-      for (Model& model : models) model = fitted(model, round.data, round.iterations, round.noise_rounds);
+      for (Model& model : models)
+        model = fitted(model, round.data, round.iterations, round.noise_rounds, round.mass_known_to);
       std::stable_sort(models.begin(), models.end(),
                        [](const Model& x, const Model& y) { return rank_of(x) < rank_of(y); });
       models.resize(std::min(round.kept, models.size()));
@@ -281,16 +317,15 @@ class Identifier {
     return models.front();
   }
 
-  /// Adds effects; keeps them when the data ask for them.
-  bool try_effects(Model& model, const Model& base, const std::vector<Start>& starts) {
-    const Model best = best_of(base, starts);
+  /// Keeps the best of what was tried with these effects when the data ask for it. Whether they do.
+  bool keep(Model& model, const Model& best, const std::vector<std::string_view>& kinds) {
     if (!std::isfinite(best.fit.objective)) return false;
     const double evidence = model.fit.objective - best.fit.objective;
     bool sized = true;
     std::string names;
-    for (const Addition& addition : starts.front()) {
-      names += (names.empty() ? "" : " and ") + std::string(addition.kind);
-      const std::size_t effect = number_of(addition.kind);
+    for (const std::string_view kind : kinds) {
+      names += (names.empty() ? "" : " and ") + std::string(kind);
+      const std::size_t effect = number_of(kind);
       sized = sized && best.plant.find(effect)->values[0] > least_certainty * sigma_of(best, effect, 0);
     }
     const bool kept = evidence > least_evidence && sized;
@@ -310,27 +345,46 @@ class Identifier {
     double breakaway = 0.0;
     for (const Breakaway& b : result_.breakaways)
       breakaway += std::abs(b.force_n) / static_cast<double>(result_.breakaways.size());
-    const double extra = std::max(breakaway - sliding, 0.3 * std::max(sliding, 0.03));
     const double fast = range_.largest_speed_mps;
-    const auto rise = [&](double velocity, double shape) {
-      return Addition{"stribeck_friction", {extra, velocity * fast, shape}};
+    // One level for all speeds lies somewhere between rest and fast sliding: the rise begins as a part of it,
+    // or on top.
+    const auto part = [&](const Model& base, double velocity, double shape) {
+      const double half = 0.5 * base.plant.find("coulomb_friction")->values[0];
+      return Start{{"coulomb_friction", {half}}, {"stribeck_friction", {half, velocity * fast, shape}}};
+    };
+    const auto on_top = [&](double velocity, double shape) {
+      const double extra = std::max(breakaway - sliding, 0.3 * std::max(sliding, 0.03));
+      return Start{{"stribeck_friction", {extra, velocity * fast, shape}}};
     };
     std::vector<Start> bristles, both;
     for (const double stiffness : {100.0, 1000.0}) {
       const double critical = std::sqrt(stiffness * model.plant.cart_mass_kg);
       for (const double damping : {1.0, 5.0}) {
-        const Addition bristle{"bristle_friction", {stiffness, damping * critical}};
-        bristles.push_back({bristle});
-        for (const double velocity : {0.07, 0.2}) both.push_back({rise(velocity, 2.0), bristle});
+        bristles.push_back({{"bristle_friction", {stiffness, damping * critical}}});
+        for (const double velocity : {0.07, 0.2}) {
+          both.push_back(part(plain, velocity, 2.0));
+          both.back().push_back(bristles.back().front());
+        }
       }
     }
     tell(0.15, "Stribeck rise");
-    bool found = try_effects(model, plain, {{rise(0.05, 1.5)}, {rise(0.15, 2.0)}, {rise(0.3, 2.0)}});
+    const Model risen = best_of(
+        richer(plain, {on_top(0.05, 1.5), on_top(0.15, 2.0), on_top(0.3, 2.0), part(plain, 0.15, 2.0)}));
+    bool found = keep(model, risen, {"stribeck_friction"});
     tell(0.25, "bristles");
-    found = try_effects(model, plain, bristles) || found;
-    // Each may hide behind the other: a rise that is seen through bristles, and bristles through a rise.
+    const Model bristled = best_of(richer(plain, bristles));
+    found = keep(model, bristled, {"bristle_friction"}) || found;
+    // Each may hide behind the other: a rise that is seen through bristles, and bristles through a rise. And
+    // what has both can do no worse than what has one, from where that one ended.
     tell(0.4, "both");
-    return try_effects(model, plain, both) || found;
+    std::vector<Model> models = richer(plain, both);
+    if (std::isfinite(risen.fit.objective))
+      for (const Start& start : bristles) models.push_back(richer(risen, start));
+    if (std::isfinite(bristled.fit.objective))
+      for (const double velocity : {0.07, 0.2})
+        for (const Start& start : {part(bristled, velocity, 2.0), on_top(velocity, 2.0)})
+          models.push_back(richer(bristled, start));
+    return keep(model, best_of(std::move(models)), {"stribeck_friction", "bristle_friction"}) || found;
   }
 
   double sigma_of(const Model& model, std::size_t effect, std::size_t index) const {
