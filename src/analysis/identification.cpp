@@ -222,15 +222,13 @@ class Identifier {
     if (model.fit.covariance.size() == 0) point.noise.force = 0.01 * range_.largest_force_n;
     point.starts = guess_starts(runs_, data.segments, model.plant);
     FitOptions fit_options;
-    if (model.fit.covariance.size() > 0) {
-      // What guessed initial states leave is not noise: they follow first.
-      fit_options.starts_only = true;
-      fit_options.noise_rounds = 0;
-      fit_options.most_iterations = 6;
-      const FitResult followed = fit(data, point, {}, fit_options);
-      if (std::isfinite(followed.objective)) point.starts = followed.point.starts;
-      fit_options = {};
-    }
+    // What guessed initial states leave is not noise: they follow first.
+    fit_options.starts_only = true;
+    fit_options.noise_rounds = 0;
+    fit_options.most_iterations = 6;
+    const FitResult followed = fit(data, point, {}, fit_options);
+    if (std::isfinite(followed.objective)) point.starts = followed.point.starts;
+    fit_options = {};
     fit_options.most_iterations = iterations;
     fit_options.noise_rounds = noise_rounds;
     model.fit = fit(data, point, parameters_of(model, mass_known_to), fit_options);
