@@ -5,11 +5,7 @@
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
-upright=build/release/src/cli/upright
-if [ ! -x "$upright" ]; then
-  scripts/install-deps.sh
-  scripts/build.sh release upright
-fi
+upright=$(scripts/program.sh)
 folder=${1:-$(mktemp -d)}
 
 # Gains, starting angle in degrees, delay in seconds: delays make the cart move far enough to show how friction slides.

@@ -9,11 +9,7 @@ set -euo pipefail
 data=$(realpath "${1:?name the folder that holds emps, aau, uw and canterbury}")
 cd "$(dirname "$0")/.."
 
-upright=build/release/src/cli/upright
-if [ ! -x "$upright" ]; then
-  scripts/install-deps.sh
-  scripts/build.sh release upright
-fi
+upright=$(scripts/program.sh)
 out=${2:-$(mktemp -d)}
 shift "$(($# > 1 ? 2 : 1))"
 

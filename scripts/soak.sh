@@ -4,9 +4,5 @@
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
-upright=build/release/src/cli/upright
-if [ ! -x "$upright" ]; then
-  scripts/install-deps.sh
-  scripts/build.sh release upright
-fi
+scripts/program.sh >/dev/null
 exec python3 scripts/soak.py "$@"

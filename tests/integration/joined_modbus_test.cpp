@@ -7,6 +7,7 @@
 #include <thread>
 
 #include "../unit/fake_comedi.hpp"
+#include "fresh_reading.hpp"
 #include "upright/hal/rig_factory.hpp"
 #include "upright/model/error.hpp"
 #include "virtual_rig_process.hpp"
@@ -62,15 +63,6 @@ class JoinedModbus : public testing::TestWithParam<Link> {
     return rig;
   }
 
-  RigReading fresh_reading(Rig& rig) {
-    for (int i = 0; i < 100; ++i) {
-      const RigReading reading = rig.read();
-      if (reading.status == RigStatus::fresh) return reading;
-      std::this_thread::sleep_for(5ms);
-    }
-    ADD_FAILURE() << "no fresh reading";
-    return {};
-  }
   lsampl_t output() { return fake_cards().at(card).subdevices[1].data[0]; }
 
   bool serial = GetParam().serial;

@@ -8,6 +8,7 @@
 #include <numbers>
 #include <thread>
 
+#include "fresh_reading.hpp"
 #include "upright/hal/rig_factory.hpp"
 #include "upright/model/error.hpp"
 #include "virtual_rig_process.hpp"
@@ -41,16 +42,6 @@ std::unique_ptr<Rig> connect(const Folder& folder, const std::string& text, cons
   const std::filesystem::path file = folder / "client.yaml";
   std::ofstream(file) << pointed;
   return make_rig(read_rig_file(file), {period_s});
-}
-
-RigReading fresh_reading(Rig& rig) {
-  for (int i = 0; i < 100; ++i) {
-    const RigReading reading = rig.read();
-    if (reading.status == RigStatus::fresh) return reading;
-    std::this_thread::sleep_for(5ms);
-  }
-  ADD_FAILURE() << "no fresh reading";
-  return {};
 }
 
 class ModbusMap : public testing::TestWithParam<Map> {
