@@ -600,12 +600,9 @@ class Diagnostician {
     all.segments.insert(all.segments.end(), held_.segments.begin(), held_.segments.end());
     // At what all runs say, so that what few training runs left uncertain is not taken for something missing.
     ResidualStructure structure = examine_residuals(all, known_.train.point);
-    FitOptions follow;
-    follow.starts_only = true;
-    follow.noise_rounds = 0;
     FitPoint point = known_.train.point;
     point.noise = sensor_noise(known_);
-    const FitResult plain = fit(all, point, {}, follow);
+    const FitResult plain = follow(all, point);
     structure.noise_ratio = whitened_rms(plain);
     point = plain.point;
     point.noise = known_.train.point.noise;

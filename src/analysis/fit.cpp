@@ -870,6 +870,14 @@ FitResult fit(const FitData& data, const FitPoint& start, const std::vector<Free
   return Fitter(data, start, free, options).run();
 }
 
+FitResult follow(const FitData& data, const FitPoint& start, int most_iterations) {
+  FitOptions options;
+  options.starts_only = true;
+  options.noise_rounds = 0;
+  options.most_iterations = most_iterations;
+  return fit(data, start, {}, options);
+}
+
 std::vector<std::vector<LinearStep>> linearise(const FitData& data, const FitPoint& point) {
   std::vector<std::vector<LinearStep>> steps(data.segments.size());
   parallel_for(data.segments.size(), [&](std::size_t s) {

@@ -145,10 +145,8 @@ class Identifier {
     tell(0.05, "balance of forces");
     Model model = start();
     model = fitted(model, trial_, 8, 1);
-    // Much noise and a poor fit hold each other up: a second descent begins with little noise.
     Model calm = model;
-    calm.fit.point.noise.force *= 0.1;
-    calm.fit.point.noise.torque *= 0.1;
+    calm.fit.point.noise = calmed(calm.fit.point.noise);
     calm = fitted(calm, trial_, 16, 1);
     if (rank_of(calm) < rank_of(model)) model = std::move(calm);
     const bool transition = range_.cart_moves && starts_from_rest() && grow(model);
@@ -221,14 +219,10 @@ class Identifier {
     point.noise = model.fit.covariance.size() > 0 ? model.fit.point.noise : Noise{};
     if (model.fit.covariance.size() == 0) point.noise.force = 0.01 * range_.largest_force_n;
     point.starts = guess_starts(runs_, data.segments, model.plant);
-    FitOptions fit_options;
     // What guessed initial states leave is not noise: they follow first.
-    fit_options.starts_only = true;
-    fit_options.noise_rounds = 0;
-    fit_options.most_iterations = 6;
-    const FitResult followed = fit(data, point, {}, fit_options);
+    const FitResult followed = follow(data, point, 6);
     if (std::isfinite(followed.objective)) point.starts = followed.point.starts;
-    fit_options = {};
+    FitOptions fit_options;
     fit_options.most_iterations = iterations;
     fit_options.noise_rounds = noise_rounds;
     model.fit = fit(data, point, parameters_of(model, mass_known_to), fit_options);

@@ -116,13 +116,9 @@ Hypothesis Search::fitted(const std::set<std::size_t>& added, const FitPoint& st
 
 void Search::judge(Hypothesis& h, const Noise& noise) const {
   if (!std::isfinite(h.train.objective)) return;
-  FitOptions options;
-  options.starts_only = true;
-  options.noise_rounds = 0;
-  options.most_iterations = 6;
   const FitPoint plain{plant_, held_starts_, noise};
   const FitPoint point = moved_to(plain, h.train.point.plant);
-  h.held = fit(held_, point, {}, options);
+  h.held = follow(held_, point, 6);
 }
 
 void Search::weigh(Hypothesis& h) const {
@@ -164,10 +160,8 @@ Hypothesis Search::told(const Hypothesis& h) const {
 Hypothesis Search::baseline() {
   FitOptions options;
   Hypothesis h = fitted({}, {plant_, train_starts_, {.force = 0.1, .torque = 0.01}}, options, free_of({}));
-  // Much noise and a poor fit hold each other up: a second descent begins with little noise.
   FitPoint calm = h.train.point;
-  calm.noise.force *= 0.1;
-  calm.noise.torque *= 0.1;
+  calm.noise = calmed(calm.noise);
   options.most_iterations = 24;
   Hypothesis again = fitted({}, calm, options, free_of({}));
   if (again.train.objective < h.train.objective) h = std::move(again);

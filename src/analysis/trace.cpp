@@ -9,10 +9,7 @@ std::vector<SimulatedTrace> simulate_segments(const Plant& plant, const std::vec
   const FitData data{&runs, segments};
   // Without force and torque noise the filter is a plain simulation.
   const FitPoint guess{plant, guess_starts(runs, segments, plant), {}};
-  FitOptions options;
-  options.starts_only = true;
-  options.noise_rounds = 0;
-  const FitPoint point = fit(data, guess, {}, options).point;
+  const FitPoint point = follow(data, guess).point;
   const std::vector<std::vector<LinearStep>> steps = linearise(data, point);
   std::vector<SimulatedTrace> traces;
   for (std::size_t s = 0; s < segments.size(); ++s) {

@@ -73,6 +73,14 @@ struct LinearStep {
   double period_s;
 };
 
+/// A tenth of the force and torque noise. Much noise and a poor fit hold each other up: a second descent
+/// begins with little noise.
+inline Noise calmed(Noise noise) {
+  noise.force *= 0.1;
+  noise.torque *= 0.1;
+  return noise;
+}
+
 /// What a fit works on.
 struct FitData {
   const std::vector<Measurement>* runs = nullptr;
@@ -116,6 +124,10 @@ struct FitOptions {
 /// Fits. A fit that fails returns an infinite objective; it does not throw.
 FitResult fit(const FitData& data, const FitPoint& start, const std::vector<FreeParameter>& free,
               const FitOptions& options = {});
+
+/// Lets the initial states follow, with plant and noise held.
+FitResult follow(const FitData& data, const FitPoint& start,
+                 int most_iterations = FitOptions{}.most_iterations);
 
 /// Linearised steps of every segment at a point, for residual analysis.
 std::vector<std::vector<LinearStep>> linearise(const FitData& data, const FitPoint& point);
