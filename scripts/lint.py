@@ -60,7 +60,8 @@ def read_as_one(sources, flags, folder):
             if len(together) == 1 or not said:
                 problems += said
                 break
-            kept = [s for s in together if s not in bad[:]]
+            # A clash that shows in a header only names no source: then half of them.
+            kept = [s for s in together if s not in bad] if bad else together[:len(together) // 2]
             together = kept or together[:1]
         lists.append(file)
         left = [s for s in left if s not in together]

@@ -3,6 +3,8 @@
 # gpio-sim and comedi_test, and prints what the test programs say. The programs and the modules each asks for are listed
 # in tests/kernel/CMakeLists.txt.
 #   scripts/test-kernel.sh [PRESET] [PROGRAM...]    PRESET is release when none is named; all programs when none is named
+# What is built for this processor runs in the guest, unless the processor has AVX-512 or UPRIGHT_NATIVE=OFF is set: then
+# the tests are built for any processor, in build/kernel.
 # Ends with the programs' exit code, or with 77 where the kernel's packages are not to be had. An emulated processor says
 # what is right and what is wrong, never how fast. Kernel and modules are kept in build/kernel-test.
 set -euo pipefail
@@ -11,6 +13,7 @@ cd "$(dirname "$0")/.."
 preset=${1:-release}
 shift || true
 cache=$PWD/build/kernel-test
+guests=2  # an emulated processor each, with a share of each program's tests
 patience_s=270
 
 skip() {
@@ -22,7 +25,17 @@ skip() {
 
 # QEMU does not emulate AVX-512: where this processor has it, what is built for it would not run in the guest.
 runs_in_guest() {
-  ! grep -qm1 '^flags.* avx512f' /proc/cpuinfo
+  [ "${UPRIGHT_NATIVE:-ON}" = ON ] && ! grep -qm1 '^flags.* avx512f' /proc/cpuinfo
+}
+
+# The tests for any processor, in a build folder of their own.
+build_portable() {
+  local options=(-DUPRIGHT_NATIVE=OFF)
+  if command -v ccache >/dev/null; then
+    options+=(-DCMAKE_CXX_COMPILER_LAUNCHER=ccache)
+    export CCACHE_BASEDIR=$PWD CCACHE_NOHASHDIR=1
+  fi
+  cmake --preset "$preset" "${options[@]}" -B "$build" >/dev/null && cmake --build "$build" --target kernel_tests
 }
 
 # The kernel, its Comedi modules, and gpio-sim with irq_sim, which Debian has the source of but does not build.
@@ -72,6 +85,16 @@ copy() {
   done
 }
 
+# What the fault suite has seen in the guest, against its columns of docs/faults.md.
+compare_outcomes() {
+  local records=$build/kernel_fault_records name cell
+  [[ $(cat "$guest/programs") == *kernel_fault_test* ]] || return 0
+  rm -rf "$records"
+  mkdir -p "$records"
+  sed -n 's/^guest: outcome //p' "$consoles"/* | while read -r name cell; do printf '%s' "$cell" >"$records/$name"; done
+  "$build/tests/fault/faults_document" "$records" docs/faults.md gpio comedi
+}
+
 write_init() {
   cat >"$guest/init" <<'INIT'
 #!/bin/sh
@@ -89,6 +112,7 @@ while read -r program modules; do
   echo "== $(basename "$program")"
   "$program" || { status=$?; echo "== $(basename "$program") FAILED ($status)"; }
 done </programs
+for record in /records/*; do [ ! -e "$record" ] || echo "guest: outcome $(basename "$record") $(cat "$record")"; done
 echo "guest: exit $status"
 poweroff -f
 INIT
@@ -107,20 +131,20 @@ if runs_in_guest; then
   scripts/build.sh "$preset" kernel_tests
 else
   build=build/kernel
-  cmake --preset "$preset" -DUPRIGHT_NATIVE=OFF -B "$build" >/dev/null
-  cmake --build "$build" --target kernel_tests
+  build_portable
 fi
 
 guest=$(mktemp -d)
-console=$(mktemp)
-trap 'rm -rf "$guest" "$console"' EXIT
-mkdir -p "$guest"/{bin,proc,sys,dev,tmp}
+consoles=$(mktemp -d)
+trap 'rm -rf "$guest" "$guest.gz" "$consoles"' EXIT
+mkdir -p "$guest"/{bin,proc,sys,dev,tmp,records} "$guest$PWD/$build"
+ln -s /records "$guest$PWD/$build/fault_records"
 cp /bin/busybox "$guest/bin/busybox"
 ln -s busybox "$guest/bin/sh"
 cp -r "$cache/root/lib" "$guest"
 mkdir -p "$guest$PWD"
 cp -r config "$guest$PWD"
-copy "$PWD/$build/src/cli/upright"
+while read -r file; do copy "$file"; done <"$build/tests/kernel/files"
 while read -r program modules; do
   if [ $# -gt 0 ] && ! [[ " $* " == *" $(basename "$program") "* ]]; then continue; fi
   copy "$program"
@@ -129,13 +153,22 @@ done <"$build/tests/kernel/programs"
 [ -e "$guest/programs" ] || { echo "name one of these programs:" >&2; cat "$build/tests/kernel/programs" >&2; exit 2; }
 write_init
 (cd "$guest" && find . | busybox cpio -o -H newc 2>/dev/null) | gzip -1 >"$guest.gz"
-trap 'rm -rf "$guest" "$guest.gz" "$console"' EXIT
 
 # The guest's clock follows the instructions it has executed, and leaps while it idles: it is never late because the machine
-# around it is busy.
-timeout "$patience_s" qemu-system-x86_64 -accel tcg -icount shift=2,sleep=off -M q35 -cpu max -smp 1 -m 1024 \
-  -kernel "$cache/vmlinuz" -initrd "$guest.gz" -append "console=ttyS0 quiet panic=-1 comedi.comedi_num_legacy_minors=4" \
-  -nodefaults -nographic -no-reboot -serial stdio </dev/null | tr -d '\r' | tee "$console" || true
-status=$(sed -n 's/^guest: exit \([0-9]*\)$/\1/p' "$console")
-[ -n "$status" ] || { echo "look at the lines above: the guest did not end within $patience_s s" >&2; exit 1; }
-exit "$status"
+# around it is busy. What the kernel does not know on its command line is its first process's environment.
+boot() {
+  timeout "$patience_s" qemu-system-x86_64 -accel tcg -icount shift=2,sleep=off -M q35 -cpu max -smp 1 -m 512 \
+    -kernel "$cache/vmlinuz" -initrd "$guest.gz" -nodefaults -nographic -no-reboot -serial stdio -append \
+    "console=ttyS0 quiet panic=-1 comedi.comedi_num_legacy_minors=4 GTEST_TOTAL_SHARDS=$guests GTEST_SHARD_INDEX=$1" \
+    </dev/null | sed -u 's/\r//g' | tee "$consoles/$1" | sed -u "s/^/$1: /" || true
+}
+for ((i = 0; i < guests; ++i)); do boot "$i" & done
+wait
+status=0
+for ((i = 0; i < guests; ++i)); do
+  said=$(sed -n 's/^guest: exit \([0-9]*\)$/\1/p' "$consoles/$i")
+  [ -n "$said" ] || { echo "look at the lines above: guest $i did not end within $patience_s s" >&2; exit 1; }
+  [ "$said" -eq 0 ] || status=$said
+done
+[ "$status" -eq 0 ] || exit "$status"
+compare_outcomes

@@ -22,7 +22,7 @@ constexpr std::int64_t longest_pause_ns = 100'000'000;
 constexpr double connect_patience_s = 0.02;
 constexpr double open_patience_s = 1.0;
 constexpr double share_of_period = 0.75;  // the rest is for computing and writing
-constexpr int other_boots_until_restart = 3;
+constexpr int replies_until_certain = 3;  // a single one may have a wrong bit that nothing betrays
 constexpr int io_priority = 70;
 
 std::int64_t now_ns() noexcept {
@@ -133,7 +133,8 @@ void ModbusTransport::open() {
   stopping_ = ending_ = false;
   stop_served_ = enabled_ = restarted_ = false;
   verified_ = true;
-  other_boots_in_a_row_ = 0;
+  other_boots_in_a_row_ = other_watchdogs_in_a_row_ = 0;
+  checks_refused_in_a_row_ = reads_refused_in_a_row_ = writes_refused_in_a_row_ = 0;
   recoveries_ = 0;
   pause_ns_ = first_pause_ns;
   next_attempt_ns_ = 0;
@@ -210,7 +211,8 @@ RigFault ModbusTransport::ready() noexcept {
     if (const RigFault fault = link_.resynchronise(voltage_v_.load()); fault != RigFault::none) return fault;
   }
   if (!verified_) {
-    if (const RigFault fault = verify(); fault != RigFault::none) return fault;
+    const RigFault fault = certain(verify(), checks_refused_in_a_row_);
+    if (fault != RigFault::none) return fault;
     verified_ = true;
     ++recoveries_;
   }
@@ -218,27 +220,36 @@ RigFault ModbusTransport::ready() noexcept {
   return RigFault::none;
 }
 
+/// What a reply means that does not come from the device we programmed.
+RigFault ModbusTransport::other_device(int& in_a_row) noexcept {
+  if (++in_a_row < replies_until_certain) return RigFault::corrupt_reply;
+  restarted_ = true;
+  return RigFault::device_restarted;
+}
+
+/// An exception is a refusal when it comes again and again.
+RigFault ModbusTransport::certain(RigFault fault, int& refusals_in_a_row) noexcept {
+  if (fault == RigFault::none) refusals_in_a_row = 0;
+  if (fault != RigFault::device_refused) return fault;
+  return ++refusals_in_a_row < replies_until_certain ? RigFault::corrupt_reply : fault;
+}
+
 /// A device that restarted has forgotten its watchdog's time.
 RigFault ModbusTransport::verify() noexcept {
   if (!rig_.modbus->watchdog) return RigFault::none;
   int counts = 0;
   const RigFault fault = link_.read_register(rig_.modbus->watchdog->address, counts);
-  if (fault == RigFault::none && counts != rig_.modbus->watchdog->counts()) {
-    restarted_ = true;
-    return RigFault::device_restarted;
-  }
-  return fault;
+  if (fault != RigFault::none) return fault;
+  if (counts != rig_.modbus->watchdog->counts()) return other_device(other_watchdogs_in_a_row_);
+  other_watchdogs_in_a_row_ = 0;
+  return RigFault::none;
 }
 
-/// A device with another boot count restarted; a single one is a corrupt reply.
+/// A device with another boot count restarted.
 RigFault ModbusTransport::same_device(const DeviceReading& reading) noexcept {
-  if (reading.boot_count == boot_count_) {
-    other_boots_in_a_row_ = 0;
-    return RigFault::none;
-  }
-  if (++other_boots_in_a_row_ < other_boots_until_restart) return RigFault::corrupt_reply;
-  restarted_ = true;
-  return RigFault::device_restarted;
+  if (reading.boot_count != boot_count_) return other_device(other_boots_in_a_row_);
+  other_boots_in_a_row_ = 0;
+  return RigFault::none;
 }
 
 void ModbusTransport::serve_read(std::uint32_t number) noexcept {
@@ -247,7 +258,7 @@ void ModbusTransport::serve_read(std::uint32_t number) noexcept {
   if (answer.fault == RigFault::none) {
     DeviceReading reading;
     const std::int64_t asked_ns = now_ns();
-    answer.fault = link_.read(voltage_v_.load(), reading);
+    answer.fault = certain(link_.read(voltage_v_.load(), reading), reads_refused_in_a_row_);
     answer.time_ns = asked_ns + (now_ns() - asked_ns) / 2;
     if (answer.fault == RigFault::none) answer.fault = same_device(reading);
     if (answer.fault == RigFault::none) {
@@ -273,6 +284,7 @@ void ModbusTransport::serve_write() noexcept {
       fault = link_.write_register(*rig_.modbus->enable_address, 1);
       enabled_ = fault == RigFault::none;
     }
+    fault = certain(fault, writes_refused_in_a_row_);
   }
   write_fault_.store(fault, std::memory_order_relaxed);
 }

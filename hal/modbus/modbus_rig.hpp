@@ -39,6 +39,8 @@ class ModbusTransport final : public Rig {
   void serve_write() noexcept;
   void serve_stop() noexcept;
   RigFault ready() noexcept;
+  RigFault other_device(int& in_a_row) noexcept;
+  static RigFault certain(RigFault fault, int& refusals_in_a_row) noexcept;
   RigFault verify() noexcept;
   RigFault same_device(const DeviceReading& reading) noexcept;
   void ring() noexcept;
@@ -72,7 +74,8 @@ class ModbusTransport final : public Rig {
   bool restarted_ = false;
   bool verified_ = false;
   int boot_count_ = 0;
-  int other_boots_in_a_row_ = 0;
+  int other_boots_in_a_row_ = 0, other_watchdogs_in_a_row_ = 0;
+  int checks_refused_in_a_row_ = 0, reads_refused_in_a_row_ = 0, writes_refused_in_a_row_ = 0;
   std::uint64_t sequence_ = 0;
   std::uint32_t recoveries_ = 0;
   std::int64_t pause_ns_ = 0;

@@ -269,9 +269,11 @@ std::vector<std::vector<double>> search_starts(std::size_t effect, const DataRan
     start.push_back(std::isfinite(parameter.neutral)
                         ? (parameter.neutral == 1.0 ? 1.0 : 0.1 * order_of_magnitude(parameter, range))
                         : parameter.typical);
-  // Effects of either sign start at nothing, so that the sign is the data's.
-  if (info.parameters.size() == 1 && info.parameters[0].range.low < 0.0) start[0] = 0.0;
-  return {start};
+  if (info.parameters.size() > 1 || !(info.parameters[0].range.low < 0.0)) return {start};
+  // A dry level is not below zero: where no other friction is known, nothing grows from nothing.
+  if (info.dry) return {{start[0]}, {-start[0]}};
+  // Other effects of either sign start at nothing, so that the sign is the data's.
+  return {{0.0}};
 }
 
 }  // namespace upright

@@ -55,12 +55,13 @@ std::string kind_of(std::size_t effect) {
   return std::string(effect_registry()[effect].kind);
 }
 
-/// How lively a run is: root mean square speed of the cart, or of the pendulum where the cart does not move.
-double liveliness(const Measurement& run) {
+/// How lively a stretch is: root mean square speed of the cart, or of the pendulum where the cart does not
+/// move.
+double liveliness(const Measurement& run, const Segment& stretch) {
   const std::vector<double>& position = run.has_cart() && !run.cart_locked ? run.cart_m : run.theta_rad;
   const auto stride = std::max<std::size_t>(1, static_cast<std::size_t>(0.02 / run.median_period_s()));
   double sum = 0.0, count = 0.0;
-  for (std::size_t k = stride; k < position.size(); k += stride) {
+  for (std::size_t k = stretch.first + stride; k <= stretch.last; k += stride) {
     const double speed = (position[k] - position[k - stride]) / (run.time_s[k] - run.time_s[k - stride]);
     sum += speed * speed;
     count += 1.0;
@@ -68,35 +69,41 @@ double liveliness(const Measurement& run) {
   return std::sqrt(sum / std::max(count, 1.0));
 }
 
-/// Whole runs to hold out, a third of them: the middle one of each three in the order of how lively they are,
-/// so that the fit need not answer for motions beyond those it saw, in whatever order the runs were named.
-std::vector<std::size_t> choose_held_out(const std::vector<Measurement>& runs) {
-  std::vector<std::size_t> order(runs.size());
+/// Which stretches to hold out, a third of them: the middle one of each three in the order of how lively they
+/// are, so that the fit need not answer for motions beyond those it saw, in whatever order they come.
+std::vector<std::size_t> choose_held_out(const std::vector<Measurement>& runs,
+                                         const std::vector<Segment>& stretches) {
+  std::vector<double> lively;
+  lively.reserve(stretches.size());
+  for (const Segment& stretch : stretches) lively.push_back(liveliness(runs[stretch.run], stretch));
+  std::vector<std::size_t> order(stretches.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
   std::stable_sort(order.begin(), order.end(),
-                   [&](std::size_t a, std::size_t b) { return liveliness(runs[a]) < liveliness(runs[b]); });
+                   [&](std::size_t a, std::size_t b) { return lively[a] < lively[b]; });
   std::vector<std::size_t> held;
-  if (runs.size() == 2) held = {order[0]};
-  for (std::size_t i = 1; i < runs.size() && runs.size() > 2; i += 3) held.push_back(order[i]);
+  if (order.size() == 2) held = {order[0]};
+  for (std::size_t i = 1; i < order.size() && order.size() > 2; i += 3) held.push_back(order[i]);
   std::sort(held.begin(), held.end());
   return held;
 }
 
+/// Holds out whole runs; of one run, segments of it.
 void split(const std::vector<Measurement>& runs, Diagnosis& diagnosis, FitData& train, FitData& held) {
   const std::vector<Segment> segments = cut_segments(runs);
   train.runs = held.runs = &runs;
-  if (runs.size() == 1) {
-    const double from = runs[0].time_s.front() + 2.0 / 3.0 * (runs[0].time_s.back() - runs[0].time_s.front());
-    for (const Segment& segment : segments)
-      (runs[0].time_s[segment.first] >= from ? held : train).segments.push_back(segment);
-    diagnosis.notes.push_back("one run only: its last third is held out");
+  std::vector<Segment> whole;
+  whole.reserve(runs.size());
+  for (std::size_t r = 0; r < runs.size(); ++r) whole.push_back({r, 0, runs[r].size() - 1});
+  const bool one_run = runs.size() == 1;
+  const std::vector<std::size_t> chosen = choose_held_out(runs, one_run ? segments : whole);
+  for (std::size_t s = 0; s < segments.size(); ++s) {
+    const bool out = std::binary_search(chosen.begin(), chosen.end(), one_run ? s : segments[s].run);
+    (out ? held : train).segments.push_back(segments[s]);
+  }
+  if (one_run) {
+    diagnosis.notes.push_back("one run only: a third of its segments is held out");
   } else {
-    diagnosis.held_out_runs = choose_held_out(runs);
-    for (const Segment& segment : segments) {
-      const bool out =
-          std::binary_search(diagnosis.held_out_runs.begin(), diagnosis.held_out_runs.end(), segment.run);
-      (out ? held : train).segments.push_back(segment);
-    }
+    diagnosis.held_out_runs = chosen;
   }
   if (held.segments.empty() && train.segments.size() > 1) {
     held.segments.push_back(train.segments.back());
@@ -266,6 +273,44 @@ class Diagnostician {
     result_.trials.push_back(trial);
   }
 
+  /// An effect that might be added, and what it saves beyond its price.
+  struct Believed {
+    std::size_t effect = 0;
+    Hypothesis hypothesis;
+    double score = 0.0;
+  };
+
+  /// The one with the largest score. Close ones are fitted to the end first, for a fit that stopped a little
+  /// early is no reason; scores that are equal then leave it to the plainer effect.
+  std::size_t choose(std::vector<Believed>& believed) {
+    constexpr double close = 0.05, equal = 4.0;
+    const auto largest = [&] {
+      double score = -infinity;
+      for (const Believed& b : believed) score = std::max(score, b.score);
+      return score;
+    };
+    const double to_reach = (1.0 - close) * largest();
+    if (std::count_if(believed.begin(), believed.end(),
+                      [&](const Believed& b) { return b.score > to_reach; }) > 1)
+      for (Believed& b : believed) {
+        if (b.score <= to_reach) continue;
+        tell(0.8, "fitting " + kind_of(b.effect) + " to the end");
+        Hypothesis further = b.hypothesis;
+        search_->refine(b.hypothesis, further);
+        const double gain = b.hypothesis.train.objective - further.train.objective;
+        if (!(gain > 0.0)) continue;
+        b.hypothesis = std::move(further);
+        b.score += gain;
+      }
+    const double best = largest();
+    std::size_t chosen = believed.size();
+    for (std::size_t i = 0; i < believed.size(); ++i)
+      if (believed[i].score > best - equal &&
+          (chosen == believed.size() || is_plainer(believed[i].effect, believed[chosen].effect)))
+        chosen = i;
+    return chosen;
+  }
+
   /// Adds effects one at a time, the best first, for as long as the data ask for one.
   void grow() {
     for (int round = 0; round < most_rounds; ++round) {
@@ -284,9 +329,7 @@ class Diagnostician {
       for (std::size_t i = 0; i < ranking.size(); ++i) ranking[i] = i;
       std::stable_sort(ranking.begin(), ranking.end(),
                        [&](std::size_t a, std::size_t b) { return screened[a].first > screened[b].first; });
-      std::optional<Hypothesis> best;
-      double best_score = 0.0;
-      std::size_t best_effect = 0;
+      std::vector<Believed> believed;
       for (std::size_t place = 0; place < std::min(finalists, ranking.size()); ++place) {
         const std::size_t i = ranking[place];
         if (screened[i].first < 0.4 * least_evidence) break;
@@ -307,20 +350,15 @@ class Diagnostician {
         if (!correction && certainty(h, candidates[i]) < least_certainty) continue;
         if (!simulates_as_well(h)) continue;
         const double score = improvement.train - price_of(candidates[i]);
-        // Scores so close are equal: then the plainer effect is the one to believe.
-        constexpr double equal = 4.0;
-        const bool plainer = best && is_plainer(candidates[i], best_effect) && score > best_score - equal;
-        if (!best || score > best_score + equal || plainer) {
-          best = std::move(h);
-          best_score = score;
-          best_effect = candidates[i];
-        }
+        believed.push_back({candidates[i], std::move(h), score});
       }
-      if (!best) return;
+      if (believed.empty()) return;
+      Believed& best = believed[choose(believed)];
+      const std::size_t best_effect = best.effect;
       for (Trial& trial : result_.trials)
         if (trial.round == static_cast<std::size_t>(round) && trial.effect == best_effect) trial.taken = true;
       where_[best_effect] = locate(current_);
-      current_ = std::move(*best);
+      current_ = std::move(best.hypothesis);
       found_.push_back(best_effect);
       // What gained a fair share of the same may be the same thing by another name.
       std::vector<std::size_t>& near = near_[best_effect];

@@ -102,24 +102,11 @@ class Whitener {
   void predict(const LinearStep& step) {
     if (noise_.force == 0.0 && noise_.torque == 0.0) return;
     active_ = true;
-    const double f = square(noise_.force) * step.period_s, t = square(noise_.torque) * step.period_s;
-    for (int i = 0; i < 2; ++i)
-      for (int j = 0; j < 2; ++j)
-        p_[2 + i][2 + j] +=
-            f * step.by_force[i] * step.by_force[j] + t * step.by_torque[i] * step.by_torque[j];
-    StateMatrix half;
-    for (int i = 0; i < states; ++i)
-      for (int j = 0; j < states; ++j) {
-        double sum = 0.0;
-        for (int k = 0; k < states; ++k) sum += step.transition[i][k] * p_[k][j];
-        half[i][j] = sum;
-      }
-    for (int i = 0; i < states; ++i)
-      for (int j = 0; j <= i; ++j) {
-        double sum = 0.0;
-        for (int k = 0; k < states; ++k) sum += half[i][k] * step.transition[j][k];
-        p_[i][j] = p_[j][i] = sum;
-      }
+    if (step.holds[0] > 0.0 || step.holds[1] > 0.0) {
+      carry_creeping(step);
+    } else {
+      carry(step);
+    }
   }
 
   bool present(int channel) const { return present_[channel]; }
@@ -146,6 +133,75 @@ class Whitener {
 
  private:
   static double square(double x) { return x * x; }
+
+  void carry(const LinearStep& step) {
+    const double f = square(noise_.force) * step.period_s, t = square(noise_.torque) * step.period_s;
+    for (int i = 0; i < 2; ++i)
+      for (int j = 0; j < 2; ++j)
+        p_[2 + i][2 + j] +=
+            f * step.by_force[i] * step.by_force[j] + t * step.by_torque[i] * step.by_torque[j];
+    StateMatrix half;
+    for (int i = 0; i < states; ++i)
+      for (int j = 0; j < states; ++j) {
+        double sum = 0.0;
+        for (int k = 0; k < states; ++k) sum += step.transition[i][k] * p_[k][j];
+        half[i][j] = sum;
+      }
+    for (int i = 0; i < states; ++i)
+      for (int j = 0; j <= i; ++j) {
+        double sum = 0.0;
+        for (int k = 0; k < states; ++k) sum += half[i][k] * step.transition[j][k];
+        p_[i][j] = p_[j][i] = sum;
+      }
+  }
+
+  /// Dry friction under white force: a contact that rests in the model creeps at random in truth.
+  struct Creep {
+    double speed = 0.0;  ///< standard deviation; 0: it rests
+    double keeps = 0.0;  ///< share of a speed that is left a sample later
+    double moves_s = 0.0;
+    double rate_variance = 0.0, covariance = 0.0, place_variance = 0.0;
+  };
+
+  /// Statistical linearisation: dv = -(F/m) sign(v) dt + (q/m) dW has a Laplace distribution of speeds, of
+  /// standard deviation q^2 / (sqrt(2) F m); the linear process with it and the same noise forgets in q^2 /
+  /// F^2.
+  Creep creep_of(const LinearStep& step, int contact, double push) const {
+    Creep creep;
+    if (!(step.holds[contact] > 0.0) || push == 0.0) return creep;
+    const double decay = step.holds[contact] * (contact == 0 ? step.by_force[0] : step.by_torque[1]);
+    const double speed = square(push) / (std::numbers::sqrt2 * decay), forgets_s = square(push / decay);
+    constexpr double shows = 0.01;  // of the sensor's noise in a sample: less is rest
+    if (square(speed * std::min(forgets_s, step.period_s)) < square(shows) * sensor_variance_[contact])
+      return creep;
+    const double periods = step.period_s / forgets_s;
+    creep.speed = speed;
+    creep.keeps = std::exp(-periods);
+    const double lost = -std::expm1(-periods);
+    creep.moves_s = forgets_s * lost;
+    creep.rate_variance = square(speed) * lost * (1.0 + creep.keeps);
+    creep.covariance = square(speed) * forgets_s * square(lost);
+    creep.place_variance =
+        square(speed * forgets_s) * std::max(0.0, 2.0 * periods - lost * (3.0 - creep.keeps));
+    return creep;
+  }
+
+  void carry_creeping(LinearStep step) {
+    const Creep creep[2] = {creep_of(step, 0, step.by_force[0] * noise_.force),
+                            creep_of(step, 1, step.by_torque[1] * noise_.torque)};
+    for (int c = 0; c < 2; ++c) {
+      if (creep[c].speed == 0.0) continue;
+      step.transition[2 + c][2 + c] = creep[c].keeps;
+      step.transition[c][2 + c] = creep[c].moves_s;
+      step.by_force[c] = step.by_torque[c] = 0.0;
+    }
+    carry(step);
+    for (int c = 0; c < 2; ++c) {
+      p_[2 + c][2 + c] += creep[c].rate_variance;
+      p_[c][2 + c] = p_[2 + c][c] += creep[c].covariance;
+      p_[c][c] += creep[c].place_variance;
+    }
+  }
 
   Noise noise_;
   bool present_[2];
@@ -212,8 +268,7 @@ struct Normal {
   std::vector<double> blocks;  ///< its objective, a stretch of time at a time
 };
 
-/// Adds a filter's correction to the state of an engine. A velocity at rest stays at rest: its gain is zero
-/// there.
+/// Adds a filter's correction to the state of an engine.
 template <class S>
 void correct_state(EventEngine<S>& engine, const double (&update)[states]) {
   if (std::all_of(update, update + states, [](double u) { return u == 0.0; })) return;
@@ -221,6 +276,13 @@ void correct_state(EventEngine<S>& engine, const double (&update)[states]) {
   const auto values = as_array(state);
   for (int i = 0; i < states; ++i) *values[static_cast<std::size_t>(i)] += S(update[i]);
   engine.correct(state);
+}
+
+/// At which a cart at rest begins to slide, in the direction in which it does so sooner.
+template <class S>
+double least_dry_level(const Dynamics<S>& dynamics, const S& cart_m) {
+  return std::min(value_of(dynamics.cart_dry_level(cart_m, S(0.0), S(1.0))),
+                  value_of(dynamics.cart_dry_level(cart_m, S(0.0), S(-1.0))));
 }
 
 /// Follows a segment with dual numbers, a sample at a time; chains the derivatives and whitens them on the
@@ -295,6 +357,11 @@ void linearise_segment(const Measurement& run, const Segment& segment, const Eng
       simulator.advance_to(run.time_s[k]);
     }
     PlantState<Jet> reached = simulator.engine().state();
+    step.holds[0] = step.holds[1] = 0.0;
+    if (!run.cart_locked && !bristles && simulator.engine().cart_at_rest())
+      step.holds[0] = least_dry_level(dynamics, reached.cart_m);
+    if (dynamics.has_pendulum() && simulator.engine().pivot_at_rest())
+      step.holds[1] = value_of(dynamics.pivot_dry_level());
     const auto end = as_array(reached);
     for (int i = 0; i < states; ++i)
       for (int j = 0; j < states; ++j)
@@ -419,10 +486,7 @@ class Fitter {
  public:
   Fitter(const FitData& data, const FitPoint& start, const std::vector<FreeParameter>& free,
          const FitOptions& options)
-      : data_(data),
-        free_(options.starts_only ? std::vector<FreeParameter>{} : free),
-        options_(options),
-        point_(start) {
+      : data_(data), free_(free), options_(options), point_(start) {
     steps_.resize(data.segments.size());
     normals_.resize(data.segments.size());
   }
@@ -870,12 +934,62 @@ FitResult fit(const FitData& data, const FitPoint& start, const std::vector<Free
   return Fitter(data, start, free, options).run();
 }
 
+namespace {
+
+/// Where the initial state of one segment goes from several of the same, with noise that carries it over from
+/// one basin to the next: a plain simulation past friction or a cogged track has many.
+FitResult follow_through_noise(const FitData& segment, FitPoint point, const FitOptions& options) {
+  const Noise wanted = point.noise;
+  for (const double share : {1.0, 0.1, 0.01, 1e-3}) {
+    point.noise.force = std::max(wanted.force, 0.1 * share);
+    point.noise.torque = std::max(wanted.torque, 0.01 * share);
+    const FitResult carried = fit(segment, point, {}, options);
+    if (std::isfinite(carried.objective)) point.starts = carried.point.starts;
+  }
+  point.noise = wanted;
+  return fit(segment, point, {}, options);
+}
+
+FitResult follow_segment(const FitData& segment, const FitPoint& point, const FitOptions& options) {
+  FitResult found = fit(segment, point, {}, options);
+  constexpr double suspicious = 2.0;  // so far off, in noise standard deviations, that it may be elsewhere
+  if (whitened_rms(found) < suspicious) return found;
+  FitResult other = follow_through_noise(segment, point, options);
+  return other.objective < found.objective ? other : found;
+}
+
+}  // namespace
+
 FitResult follow(const FitData& data, const FitPoint& start, int most_iterations) {
   FitOptions options;
-  options.starts_only = true;
   options.noise_rounds = 0;
   options.most_iterations = most_iterations;
-  return fit(data, start, {}, options);
+  std::vector<FitResult> found(data.segments.size());
+  parallel_for(found.size(), [&](std::size_t s) {
+    found[s] = follow_segment({data.runs, {data.segments[s]}}, {start.plant, {start.starts[s]}, start.noise},
+                              options);
+  });
+  FitResult result;
+  result.point = start;
+  result.converged = true;
+  for (std::size_t s = 0; s < found.size(); ++s) {
+    const FitResult& one = found[s];
+    result.point.starts[s] = one.point.starts[0];
+    result.objective += one.objective;
+    result.converged = result.converged && one.converged;
+    result.segment_objective.push_back(one.segment_objective[0]);
+    result.segment_chi_square.push_back(one.segment_chi_square[0]);
+    result.segment_samples.push_back(one.segment_samples[0]);
+    result.block_objective.insert(result.block_objective.end(), one.block_objective.begin(),
+                                  one.block_objective.end());
+  }
+  return result;
+}
+
+FitPoint with_starts_followed(const FitData& data, FitPoint point) {
+  const FitResult followed = follow(data, point, 6);
+  if (std::isfinite(followed.objective)) point.starts = followed.point.starts;
+  return point;
 }
 
 std::vector<std::vector<LinearStep>> linearise(const FitData& data, const FitPoint& point) {

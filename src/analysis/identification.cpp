@@ -219,16 +219,11 @@ class Identifier {
     point.noise = model.fit.covariance.size() > 0 ? model.fit.point.noise : Noise{};
     if (model.fit.covariance.size() == 0) point.noise.force = 0.01 * range_.largest_force_n;
     point.starts = guess_starts(runs_, data.segments, model.plant);
-    // What guessed initial states leave is not noise: they follow first.
-    const FitResult followed = follow(data, point, 6);
-    if (std::isfinite(followed.objective)) point.starts = followed.point.starts;
+    point = with_starts_followed(data, std::move(point));
     FitOptions fit_options;
     fit_options.most_iterations = iterations;
     fit_options.noise_rounds = noise_rounds;
     model.fit = fit(data, point, parameters_of(model, mass_known_to), fit_options);
-    std::fprintf(
-        stderr, "fitted: %.8g force %.4g mass %.3f\n", model.fit.objective, model.fit.point.noise.force,
-        model.fit.point.plant.find("cart_mass") ? model.fit.point.plant.find("cart_mass")->values[0] : 0.0);
     if (std::isfinite(model.fit.objective)) model.plant = model.fit.point.plant;
     return model;
   }

@@ -23,6 +23,7 @@ FitPoint moved_to(FitPoint point, const Plant& plant) {
 Belief belief_of(const Hypothesis& h) {
   const auto n = static_cast<Eigen::Index>(h.free.size());
   Belief belief{Eigen::VectorXd(n), Eigen::MatrixXd::Zero(n, n)};
+  if (n == 0) return belief;
   Eigen::VectorXd scale(n);
   for (Eigen::Index j = 0; j < n; ++j) {
     const FreeParameter& p = h.free[static_cast<std::size_t>(j)];
@@ -30,12 +31,14 @@ Belief belief_of(const Hypothesis& h) {
     scale[j] = std::sqrt(h.train.covariance(j, j));
     if (!(scale[j] > 0.0)) scale[j] = 1e-6 * p.scale;
   }
-  Eigen::MatrixXd correlation =
-      scale.cwiseInverse().asDiagonal() * h.train.covariance * scale.cwiseInverse().asDiagonal();
-  correlation.diagonal().setConstant(1.0 + 1e-9);
-  belief.information = scale.cwiseInverse().asDiagonal() *
-                       correlation.ldlt().solve(Eigen::MatrixXd::Identity(n, n)) *
-                       scale.cwiseInverse().asDiagonal();
+  const Eigen::MatrixXd unscale = scale.cwiseInverse().asDiagonal();
+  const Eigen::MatrixXd correlation = unscale * h.train.covariance * unscale;
+  // Nearly the same force twice makes this singular; rounding must not make it a belief in the impossible.
+  constexpr double least = 1e-9;
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(0.5 * (correlation + correlation.transpose()));
+  const Eigen::VectorXd inverse = solver.eigenvalues().cwiseMax(least).cwiseInverse();
+  belief.information =
+      unscale * solver.eigenvectors() * inverse.asDiagonal() * solver.eigenvectors().transpose() * unscale;
   return belief;
 }
 
@@ -114,6 +117,14 @@ Hypothesis Search::fitted(const std::set<std::size_t>& added, const FitPoint& st
   return h;
 }
 
+void Search::calm(Hypothesis& h, const FitOptions& options) {
+  if (!h.valid) return;
+  FitPoint point = h.train.point;
+  point.noise = calmed(point.noise);
+  Hypothesis again = fitted(h.added, point, options, h.free);
+  if (again.train.objective < h.train.objective) h = std::move(again);
+}
+
 void Search::judge(Hypothesis& h, const Noise& noise) const {
   if (!std::isfinite(h.train.objective)) return;
   const FitPoint plain{plant_, held_starts_, noise};
@@ -158,13 +169,12 @@ Hypothesis Search::told(const Hypothesis& h) const {
 }
 
 Hypothesis Search::baseline() {
+  const FitPoint start =
+      with_starts_followed(train_, {plant_, train_starts_, {.force = 0.1, .torque = 0.01}});
   FitOptions options;
-  Hypothesis h = fitted({}, {plant_, train_starts_, {.force = 0.1, .torque = 0.01}}, options, free_of({}));
-  FitPoint calm = h.train.point;
-  calm.noise = calmed(calm.noise);
+  Hypothesis h = fitted({}, start, options, free_of({}));
   options.most_iterations = 24;
-  Hypothesis again = fitted({}, calm, options, free_of({}));
-  if (again.train.objective < h.train.objective) h = std::move(again);
+  calm(h, options);
   weigh(h);
   return h;
 }
@@ -214,6 +224,7 @@ void Search::refine(const Hypothesis& base, Hypothesis& h) {
   FitPoint point = moved_to(base.train.point, h.train.point.plant);
   point.noise = h.train.point.noise;
   h = fitted(h.added, point, options, h.free);
+  calm(h, {});
   weigh(h);
 }
 

@@ -299,7 +299,7 @@ double kurtosis_of(const std::vector<double>& values) {
     fourth += v * v * v * v;
   }
   const auto n = static_cast<double>(values.size());
-  return n > 50.0 && second > 0.0 ? fourth * n / (second * second) : 3.0;
+  return n > 30.0 && second > 0.0 ? fourth * n / (second * second) : 3.0;
 }
 
 /// How certainly the residual goes with a probe, by the scatter of its scores over blocks: honest where the

@@ -10,10 +10,13 @@
 #include <vector>
 
 #include "commands.hpp"
+#include "histogram_json.hpp"
 #include "options.hpp"
 #include "signals.hpp"
 #include "upright/control/gain_file.hpp"
+#include "upright/hal/gpio_rig.hpp"
 #include "upright/hal/rig_factory.hpp"
+#include "upright/hal/simulated_rig.hpp"
 #include "upright/model/error.hpp"
 #include "upright/runtime/histogram_text.hpp"
 #include "upright/runtime/machine_check.hpp"
@@ -70,24 +73,55 @@ void ask_operator(const std::string& words) {
   std::fprintf(stderr, "upright: with the amplifier off, %s\n", words.c_str());
 }
 
-void examine_hand(const Arguments& arguments, const RigFile& file, Rig& rig, Clock& clock,
-                  const SignalFlag& signal, Page& page) {
-  const SafetyInputs inputs = rig.safety_inputs();
-  if (arguments.by_hand) {
-    append(page.findings, examine_signs_by_hand(rig, clock, calibration_in_use(file), arguments.hand_s,
-                                                signal, ask_operator));
-    append(page.findings, examine_safety_inputs_by_hand(rig, clock, arguments.hand_s, signal, ask_operator));
-  } else {
+/// The rig that is examined, at zero volts, and who asks for it to end.
+struct Bedside {
+  const RigFile& file;
+  Rig& rig;
+  Clock& clock;
+  const SignalFlag& signal;
+};
+
+void examine_signs(const Arguments& arguments, const Bedside& at, Page& page) {
+  if (arguments.by_hand)
+    append(page.findings, examine_signs_by_hand(at.rig, at.clock, calibration_in_use(at.file),
+                                                arguments.hand_s, at.signal, ask_operator));
+  else
     page.findings.push_back({"encoder signs", Health::not_examined, "nobody moved cart and pendulum",
                              "switch the amplifier off and run it with --by-hand"});
-    append(page.findings, judge_safety_inputs(inputs, *page.link));
-  }
+}
+
+void examine_lines(const Arguments& arguments, const Bedside& at, const LinkProbe& probe, Page& page) {
+  const SafetyInputs inputs = at.rig.safety_inputs();
+  append(page.findings, arguments.by_hand ? examine_safety_inputs_by_hand(at.rig, at.clock, arguments.hand_s,
+                                                                          at.signal, ask_operator)
+                                          : judge_safety_inputs(inputs, probe));
   append(page.findings, name_missing_inputs(inputs));
+  if (at.file.gpio) append(page.findings, name_driven_lines(*at.file.gpio));
+}
+
+/// It has no link, but lines like any other.
+void examine_simulated(const Arguments& arguments, const RigFile& file, Page& page) {
+  page.findings.push_back({"link", Health::good, "none: the rig is simulated", ""});
+  if (!file.gpio) return;
+  const SignalFlag& signal = catch_signals();
+  MonotonicClock clock;
+  const std::unique_ptr<Rig> rig = with_gpio_lines(make_simulated_rig(file, clock, {}), file);
+  try {
+    rig->open();
+  } catch (const DeviceError& error) {
+    page.findings.push_back({"digital lines", Health::bad, "they cannot be had", error.what()});
+    return;
+  }
+  std::fprintf(stderr, "upright: reading the digital lines for %.0f s, at zero volts\n", arguments.seconds);
+  const LinkProbe probe = probe_link(*rig, clock, page.rate_hz, arguments.seconds, signal);
+  page.findings.push_back(judge_lines(probe));
+  examine_lines(arguments, {file, *rig, clock, signal}, probe, page);
+  rig->stop();
 }
 
 void examine_rig(const Arguments& arguments, const RigFile& file, Page& page) {
   if (is_simulated(file)) {
-    page.findings.push_back({"link", Health::good, "none: the rig is simulated", ""});
+    examine_simulated(arguments, file, page);
     return;
   }
   const SignalFlag& signal = catch_signals();
@@ -98,7 +132,9 @@ void examine_rig(const Arguments& arguments, const RigFile& file, Page& page) {
   page.link = probe_link(*rig, clock, page.rate_hz, arguments.seconds, signal);
   page.findings.push_back(judge_link(*page.link, page.rate_hz));
   page.findings.push_back(judge_zero(page.link->counts, calibration_in_use(file)));
-  examine_hand(arguments, file, *rig, clock, signal, page);
+  const Bedside at{file, *rig, clock, signal};
+  examine_signs(arguments, at, page);
+  examine_lines(arguments, at, *page.link, page);
   rig->stop();
 }
 
@@ -106,22 +142,6 @@ const char* sentence_for(Health verdict) {
   if (verdict == Health::bad) return "not fit to run a rig: see the lines marked bad";
   if (verdict == Health::poor) return "fit to run a rig, less well than it could: see the remedies";
   return "fit to run a rig";
-}
-
-Json json_of(const DurationHistogram& h) {
-  Json upper = Json::array(), count = Json::array();
-  for (std::size_t i = 0; i < h.buckets().size(); ++i) {
-    if (h.buckets()[i] == 0) continue;
-    upper.push_back(static_cast<double>(h.upper_end_ns(i)) / 1e3);
-    count.push_back(h.buckets()[i]);
-  }
-  return {{"count", h.count()},
-          {"p50_us", h.quantile_us(0.5)},
-          {"p99_us", h.quantile_us(0.99)},
-          {"p99_9_us", h.quantile_us(0.999)},
-          {"max_us", h.max_us()},
-          {"histogram_upper_us", upper},
-          {"histogram_count", count}};
 }
 
 Json json_of(const Page& page, Health verdict) {
@@ -135,11 +155,11 @@ Json json_of(const Page& page, Health verdict) {
                 {"sentence", sentence_for(verdict)},
                 {"findings", findings},
                 {"rate_hz", page.rate_hz},
-                {"wake_late_idle", json_of(page.idle)},
-                {"wake_late_loaded", json_of(page.loaded)},
+                {"wake_late_idle", histogram_json(page.idle)},
+                {"wake_late_loaded", histogram_json(page.loaded)},
                 {"link", nullptr}};
   if (page.link) {
-    document["link"] = json_of(page.link->round_trip);
+    document["link"] = histogram_json(page.link->round_trip);
     document["link"]["failed"] = page.link->failed;
     document["link"]["highest_rate_hz"] = highest_rate_hz(page.link->round_trip);
   }

@@ -11,6 +11,7 @@
 #include <string>
 
 #include "commands.hpp"
+#include "histogram_json.hpp"
 #include "live.hpp"
 #include "options.hpp"
 #include "signals.hpp"
@@ -22,6 +23,7 @@
 #include "upright/hal/simulated_rig.hpp"
 #include "upright/model/error.hpp"
 #include "upright/model/plant_file.hpp"
+#include "upright/runtime/histogram_text.hpp"
 #include "upright/runtime/session.hpp"
 #include "upright/runtime/wait_upright.hpp"
 
@@ -156,14 +158,6 @@ void wait_for_operator(const Arguments& arguments, Rig& rig, Clock& clock, const
 
 using Json = nlohmann::ordered_json;
 
-Json json_of(const DurationHistogram& h) {
-  return {{"mean_us", h.mean_us()},
-          {"p50_us", h.quantile_us(0.5)},
-          {"p99_us", h.quantile_us(0.99)},
-          {"p99_9_us", h.quantile_us(0.999)},
-          {"max_us", h.max_us()}};
-}
-
 Json json_of(const std::optional<OverrunTolerance>& tolerance) {
   if (!tolerance) return nullptr;
   const bool any = !std::isfinite(tolerance->extra_delay_s);
@@ -211,11 +205,11 @@ Json json_of(const SessionResult& result, const LoopLimits& limits,
             {"page_faults", c.page_faults}}},
           {"link", json_of(c.link)},
           {"timing",
-           {{"wake_late", json_of(o.wake_late)},
-            {"read", json_of(o.read)},
-            {"compute", json_of(o.compute)},
-            {"write", json_of(o.write)},
-            {"cycle", json_of(o.cycle)}}},
+           {{"wake_late", histogram_json(o.wake_late)},
+            {"read", histogram_json(o.read)},
+            {"compute", histogram_json(o.compute)},
+            {"write", histogram_json(o.write)},
+            {"cycle", histogram_json(o.cycle)}}},
           {"delay_margin", json_of(tolerance)},
           {"most_periods_late", limits.most_periods_late},
           {"scheduling", result.scheduling.note},
@@ -228,6 +222,23 @@ void print_link(const LoopOutcome& o) {
     troubles += (troubles.empty() ? "" : "; ") + std::to_string(o.counts.writes_failed) + " failed writes";
   if (troubles.empty()) return;
   std::printf("Link: %s%s.\n", o.reason == StopReason::duration ? "went on after " : "", troubles.c_str());
+}
+
+void print_timing(const SessionResult& result) {
+  const LoopOutcome& o = result.outcome;
+  const LoopCounts& c = o.counts;
+  std::printf("Timing: woke late by %.0f us (99.9 %%), %.0f us at worst; a cycle took %.0f us at worst.\n",
+              o.wake_late.quantile_us(0.999), o.wake_late.max_us(), o.cycle.max_us());
+  std::printf("How many periods (bars: logarithm of the count)\n");
+  for (const std::string& line : histogram_lines({{"woke late by", o.wake_late}, {"took", o.cycle}}))
+    std::printf("%s\n", line.c_str());
+  std::printf("Overruns: %llu waking, %llu reading, %llu computing, %llu writing; %llu periods missed.\n",
+              static_cast<unsigned long long>(c.overruns_wake),
+              static_cast<unsigned long long>(c.overruns_read),
+              static_cast<unsigned long long>(c.overruns_compute),
+              static_cast<unsigned long long>(c.overruns_write), static_cast<unsigned long long>(c.missed));
+  std::printf("Scheduling: %s; %llu page faults while it ran.\n", result.scheduling.note.c_str(),
+              static_cast<unsigned long long>(c.page_faults));
 }
 
 void print_summary(const SessionResult& result, const LoopLimits& limits, bool fast) {
@@ -245,15 +256,7 @@ void print_summary(const SessionResult& result, const LoopLimits& limits, bool f
   if (fast) {
     std::printf("Virtual time: %.3g times faster than real time.\n", o.time_s / result.elapsed_s);
   } else {
-    std::printf("Timing: woke late by %.0f us (99.9 %%), %.0f us at worst; a cycle took %.0f us at worst.\n",
-                o.wake_late.quantile_us(0.999), o.wake_late.max_us(), o.cycle.max_us());
-    std::printf("Overruns: %llu waking, %llu reading, %llu computing, %llu writing; %llu periods missed.\n",
-                static_cast<unsigned long long>(c.overruns_wake),
-                static_cast<unsigned long long>(c.overruns_read),
-                static_cast<unsigned long long>(c.overruns_compute),
-                static_cast<unsigned long long>(c.overruns_write), static_cast<unsigned long long>(c.missed));
-    std::printf("Scheduling: %s; %llu page faults while it ran.\n", result.scheduling.note.c_str(),
-                static_cast<unsigned long long>(c.page_faults));
+    print_timing(result);
   }
   print_link(o);
   if (result.log.rows_dropped > 0)

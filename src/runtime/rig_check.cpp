@@ -260,6 +260,28 @@ std::vector<Finding> judge_safety_inputs(const SafetyInputs& inputs, const LinkP
   return findings;
 }
 
+Finding judge_lines(const LinkProbe& probe) {
+  const std::uint64_t read = probe.round_trip.count() + probe.emergency_stops + probe.limit_switches;
+  const std::string times = std::to_string(read) + " times";
+  if (probe.failed == 0) return {"digital lines", Health::good, "read " + times, ""};
+  return {"digital lines", Health::bad,
+          "read " + times + ", and could not be read " + std::to_string(probe.failed) + " times",
+          "check the chip and its cable"};
+}
+
+std::vector<Finding> name_driven_lines(const GpioRig& gpio) {
+  const auto held = [&gpio](int line) { return "line " + std::to_string(line) + " of " + gpio.chip; };
+  std::vector<Finding> findings;
+  if (gpio.amplifier_enable)
+    findings.push_back({"amplifier enable", Health::not_examined,
+                        held(gpio.amplifier_enable->line) + " is held, and off until a run's first voltage",
+                        "see that the amplifier is off now; if it is on, turn gpio.amplifier_enable.active"});
+  if (gpio.heartbeat)
+    findings.push_back({"heartbeat", Health::not_examined, held(*gpio.heartbeat) + " is held, and rests",
+                        "see that the external watchdog keeps the amplifier off now"});
+  return findings;
+}
+
 std::vector<Finding> examine_safety_inputs_by_hand(Rig& rig, Clock& clock, double patience_s,
                                                    const SignalFlag& signal,
                                                    const std::function<void(const std::string&)>& ask) {

@@ -134,6 +134,20 @@ TEST(Doctor, ChecksThePendulumsSignByHand) {
   EXPECT_EQ(wrong.result.exit_code, 4);
 }
 
+TEST(Doctor, SaysWhyItCannotLookAtTheLinesOfASimulatedRig) {
+  const Folder folder;
+  const std::filesystem::path file = folder / "rig.yaml";
+  std::ofstream(file) << replaced(text_of(rigs + "simulated.yaml"), "../plants",
+                                  UPRIGHT_SOURCE_DIR "/config/plants")
+                      << "gpio:\n  chip: no-such-chip\n  emergency_stop: {line: 0, active: high}\n";
+  const CommandResult result =
+      run_upright("doctor --seconds 0.1 --json --rig " + shell_quoted(file.string()));
+  EXPECT_EQ(result.exit_code, 4) << result.err;
+  const Json lines = about(parsed(result), "digital lines");
+  EXPECT_EQ(lines.at("health"), "bad");
+  EXPECT_NE(lines.at("remedy").get<std::string>().find("gpiodetect"), std::string::npos) << lines.dump();
+}
+
 TEST(Doctor, RefusesARigThatIsNotThereAndAFileThatIsNone) {
   const Folder folder;
   std::ofstream(folder / "rig.yaml") << replaced(text_of(rigs + "modbus-tcp.yaml"), "port: 1502", "port: 1");

@@ -7,6 +7,7 @@
 
 #include <chrono>
 #include <nlohmann/json.hpp>
+#include <numeric>
 #include <sstream>
 #include <thread>
 #include <vector>
@@ -66,6 +67,30 @@ TEST(Run, StaysUpForAMinuteOnEachFrictionAndReplays) {
     const CommandResult replayed = run_upright("replay " + shell_quoted(directory));
     EXPECT_EQ(replayed.exit_code, 0) << replayed.out;
   }
+}
+
+TEST(Run, SumsUpHowLateItWokeAndHowLongItTookAsHistograms) {
+  const TemporaryFolder folder;
+  const CommandResult text = run_upright(run_arguments(folder, "--duration 0.5 --theta0-deg 1"));
+  for (const char* part : {"woke late by", "took", " us to ", "#"})
+    EXPECT_NE(text.out.find(part), std::string::npos) << part << "\n" << text.out;
+  const CommandResult result = run_upright(run_arguments(folder, "--duration 0.5 --theta0-deg 1 --json"));
+  const auto json = nlohmann::json::parse(result.out);
+  const std::string run_yaml = read_text(fs::path(json.at("run_directory").get<std::string>()) / "run.yaml");
+  for (const char* part : {"wake_late", "read", "compute", "write", "cycle"}) {
+    const auto& timing = json.at("timing").at(part);
+    const std::vector<std::uint64_t> counts = timing.at("histogram_count");
+    EXPECT_EQ(std::accumulate(counts.begin(), counts.end(), std::uint64_t{0}), timing.at("count")) << part;
+    EXPECT_EQ(timing.at("histogram_upper_us").size(), counts.size());
+    EXPECT_NE(run_yaml.find("\n    " + std::string(part) + ":\n      mean_us: "), std::string::npos) << part;
+  }
+  EXPECT_NE(run_yaml.find("histogram_upper_us: ["), std::string::npos);
+}
+
+TEST(Run, HasNoHistogramsInVirtualTime) {
+  const TemporaryFolder folder;
+  const CommandResult result = run_upright(run_arguments(folder, "--fast --duration 1"));
+  EXPECT_EQ(result.out.find("woke late"), std::string::npos) << result.out;
 }
 
 TEST(Run, PrintsTheRunDirectoryOnItsLastLine) {

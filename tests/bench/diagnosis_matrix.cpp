@@ -222,11 +222,7 @@ double plain_rms(const std::vector<Measurement>& runs, const Plant& plant,
   for (const Segment& segment : cut_segments(runs))
     if (std::find(which.begin(), which.end(), segment.run) != which.end()) data.segments.push_back(segment);
   if (data.segments.empty()) return 0.0;
-  FitPoint point{plant, guess_starts(runs, data.segments, plant), {}};
-  FitOptions options;
-  options.starts_only = true;
-  options.noise_rounds = 0;
-  return whitened_rms(fit(data, point, {}, options));
+  return whitened_rms(follow(data, {plant, guess_starts(runs, data.segments, plant), {}}));
 }
 
 std::vector<std::size_t> all_runs(const std::vector<Measurement>& runs) {

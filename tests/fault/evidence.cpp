@@ -67,6 +67,13 @@ void judge_log(const Evidence& evidence, const std::string& reason) {
 
 }  // namespace
 
+std::vector<PlantRow> plant_rows(const std::vector<TraceRow>& trace) {
+  std::vector<PlantRow> rows;
+  rows.reserve(trace.size());
+  for (const TraceRow& row : trace) rows.push_back({row.time_s, row.voltage_v, row.cart_m});
+  return rows;
+}
+
 std::string reason_of(const Evidence& evidence) {
   const RunRecord run = read_run(evidence.run);
   return run.outcome ? run.outcome->text("reason") : "";

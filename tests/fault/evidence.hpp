@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "../integration/virtual_rig_process.hpp"
 #include "fault_table.hpp"
 
 namespace upright::test {
@@ -13,6 +14,8 @@ namespace upright::test {
 struct PlantRow {
   double time_s = 0.0, voltage_v = 0.0, cart_m = 0.0;
 };
+
+std::vector<PlantRow> plant_rows(const std::vector<TraceRow>& trace);
 
 struct Evidence {
   std::vector<PlantRow> plant;

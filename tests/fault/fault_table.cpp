@@ -1,20 +1,56 @@
 #include "fault_table.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <fstream>
 #include <iterator>
 #include <stdexcept>
+#include <utility>
 
 namespace upright::test {
 
 namespace {
 
-constexpr std::array benches = {"simulated-fast", "simulated-real-time", "modbus-tcp", "modbus-rtu"};
+constexpr std::array names = {"simulated-fast", "simulated-real-time", "modbus-tcp", "modbus-rtu", "gpio",
+                              "comedi"};
+
+using Cells = std::array<std::string, names.size()>;
+
+constexpr const char* no_test = "-";
+constexpr const char* between_cells = " | ";
+
+constexpr const char* introduction =
+    R"(# Faults and what comes of them
+
+Made by the fault suite from the tests that passed: the first four columns by `ctest -L fault`, the last two by
+`scripts/test-kernel.sh`. Each compares its columns with what it has seen. Each fault is put into a run that balances, and
+what the plant was given is looked at, not what the controller says of itself: the voltage that the virtual rig recorded,
+the simulated plant's own input, or what was on the card's output. After a stop the motor is at zero volts for good, the
+reason is in `run.yaml`, no row is missing from the log, and it replays. In the hundreds of milliseconds of a test a busy
+machine may add 50 ms to the times given.
+
+Over Modbus the runs are of `upright run` against `upright virtual-rig`, as processes of their own, at 200 Hz with
+`watchdog_s: 0.1`.
+
+Under gpio and comedi they are of `upright run` at 200 Hz in a guest with Debian's kernel, whose simulated chip and cards a
+plant moves (`tests/kernel`). comedi is cards alone: two potentiometers (counters where they wrap) and the output. gpio
+has the pendulum's encoder, emergency stop, limit switches, amplifier enable and heartbeat on lines, and a watchdog that
+takes the motor's voltage away when the heart has not beaten for 100 ms; its cart and its output are on cards, since a cart
+makes more edges than lines can count.
+
+A dash is a fault without a meaning there: virtual time knows nothing of the machine; a simulated plant ends with its
+program; the Modbus register map has no bits for emergency stop and limit switches, and cards alone have no lines; lines
+and cards answer a call or refuse it, so that no reply is late, lost, corrupt or out of order, and there is no device that
+restarts; edges are counted by the program, which does not wrap; only an analog input is a potentiometer.
+
+| fault | simulated, virtual time | simulated, real time | modbus-tcp | modbus-rtu | gpio | comedi |
+|---|---|---|---|---|---|---|
+)";
 
 std::filesystem::path file_of(const std::filesystem::path& records, const std::string& fault,
                               std::size_t bench) {
-  return records / (fault + "." + benches.at(bench));
+  return records / (fault + "." + names.at(bench));
 }
 
 std::string text_or(const std::filesystem::path& file, const std::string& otherwise) {
@@ -23,7 +59,40 @@ std::string text_or(const std::filesystem::path& file, const std::string& otherw
   return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
 }
 
+/// The cells of a fault's row in `page`.
+Cells cells_in(const std::string& page, const Fault& fault) {
+  Cells cells;
+  cells.fill(no_test);
+  const std::string start = std::string("\n| ") + fault.words + between_cells;
+  std::size_t from = page.find(start);
+  if (from == std::string::npos) return cells;
+  from += start.size();
+  const std::string row = page.substr(from, page.find('\n', from) - from);
+  std::size_t begin = 0;
+  for (std::string& cell : cells) {
+    const std::size_t end = row.find(" |", begin);
+    if (end == std::string::npos) break;
+    cell = row.substr(begin, end - begin);
+    begin = end + std::string(between_cells).size();
+  }
+  return cells;
+}
+
 }  // namespace
+
+std::optional<Bench> bench_named(const std::string& name) {
+  const auto* const found = std::find(names.begin(), names.end(), name);
+  if (found == names.end()) return std::nullopt;
+  return static_cast<Bench>(found - names.begin());
+}
+
+Expectation goes_on() {
+  return {true, {}, 0.0};
+}
+
+Expectation stops(std::vector<std::string> reasons, double within_s) {
+  return {false, std::move(reasons), within_s};
+}
 
 const std::vector<Fault>& faults() {
   static const std::vector<Fault> list = {
@@ -32,6 +101,7 @@ const std::vector<Fault>& faults() {
       {"stuck_cart", "the cart's encoder stops counting"},
       {"stuck_pendulum", "the pendulum's encoder stops counting"},
       {"jump", "the cart's counts jump by 5000 and stay there"},
+      {"no_contact", "a potentiometer has no contact"},
       {"wrap", "16-bit counters wrap during the motion"},
       {"sign_amplifier", "`amplifier.sign` is wrong"},
       {"sign_cart", "`calibration.cart.sign` is wrong"},
@@ -44,7 +114,7 @@ const std::vector<Fault>& faults() {
       {"reorder", "one reply in 20 leaves after the next one"},
       {"silent", "no reply comes any more"},
       {"always_late", "every reply comes too late"},
-      {"cut", "the link is cut"},
+      {"cut", "the link is cut, or the encoders' card goes"},
       {"restart", "the device restarts"},
       {"emergency_stop", "the emergency stop is pressed"},
       {"limit_switch", "a limit switch is hit"},
@@ -86,41 +156,20 @@ void record(const std::string& fault, Bench bench, const std::string& cell) {
   if (!out.flush()) throw std::runtime_error("cannot keep the outcome of " + fault);
 }
 
-std::string page_of(const std::filesystem::path& records) {
-  std::string page =
-      "# Faults and what comes of them\n\n"
-      "Made by the fault suite (`ctest -L fault`) from the tests that passed; a test compares this page with "
-      "what was\n"
-      "seen. Each fault is put into a run that balances, and what the plant was given is looked at, not what "
-      "the\n"
-      "controller says of itself: the voltage that the virtual rig recorded, or the simulated plant's own "
-      "input. After a\n"
-      "stop the motor is at zero volts for good, the reason is in `run.yaml`, no row is missing from the "
-      "log, and it\n"
-      "replays. In the hundreds of milliseconds of a test a busy machine may add 50 ms to the times "
-      "given.\n\n"
-      "Over Modbus the runs are of `upright run` against `upright virtual-rig`, as processes of their own, "
-      "at 200 Hz with\n"
-      "`watchdog_s: 0.1`. A dash: not tried there, since virtual time knows nothing of the machine, a "
-      "simulated plant ends\n"
-      "with its program, and the Modbus register map has no bits for emergency stop and limit switches.\n\n"
-      "Emergency stop and limit switches as digital lines, edges that are lost or come too fast, a GPIO chip "
-      "that goes,\n"
-      "and the faults of Comedi cards need a kernel with simulated chips and cards: they are put in by "
-      "`scripts/test-kernel.sh`\n"
-      "(`tests/kernel`), in a guest, and judged by the plant's record as well.\n\n"
-      "| fault | simulated, virtual time | simulated, real time | modbus-tcp | modbus-rtu |\n"
-      "|---|---|---|---|---|\n";
+std::string page_of(const std::filesystem::path& records, const std::string& page,
+                    const std::vector<Bench>& benches) {
+  std::string made = introduction;
   for (const Fault& fault : faults()) {
-    page += "| ";
-    page += fault.words;
-    for (std::size_t bench = 0; bench < benches.size(); ++bench) {
-      page += " | ";
-      page += text_or(file_of(records, fault.key, bench), "-");
+    Cells cells = cells_in(page, fault);
+    for (const Bench bench : benches) {
+      const auto column = static_cast<std::size_t>(bench);
+      cells.at(column) = text_or(file_of(records, fault.key, column), no_test);
     }
-    page += " |\n";
+    made += std::string("| ") + fault.words;
+    for (const std::string& cell : cells) made += between_cells + cell;
+    made += " |\n";
   }
-  return page;
+  return made;
 }
 
 }  // namespace upright::test

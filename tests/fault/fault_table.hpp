@@ -2,12 +2,16 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
 namespace upright::test {
 
-enum class Bench { simulated_fast, simulated_real_time, modbus_tcp, modbus_rtu };
+enum class Bench { simulated_fast, simulated_real_time, modbus_tcp, modbus_rtu, gpio, comedi };
+
+/// The name of a bench's records: "modbus-tcp", ...; none: there is no such bench.
+std::optional<Bench> bench_named(const std::string& name);
 
 /// A row of the table.
 struct Fault {
@@ -24,13 +28,18 @@ struct Expectation {
   double zero_within_s = 0.0;        ///< zero volts at the plant, from the fault on
 };
 
+Expectation goes_on();
+Expectation stops(std::vector<std::string> reasons, double within_s);
+
 /// A cell of the table: "goes on", "`link_lost`, 0 V within 100 ms", ...
 std::string cell_of(const Expectation& expectation);
 
 /// Keeps the cell of a test that passed, under the folder UPRIGHT_FAULT_RECORDS.
 void record(const std::string& fault, Bench bench, const std::string& cell);
 
-/// The page, from the cells that were kept. Cells of tests that did not run say so.
-std::string page_of(const std::filesystem::path& records);
+/// The page with the cells of `benches` from what was kept, and those of the others as in `page`, for no
+/// machine runs them all at once. A dash is a cell that no test has.
+std::string page_of(const std::filesystem::path& records, const std::string& page,
+                    const std::vector<Bench>& benches);
 
 }  // namespace upright::test

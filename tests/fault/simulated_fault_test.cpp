@@ -4,15 +4,16 @@
 #include <sys/resource.h>
 #include <unistd.h>
 
+#include <atomic>
 #include <cmath>
 #include <csignal>
 #include <fstream>
 #include <functional>
-#include <limits>
 #include <memory>
 #include <numbers>
 
 #include "../integration/virtual_rig_process.hpp"
+#include "broken_compensator.hpp"
 #include "evidence.hpp"
 #include "shim.hpp"
 #include "upright/hal/guarded_rig.hpp"
@@ -105,20 +106,6 @@ class TamperedRig final : public Rig {
   double bad_s_ = 0.0;
 };
 
-/// An estimate that is not a number, from a cycle on.
-class BrokenCompensator final : public DelayCompensator {
- public:
-  void start(const ControlState&) noexcept override {}
-  ControlState compensate(const ControlState& delayed, double) noexcept override {
-    ControlState state = delayed;
-    if (++cycle_ >= bad) state.cart_velocity_mps = std::numeric_limits<double>::quiet_NaN();
-    return state;
-  }
-
- private:
-  int cycle_ = 0;
-};
-
 enum class Begins { in_cycle, at_the_start, when_the_shim_strikes, when_the_log_ends };
 
 struct Case {
@@ -134,13 +121,6 @@ struct Case {
   std::function<void(RigFile&)> rig_as_read = {};  ///< what the controller takes it for
   std::function<void()> before = {}, after = {};
 };
-
-Expectation goes_on() {
-  return {true, {}, 0.0};
-}
-Expectation stops(std::vector<std::string> reasons, double within_s) {
-  return {false, std::move(reasons), within_s};
-}
 
 Tamper every(int nth, RigStatus status, RigFault fault) {
   return [=](int cycle, RigReading& reading, Surroundings&) {
@@ -220,6 +200,9 @@ std::vector<Case> link_cases() {
       {.fault = "restart",
        .expectation = stops({"rig_fault"}, period_s),
        .tamper = every(1, RigStatus::fault, RigFault::device_restarted)},
+      {.fault = "no_contact",
+       .expectation = stops({"link_lost"}, watchdog_s + period_s),
+       .tamper = every(1, RigStatus::fault, RigFault::out_of_range)},
       {.fault = "emergency_stop",
        .expectation = stops({"emergency_stop"}, period_s),
        .tamper = every(1, RigStatus::fault, RigFault::emergency_stop)},
@@ -415,7 +398,8 @@ Evidence evidence_of(const On& on, const Folder& folder) {
   rig->open();
   SessionOptions options;
   options.out = folder / "runs";
-  if (c.broken_controller) options.compensator = std::make_unique<BrokenCompensator>();
+  std::atomic<double> broken_since_s{0.0};
+  if (c.broken_controller) options.compensator = std::make_unique<BrokenCompensator>(bad, broken_since_s);
   if (c.before) c.before();
   const SessionResult result = run_session(setup, *rig, clock, signal, std::move(options));
   if (c.begins == Begins::when_the_shim_strikes) {

@@ -10,6 +10,7 @@
 #include <random>
 
 #include "blind_case.hpp"
+#include "upright/analysis/gain_design.hpp"
 #include "upright/model/error.hpp"
 
 namespace upright {
@@ -84,11 +85,11 @@ TEST_P(OneHiddenEffect, IsNamedFirstWithItsParameterAndTheGapCloses) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Effects, OneHiddenEffect,
-                         testing::Values(Hidden{"coulomb_friction", {0.3}}, Hidden{"quadratic_drag", {1.0}},
+                         testing::Values(Hidden{"coulomb_friction", {0.3}},
                                          Hidden{"voltage_dead_zone", {0.2}}, Hidden{"input_delay", {0.006}},
-                                         Hidden{"motor_lag", {0.01}}, Hidden{"voltage_saturation", {1.8}},
-                                         Hidden{"cogging_force", {0.3, 0.012, 0.7}},
-                                         Hidden{"pivot_viscous_friction", {0.002}}),
+                                         Hidden{"voltage_saturation", {1.8}},
+                                         Hidden{"pivot_viscous_friction", {0.002}},
+                                         Hidden{"friction_asymmetry", {0.4}}),
                          [](const auto& test) { return test.param.kind; });
 
 TEST(Diagnosis, NamesAConstantForceTogetherWithWhatItCannotBeToldFrom) {
@@ -113,6 +114,22 @@ TEST(Diagnosis, FindsStickSlipAsCoulombAndStribeck) {
   EXPECT_NEAR(coulomb->values[0], 0.43, 0.03);
   EXPECT_NEAR(coulomb->values[0] + stribeck->values[0], 0.86, 0.05);
   EXPECT_LT(d.gap_after, 1.1);
+}
+
+TEST(Diagnosis, FindsWhatOnlyTheEndOfOneRunShows) {
+  std::mt19937_64 random(17);
+  blind::Rig rig{.plant = true_plant(random)};
+  rig.plant.set("pivot_quadratic_drag", {0.0007});
+  blind::Plan plan;
+  plan.experiment = blind::Experiment::balance;
+  plan.duration_s = 6.0;
+  plan.gains = design_gains(believed_plant(), {}, 100.0).gains;
+  plan.swing_rad = 0.02;
+  plan.let_go_s = 3.5;
+  const Diagnosis d = diagnose(believed_plant(), {measure(rig, plan, "run")});
+  EXPECT_EQ(d.verdict, Verdict::explained) << d.residual;
+  ASSERT_FALSE(d.effects.empty());
+  EXPECT_EQ(effect_registry()[d.effects.front().effect].kind, "pivot_quadratic_drag");
 }
 
 TEST(Diagnosis, NamesNoEffectWhereNoneIsHidden) {

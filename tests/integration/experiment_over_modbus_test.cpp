@@ -1,5 +1,5 @@
-// `upright experiment` over a real link against the virtual rig: refused without a sign check, which is done
-// once, notices a wrong sign, and opens the way to the others.
+// `upright experiment` over the real links against the virtual rig: refused without a sign check, which is
+// done once, notices a wrong sign, and opens the way to the others.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -17,18 +17,26 @@ struct Said {
   std::string out;
 };
 
-class ExperimentOverModbus : public ::testing::Test {
+struct Link {
+  std::string name;
+  bool serial = false;
+  std::string rate_hz;
+};
+
+class ExperimentOverModbus : public ::testing::TestWithParam<Link> {
  protected:
   ExperimentOverModbus()
-      : rig_text_(text_of(config + "rigs/modbus-tcp.yaml")),
-        server_(folder_, rig_text_, false, {"--theta0-deg", "180"}) {
-    rig_text_ = replaced(rig_text_, "port: 1502", "port: " + std::to_string(server_.port()));
+      : rig_text_(text_of(config + "rigs/modbus-" + GetParam().name + ".yaml")),
+        server_(folder_, rig_text_, GetParam().serial, {"--theta0-deg", "180"}) {
+    rig_text_ = GetParam().serial
+                    ? replaced(rig_text_, "/dev/ttyUSB0", server_.name())
+                    : replaced(rig_text_, "port: 1502", "port: " + std::to_string(server_.port()));
     std::ofstream(folder_ / "rig.yaml") << rig_text_;
   }
 
   Said experiment(const std::string& file, const std::string& rig, const std::string& out) {
-    Process client({UPRIGHT_BINARY, "experiment", file, "--rig", folder_ / rig, "--rate", "500", "--out",
-                    folder_ / out});
+    Process client({UPRIGHT_BINARY, "experiment", file, "--rig", folder_ / rig, "--rate", GetParam().rate_hz,
+                    "--out", folder_ / out});
     Said said;
     said.out = client.rest();
     said.exit_code = client.wait();
@@ -47,7 +55,7 @@ class ExperimentOverModbus : public ::testing::Test {
   VirtualRigProcess server_;
 };
 
-TEST_F(ExperimentOverModbus, AsksForASignCheckOnceAndThenRuns) {
+TEST_P(ExperimentOverModbus, AsksForASignCheckOnceAndThenRuns) {
   EXPECT_EQ(experiment(ramp(), "rig.yaml", "out").exit_code, 2);
   EXPECT_FALSE(std::filesystem::exists(folder_ / "out"));
   const Said check = experiment(config + "experiments/sign-check.yaml", "rig.yaml", "signs");
@@ -64,7 +72,7 @@ TEST_F(ExperimentOverModbus, AsksForASignCheckOnceAndThenRuns) {
   EXPECT_EQ(experiment(ramp(), "rig.yaml", "out2").exit_code, 2);
 }
 
-TEST_F(ExperimentOverModbus, ASignCheckNoticesAWrongSign) {
+TEST_P(ExperimentOverModbus, ASignCheckNoticesAWrongSign) {
   std::ofstream(folder_ / "wrong.yaml")
       << replaced(rig_text_, "pendulum: {counts_per_revolution: 4096, sign: 1",
                   "pendulum: {counts_per_revolution: 4096, sign: -1");
@@ -72,6 +80,10 @@ TEST_F(ExperimentOverModbus, ASignCheckNoticesAWrongSign) {
   EXPECT_EQ(check.exit_code, 3) << check.out;
   EXPECT_FALSE(std::filesystem::exists(folder_ / "wrong.yaml.signs"));
 }
+
+INSTANTIATE_TEST_SUITE_P(Links, ExperimentOverModbus,
+                         testing::Values(Link{"tcp", false, "500"}, Link{"rtu", true, "200"}),
+                         [](const auto& test) { return test.param.name; });
 
 }  // namespace
 }  // namespace upright::test

@@ -23,7 +23,7 @@ class ComediCardUnderTest {
   explicit ComediCardUnderTest(const std::string& file) : file_(file) {
     comedi_devconfig config{};
     std::strcpy(config.board_name, "comedi_test");
-    configure(&config);
+    if (!configure(&config)) throw std::runtime_error(file + " cannot be attached: " + std::strerror(errno));
     handle_ = comedi_open(file.c_str());
     if (handle_ == nullptr) throw std::runtime_error(file + " was attached and cannot be opened");
   }
@@ -34,7 +34,23 @@ class ComediCardUnderTest {
   ComediCardUnderTest(const ComediCardUnderTest&) = delete;
   ComediCardUnderTest& operator=(const ComediCardUnderTest&) = delete;
 
+  /// The data that a channel shows for volts, and what they mean. The middle is zero volts.
+  static lsampl_t datum_of(double volts) {
+    comedi_range range = ten_v();
+    return comedi_from_phys(volts, &range, top);
+  }
+  static double volts_of(lsampl_t datum) {
+    // Not by comedi_to_phys, which makes NaN of either end of the range until somebody tells it otherwise.
+    const comedi_range range = ten_v();
+    const double share = static_cast<double>(datum) / static_cast<double>(top);
+    return datum == middle ? 0.0 : range.min + share * (range.max - range.min);
+  }
+
   const std::string& file() const { return file_; }
+  /// The card goes, as one on a bus that can be unplugged does.
+  void detach() const {
+    if (!configure(nullptr)) throw std::runtime_error(file_ + " cannot be detached: " + std::strerror(errno));
+  }
   /// What is on an output.
   lsampl_t seen(unsigned int channel) const {
     lsampl_t datum = 0;
@@ -48,12 +64,15 @@ class ComediCardUnderTest {
   }
 
  private:
-  void configure(comedi_devconfig* config) const {
+  static comedi_range ten_v() { return {-10, 10, UNIT_volt}; }
+  bool configure(comedi_devconfig* config) const {
     const int descriptor = ::open(file_.c_str(), O_RDWR | O_CLOEXEC);
-    const int result = descriptor < 0 ? -1 : ioctl(descriptor, COMEDI_DEVCONFIG, config);
-    const std::string problem = std::strerror(errno);
-    if (descriptor >= 0) ::close(descriptor);
-    if (result != 0 && config != nullptr) throw std::runtime_error(file_ + " cannot be attached: " + problem);
+    if (descriptor < 0) return false;
+    const bool done = ioctl(descriptor, COMEDI_DEVCONFIG, config) == 0;
+    const int problem = errno;
+    ::close(descriptor);
+    errno = problem;
+    return done;
   }
 
   std::string file_;

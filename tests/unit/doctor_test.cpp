@@ -323,6 +323,30 @@ TEST(SafetyInputs, ThatAreActiveAreNamedAndNotBlamedOnTheLink) {
   EXPECT_EQ(judge_link(all, 100.0).health, Health::not_examined);
 }
 
+TEST(DigitalLines, AreReadOrBad) {
+  VirtualClock clock;
+  WiredRig rig(clock);
+  const SignalFlag signal{0};
+  LinkProbe probe = probe_link(rig, clock, 100.0, 1.0, signal);
+  EXPECT_EQ(judge_lines(probe).health, Health::good);
+  EXPECT_EQ(judge_lines(probe).what, "read 100 times");
+  probe.failed = 3;
+  EXPECT_EQ(judge_lines(probe).health, Health::bad);
+  EXPECT_FALSE(judge_lines(probe).remedy.empty());
+}
+
+TEST(DigitalLines, ThatAreDrivenAreNamedWithWhatToLookAt) {
+  GpioRig gpio;
+  gpio.chip = "gpiochip7";
+  EXPECT_TRUE(name_driven_lines(gpio).empty());
+  gpio.amplifier_enable = DigitalLine{3, true, LineBias::as_is};
+  gpio.heartbeat = 4;
+  const std::vector<Finding> findings = name_driven_lines(gpio);
+  EXPECT_NE(about(findings, "amplifier enable").what.find("line 3 of gpiochip7"), std::string::npos);
+  EXPECT_NE(about(findings, "heartbeat").what.find("line 4 of gpiochip7"), std::string::npos);
+  for (const Finding& finding : findings) EXPECT_FALSE(finding.remedy.empty());
+}
+
 TEST(Histograms, ShowEveryCountWithinAHundredColumns) {
   DurationHistogram narrow, wide, link;
   for (int i = 0; i < 10000; ++i) narrow.add(30'000);

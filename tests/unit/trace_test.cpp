@@ -50,6 +50,22 @@ TEST(SimulateSegments, OfTheTruePlantLeavesTheEncodersSteps) {
   }
 }
 
+TEST(SimulateSegments, FindsTheBasinOfTheInitialStateOnACoggedTrack) {
+  blind::Rig rig{.plant = rig_plant()};
+  rig.plant.remove(effect_number("coulomb_friction"));
+  rig.plant.set("cogging_force", {0.58, 0.0156, -2.3});
+  std::vector<Measurement> runs;
+  for (unsigned seed = 1; seed <= 6; ++seed) {
+    blind::Plan plan = short_plan(blind::Experiment::multisine);
+    plan.duration_s = 6.0;
+    plan.amplitude_v = 0.6;
+    plan.seed = seed;
+    runs.push_back(measure(rig, plan, "run"));
+  }
+  for (const SimulatedTrace& trace : simulate_segments(rig.plant, runs, cut_segments(runs)))
+    EXPECT_LT(rms_of_difference(trace.cart_m, trace.simulated_cart_m), rig.cart_step_m);
+}
+
 TEST(SimulateSegments, OfAnotherPlantIsOff) {
   const blind::Rig rig{.plant = rig_plant()};
   const std::vector<Measurement> runs = {measure(rig, short_plan(blind::Experiment::square), "run")};

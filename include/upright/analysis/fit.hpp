@@ -70,6 +70,7 @@ struct LinearStep {
   double weight[2];                   ///< how much of a measurement each is
   double gain[2];                     ///< d output / d state of the sensors
   double rate[2];                     ///< velocities, for jitter
+  double holds[2];  ///< level [N, N m] at which cart and pendulum rest in the end; 0: they move
   double period_s;
 };
 
@@ -116,7 +117,6 @@ struct FitOptions {
   int noise_rounds = 2;           ///< how often the noise is estimated anew; 0: as given
   std::optional<Noise> or_noise;  ///< another place from which to search for the noise, if it is the better
   bool noise_last = false;        ///< with no rounds: estimate the noise once, roughly, after the descent
-  bool starts_only = false;       ///< the plant is held: only initial states follow
   std::optional<Belief> belief;   ///< in the place of what each free parameter says of itself
   double tolerance = 1e-4;        ///< relative fall of the objective per sample at which to stop
 };
@@ -128,6 +128,10 @@ FitResult fit(const FitData& data, const FitPoint& start, const std::vector<Free
 /// Lets the initial states follow, with plant and noise held.
 FitResult follow(const FitData& data, const FitPoint& start,
                  int most_iterations = FitOptions{}.most_iterations);
+
+/// The point with its initial states followed, for a first fit: what guessed ones leave is not noise. As it
+/// was where they cannot be.
+FitPoint with_starts_followed(const FitData& data, FitPoint point);
 
 /// Linearised steps of every segment at a point, for residual analysis.
 std::vector<std::vector<LinearStep>> linearise(const FitData& data, const FitPoint& point);

@@ -78,6 +78,8 @@ class Search {
   std::vector<FreeParameter> free_of(const std::set<std::size_t>& added) const;
   std::vector<std::vector<double>> starts_of(std::size_t effect, const Hypothesis& base) const;
   std::vector<std::pair<double, double>> force_residual(const Hypothesis& base) const;
+  /// Fits once more from less noise, and keeps what is better: much noise and a poor fit hold each other up.
+  void calm(Hypothesis& h, const FitOptions& options);
   Hypothesis fitted(const std::set<std::size_t>& added, const FitPoint& start, const FitOptions& options,
                     const std::vector<FreeParameter>& free);
 

@@ -9,6 +9,7 @@
 
 #include "upright/hal/calibration.hpp"
 #include "upright/hal/clock.hpp"
+#include "upright/hal/gpio.hpp"
 #include "upright/hal/rig.hpp"
 #include "upright/runtime/control_loop.hpp"
 #include "upright/runtime/finding.hpp"
@@ -66,6 +67,12 @@ std::vector<Finding> name_missing_inputs(const SafetyInputs& inputs);
 
 /// What those that are wired showed while the link was probed.
 std::vector<Finding> judge_safety_inputs(const SafetyInputs& inputs, const LinkProbe& probe);
+
+/// Whether the inputs of a rig without a link could be read each time.
+Finding judge_lines(const LinkProbe& probe);
+
+/// The lines that the program drives. An open rig holds them, off; what hangs on them only a person can see.
+std::vector<Finding> name_driven_lines(const GpioRig& gpio);
 
 /// Asks to press the emergency stop and to trip each limit switch, and to release each again, each with
 /// `patience_s`: was it seen? Those that are not wired are left out.

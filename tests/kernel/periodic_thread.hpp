@@ -1,4 +1,4 @@
-// A thread that does something a thousand times a second, for a plant beside the controller under test.
+// A thread that does something again and again, for a plant beside the controller under test.
 #pragma once
 
 #include <pthread.h>
@@ -15,19 +15,19 @@
 namespace upright::test {
 
 /// `act` gets the present time; it is not called any more once this is gone.
-class EveryMillisecond {
+class PeriodicThread {
  public:
-  explicit EveryMillisecond(std::function<void(std::int64_t now_ns)> act)
-      : act_(std::move(act)), thread_([this] { serve(); }) {
+  PeriodicThread(std::int64_t period_ns, std::function<void(std::int64_t now_ns)> act)
+      : period_ns_(period_ns), act_(std::move(act)), thread_([this] { serve(); }) {
     const sched_param parameters{20};  // below the controller's
     pthread_setschedparam(thread_.native_handle(), SCHED_FIFO, &parameters);
   }
-  ~EveryMillisecond() {
+  ~PeriodicThread() {
     ending_ = true;
     thread_.join();
   }
-  EveryMillisecond(const EveryMillisecond&) = delete;
-  EveryMillisecond& operator=(const EveryMillisecond&) = delete;
+  PeriodicThread(const PeriodicThread&) = delete;
+  PeriodicThread& operator=(const PeriodicThread&) = delete;
 
  private:
   void serve() {
@@ -35,10 +35,11 @@ class EveryMillisecond {
     while (!ending_) {
       const std::int64_t now_ns = clock.now_ns();
       act_(now_ns);
-      clock.sleep_until(now_ns + 1'000'000);
+      clock.sleep_until(now_ns + period_ns_);
     }
   }
 
+  std::int64_t period_ns_;
   std::function<void(std::int64_t)> act_;
   std::atomic<bool> ending_{false};
   std::thread thread_;

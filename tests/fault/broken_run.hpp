@@ -1,0 +1,16 @@
+// A run on a real rig whose controller computes a value that is not a number, in this process.
+#pragma once
+
+#include <filesystem>
+
+namespace upright::test {
+
+struct BrokenRun {
+  std::filesystem::path directory;
+  double began_s = 0.0;  ///< when the value was computed, on the monotonic clock
+};
+
+BrokenRun broken_run(const std::filesystem::path& rig_file, const std::filesystem::path& gain_file,
+                     const std::filesystem::path& runs);
+
+}  // namespace upright::test

@@ -1,0 +1,37 @@
+// The filter by which segments are followed, on data of the CVODE reference (tests/blind).
+#include "upright/analysis/fit.hpp"
+
+#include <gtest/gtest.h>
+
+#include "blind_case.hpp"
+
+namespace upright {
+namespace {
+
+TEST(Fit, TakesSlidingWhereTheModelRestsForAForceAndNotForSensorNoise) {
+  Plant believed;
+  believed.cart_mass_kg = 1.0;
+  believed.motor = {1.5, 6.6};
+  believed.set("viscous_friction", {2.8});
+  believed.set("coulomb_friction", {0.41});
+  blind::Rig rig{.plant = believed};
+  rig.plant.set("constant_force", {0.55});
+  std::vector<Measurement> runs;
+  for (const blind::Experiment experiment : {blind::Experiment::square, blind::Experiment::multisine}) {
+    blind::Plan plan;
+    plan.experiment = experiment;
+    plan.rate_hz = 250.0;
+    plan.duration_s = 8.0;
+    plan.amplitude_v = 0.5;
+    runs.push_back(measure(rig, plan, "run"));
+  }
+  const FitData data{&runs, cut_segments(runs)};
+  const FitPoint start{believed, guess_starts(runs, data.segments, believed), {.force = 0.1}};
+  const Noise noise = fit(data, start, {}).point.noise;
+  EXPECT_LT(noise.sensors, 1.5);
+  EXPECT_GT(noise.force, 0.01);
+  EXPECT_LT(noise.force, 1.0);
+}
+
+}  // namespace
+}  // namespace upright
