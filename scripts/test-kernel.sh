@@ -2,16 +2,14 @@
 # Runs the tests that need the kernel's own GPIO and Comedi devices: boots Debian's kernel in QEMU (no KVM needed) with
 # gpio-sim and comedi_test, and prints what the test programs say. The programs and the modules each asks for are listed
 # in tests/kernel/CMakeLists.txt.
-#   scripts/test-kernel.sh [PRESET] [PROGRAM...]    PRESET is release when none is named; all programs when none is named
-# What is built for this processor runs in the guest, unless the processor has AVX-512 or UPRIGHT_NATIVE=OFF is set: then
-# the tests are built for any processor, in build/kernel.
+#   scripts/test-kernel.sh [PROGRAM...]    all programs when none is named
+# They are built with the preset ci, which keeps to what the guest's processor can do.
 # Ends with the programs' exit code, or with 77 where the kernel's packages are not to be had. An emulated processor says
 # what is right and what is wrong, never how fast. Kernel and modules are kept in build/kernel-test.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
-preset=${1:-release}
-shift || true
+preset=ci
 cache=$PWD/build/kernel-test
 guests=2  # an emulated processor each, with a share of each program's tests
 patience_s=270
@@ -21,21 +19,6 @@ skip() {
   echo "!! THE KERNEL TESTS DID NOT RUN: $*" >&2
   echo "!!" >&2
   exit 77
-}
-
-# QEMU does not emulate AVX-512: where this processor has it, what is built for it would not run in the guest.
-runs_in_guest() {
-  [ "${UPRIGHT_NATIVE:-ON}" = ON ] && ! grep -qm1 '^flags.* avx512f' /proc/cpuinfo
-}
-
-# The tests for any processor, in a build folder of their own.
-build_portable() {
-  local options=(-DUPRIGHT_NATIVE=OFF)
-  if command -v ccache >/dev/null; then
-    options+=(-DCMAKE_CXX_COMPILER_LAUNCHER=ccache)
-    export CCACHE_BASEDIR=$PWD CCACHE_NOHASHDIR=1
-  fi
-  cmake --preset "$preset" "${options[@]}" -B "$build" >/dev/null && cmake --build "$build" --target kernel_tests
 }
 
 # The kernel, its Comedi modules, and gpio-sim with irq_sim, which Debian has the source of but does not build.
@@ -127,12 +110,7 @@ make_kernel || problem=$?
 [ "$problem" -eq 0 ] || echo "the kernel's packages are not to be had: running the $(cat "$cache/version") at hand" >&2
 
 build=build/$preset
-if runs_in_guest; then
-  scripts/build.sh "$preset" kernel_tests
-else
-  build=build/kernel
-  build_portable
-fi
+scripts/build.sh "$preset" kernel_tests
 
 guest=$(mktemp -d)
 consoles=$(mktemp -d)
