@@ -28,7 +28,8 @@ Made by the fault suite from the tests that passed: the first four columns by `c
 what the plant was given is looked at, not what the controller says of itself: the voltage that the virtual rig recorded,
 the simulated plant's own input, or what was on the card's output. After a stop the motor is at zero volts for good, the
 reason is in `run.yaml`, no row is missing from the log, and it replays. In the hundreds of milliseconds of a test a busy
-machine may add 50 ms to the times given.
+machine may add 50 ms to the times given. An encoder that sticks is noticed when something has moved that it does not show:
+mostly within 100 ms, but a rig that is nearly at rest takes its time.
 
 Over Modbus the runs are of `upright run` against `upright virtual-rig`, as processes of their own, at 200 Hz with
 `watchdog_s: 0.1`.

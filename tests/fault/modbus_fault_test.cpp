@@ -56,8 +56,7 @@ std::vector<Case> link_cases() {
 }
 
 std::vector<Case> encoder_cases() {
-  constexpr double noticed_s = 1.1;
-  const Expectation stuck = stops({"stuck_encoder"}, noticed_s);
+  const Expectation stuck = stops({"stuck_encoder"}, stuck_noticed_s);
   return {
       {{.fault = "stuck_cart", .expectation = stuck, .duration_s = 4.0},
        {"--inject-stick", "cart", "--inject-stick-after", after}},

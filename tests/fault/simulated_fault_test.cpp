@@ -80,14 +80,35 @@ struct Surroundings {
 /// Called in each cycle, before the controller sees the reading.
 using Tamper = std::function<void(int cycle, RigReading& reading, Surroundings& around)>;
 
+enum class Begins { in_cycle, at_the_start, when_the_shim_strikes, when_the_log_ends };
+
+struct Case {
+  const char* fault = "";
+  Expectation expectation;
+  Tamper tamper = {};
+  Begins begins = Begins::in_cycle;
+  int first = bad;
+  double duration_s = 1.5;
+  bool real_time_only = false;
+  bool broken_controller = false;
+  double output_sign = 1.0;
+  std::function<void(RigFile&)> rig = {};          ///< the rig, plant and controller alike
+  std::function<void(RigFile&)> rig_as_read = {};  ///< what the controller takes it for
+  std::function<void()> before = {}, after = {};
+};
+
 class TamperedRig final : public Rig {
  public:
-  TamperedRig(std::unique_ptr<RecordedRig> plant, const Surroundings& around, Tamper tamper, double sign)
-      : plant_(std::move(plant)), around_(around), tamper_(std::move(tamper)), sign_(sign) {}
+  TamperedRig(std::unique_ptr<RecordedRig> plant, const Surroundings& around, const Case& what)
+      : plant_(std::move(plant)),
+        around_(around),
+        tamper_(what.tamper),
+        first_(what.first),
+        sign_(what.output_sign) {}
   void open() override { plant_->open(); }
   RigReading read() noexcept override {
     RigReading reading = plant_->read();
-    if (cycle_ == bad) bad_s_ = seconds(around_.clock.now_ns());
+    if (cycle_ == first_) bad_s_ = seconds(around_.clock.now_ns());
     if (tamper_) tamper_(cycle_, reading, around_);
     ++cycle_;
     return reading;
@@ -101,25 +122,10 @@ class TamperedRig final : public Rig {
   std::unique_ptr<RecordedRig> plant_;
   Surroundings around_;
   Tamper tamper_;
+  int first_;
   double sign_;
   int cycle_ = 0;
   double bad_s_ = 0.0;
-};
-
-enum class Begins { in_cycle, at_the_start, when_the_shim_strikes, when_the_log_ends };
-
-struct Case {
-  const char* fault = "";
-  Expectation expectation;
-  Tamper tamper = {};
-  Begins begins = Begins::in_cycle;
-  double duration_s = 1.5;
-  bool real_time_only = false;
-  bool broken_controller = false;
-  double output_sign = 1.0;
-  std::function<void(RigFile&)> rig = {};          ///< the rig, plant and controller alike
-  std::function<void(RigFile&)> rig_as_read = {};  ///< what the controller takes it for
-  std::function<void()> before = {}, after = {};
 };
 
 Tamper every(int nth, RigStatus status, RigFault fault) {
@@ -142,9 +148,9 @@ Tamper standing_still(double for_s) {
   });
 }
 
-Tamper stuck(std::int64_t RigReading::*counts) {
-  return [counts, last = std::int64_t{0}](int cycle, RigReading& reading, Surroundings&) mutable {
-    if (cycle <= bad) last = reading.*counts;
+Tamper stuck(std::int64_t RigReading::*counts, int first = bad) {
+  return [counts, first, last = std::int64_t{0}](int cycle, RigReading& reading, Surroundings&) mutable {
+    if (cycle <= first) last = reading.*counts;
     reading.*counts = last;
   };
 }
@@ -222,15 +228,14 @@ std::vector<Case> link_cases() {
 }
 
 std::vector<Case> encoder_cases() {
-  constexpr double noticed_s = 1.1;
   const Expectation runaway = stops({"fell", "track_limit"}, 1.5);
   return {
       {.fault = "stuck_cart",
-       .expectation = stops({"stuck_encoder"}, noticed_s),
+       .expectation = stops({"stuck_encoder"}, stuck_noticed_s),
        .tamper = stuck(&RigReading::cart_counts),
        .duration_s = 4.0},
       {.fault = "stuck_pendulum",
-       .expectation = stops({"stuck_encoder"}, noticed_s),
+       .expectation = stops({"stuck_encoder"}, stuck_noticed_s),
        .tamper = stuck(&RigReading::pendulum_counts),
        .duration_s = 4.0},
       {.fault = "jump",
@@ -390,8 +395,7 @@ Evidence evidence_of(const On& on, const Folder& folder) {
   RunSetup setup = setup_for(c, on.fast);
   auto recorded = std::make_unique<RecordedRig>(
       make_simulated_rig(setup.rig, clock, {setup.seed, setup.theta0_rad}), clock, setup.rig.calibration);
-  auto tampered = std::make_unique<TamperedRig>(std::move(recorded), Surroundings{clock, signal}, c.tamper,
-                                                c.output_sign);
+  auto tampered = std::make_unique<TamperedRig>(std::move(recorded), Surroundings{clock, signal}, c);
   const TamperedRig& watched = *tampered;
   const std::unique_ptr<Rig> rig = guarded(std::move(tampered), setup.rig.calibration);
   if (c.rig_as_read) c.rig_as_read(setup.rig);
@@ -427,6 +431,23 @@ TEST_P(SimulatedFault, HasItsOutcome) {
   if (!HasFailure())
     record(on.what.fault, on.fast ? Bench::simulated_fast : Bench::simulated_real_time,
            cell_of(on.what.expectation));
+}
+
+/// Where the rig is nearly at rest, an encoder that sticks shows what is true for a while yet.
+TEST(StuckEncoder, IsNoticedInTimeWhereverItSticks) {
+  for (const auto counts : {&RigReading::cart_counts, &RigReading::pendulum_counts})
+    for (int first = 20; first < 1500; first += 37) {
+      const Expectation expectation = stops({"stuck_encoder"}, stuck_noticed_s);
+      const Case sticks{.fault = "stuck",
+                        .expectation = expectation,
+                        .tamper = stuck(counts, first),
+                        .first = first,
+                        .duration_s = 8.0};
+      const Folder folder;
+      judge(evidence_of({sticks, true}, folder), expectation);
+      ASSERT_FALSE(HasFailure()) << (counts == &RigReading::cart_counts ? "cart" : "pendulum") << " in cycle "
+                                 << first;
+    }
 }
 
 INSTANTIATE_TEST_SUITE_P(, SimulatedFault, testing::ValuesIn(all()), [](const auto& item) {
