@@ -50,9 +50,17 @@ function(upright_library name)
   endif()
 endfunction()
 
-# upright_test(NAME SOURCES... LINK TARGETS... LABELS ...): one GoogleTest program, one ctest entry.
+# real_time_test(NAME SECONDS PROGRAM ARGUMENTS...): a ctest entry of what needs real time: tried again for so long while
+# the machine stands still, and skipped, aloud, on one that never stops doing so.
+function(real_time_test name seconds program)
+  add_test(NAME ${name} COMMAND calm_machine ${seconds} $<TARGET_FILE:${program}> ${ARGN})
+  set_tests_properties(${name} PROPERTIES SKIP_RETURN_CODE 77)
+endfunction()
+
+# upright_test(NAME SOURCES... LINK TARGETS... LABELS ...): one GoogleTest program, one ctest entry. With REAL_TIME one
+# that is tried again when the machine stood still.
 function(upright_test name)
-  cmake_parse_arguments(arg "" "TIMEOUT" "SOURCES;LINK;LABELS" ${ARGN})
+  cmake_parse_arguments(arg "REAL_TIME" "TIMEOUT" "SOURCES;LINK;LABELS" ${ARGN})
   add_executable(${name} ${arg_SOURCES})
   target_link_libraries(${name} PRIVATE ${arg_LINK} GTest::gtest_main upright_options)
   target_compile_definitions(${name} PRIVATE UPRIGHT_SOURCE_DIR="${PROJECT_SOURCE_DIR}"
@@ -62,9 +70,14 @@ function(upright_test name)
   else()
     add_dependencies(unit_tests ${name})
   endif()
-  add_test(NAME ${name} COMMAND ${name})
   if(NOT arg_TIMEOUT)
     set(arg_TIMEOUT 120)
+  endif()
+  if(arg_REAL_TIME)
+    real_time_test(${name} ${arg_TIMEOUT} ${name})
+    math(EXPR arg_TIMEOUT "2 * ${arg_TIMEOUT}")
+  else()
+    add_test(NAME ${name} COMMAND ${name})
   endif()
   set_tests_properties(${name} PROPERTIES TIMEOUT ${arg_TIMEOUT} LABELS "${arg_LABELS}")
 endfunction()

@@ -1,0 +1,122 @@
+// Runs a test that needs real time, again when it fails while the machine stood still, as virtual machines
+// do:
+//   calm_machine SECONDS PROGRAM [ARGUMENTS...]
+// A thread of the highest priority, woken every millisecond, is the witness. Ends with the program's exit
+// code; with 77 (skipped) when every attempt within so many seconds failed and the machine stood still in
+// each, for then the test says nothing about the program.
+#include <pthread.h>
+#include <sched.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <thread>
+
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+constexpr int skipped = 77;
+constexpr auto calm = std::chrono::seconds(1);
+/// A period of the fastest loop over a link: who is late by so much has missed one.
+constexpr auto standstill = std::chrono::milliseconds(2);
+
+/// Watches, from its making to its end, by how much a sleeper of the highest priority is late.
+class Witness {
+ public:
+  Witness() : thread_([this] { watch(); }) {
+    const sched_param highest{sched_get_priority_max(SCHED_FIFO)};
+    pthread_setschedparam(thread_.native_handle(), SCHED_FIFO,
+                          &highest);  // where it is not granted it watches all the same
+  }
+  ~Witness() { stop(); }
+  Witness(const Witness&) = delete;
+  Witness& operator=(const Witness&) = delete;
+
+  void stop() {
+    ends_ = true;
+    if (thread_.joinable()) thread_.join();
+  }
+  Clock::duration latest() const { return latest_; }
+  int standstills() const { return standstills_; }
+
+ private:
+  void watch() {
+    Clock::time_point due = Clock::now();
+    while (!ends_) {
+      due = std::max(due + std::chrono::milliseconds(1), Clock::now());
+      std::this_thread::sleep_until(due);
+      const Clock::duration late = Clock::now() - due;
+      latest_ = std::max(latest_, late);
+      if (late > standstill) ++standstills_;
+    }
+  }
+
+  std::atomic<bool> ends_{false};
+  Clock::duration latest_{};
+  int standstills_ = 0;
+  std::thread thread_;
+};
+
+void leave_word() {
+  const char* file = std::getenv("UPRIGHT_INTERRUPTED");
+  if (file == nullptr) return;
+  std::filesystem::create_directories(std::filesystem::path(file).parent_path());
+  std::ofstream(file) << "the machine stood still\n";
+}
+
+int run(char** command) {
+  const pid_t child = fork();
+  if (child == 0) {
+    execvp(command[0], command);
+    std::perror(command[0]);
+    _exit(127);
+  }
+  int status = 0;
+  if (child < 0 || waitpid(child, &status, 0) != child) return EXIT_FAILURE;
+  return WIFEXITED(status) ? WEXITSTATUS(status) : EXIT_FAILURE;
+}
+
+/// Waits until the machine has run for a while without standing still; whether it did before the end.
+bool await_calm(Clock::time_point end) {
+  while (Clock::now() < end) {
+    Witness witness;
+    std::this_thread::sleep_for(calm);
+    witness.stop();
+    if (witness.standstills() == 0) return true;
+  }
+  return false;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (argc < 3) {
+    std::fputs("usage: calm_machine SECONDS PROGRAM [ARGUMENTS...]\n", stderr);
+    return 2;
+  }
+  const auto end = Clock::now() + std::chrono::duration<double>(std::atof(argv[1]));
+  for (int attempt = 1;; ++attempt) {
+    const auto started = Clock::now();
+    Witness witness;
+    const int status = run(argv + 2);
+    witness.stop();
+    if (status == 0 || witness.standstills() == 0) return status;
+    const double worst_ms = std::chrono::duration<double, std::milli>(witness.latest()).count();
+    std::printf("!! attempt %d failed (%d) while the machine stood still %d times, for %.1f ms at worst\n",
+                attempt, status, witness.standstills(), worst_ms);
+    const auto another = Clock::now() + (Clock::now() - started);
+    if (another > end || !await_calm(end)) {
+      std::printf("!! SKIPPED: this machine is not calm enough for a test in real time\n");
+      leave_word();
+      return skipped;
+    }
+    std::fflush(stdout);
+  }
+}
