@@ -55,6 +55,7 @@ endfunction()
 function(real_time_test name seconds program)
   add_test(NAME ${name} COMMAND calm_machine ${seconds} $<TARGET_FILE:${program}> ${ARGN})
   set_tests_properties(${name} PROPERTIES SKIP_RETURN_CODE 77)
+  add_dependencies(${program} calm_machine)
 endfunction()
 
 # upright_test(NAME SOURCES... LINK TARGETS... LABELS ...): one GoogleTest program, one ctest entry. With REAL_TIME one

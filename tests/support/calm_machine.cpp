@@ -1,9 +1,9 @@
 // Runs a test that needs real time, again when it fails while the machine stood still, as virtual machines
 // do:
 //   calm_machine SECONDS PROGRAM [ARGUMENTS...]
-// A thread of the highest priority, woken every millisecond, is the witness. Ends with the program's exit
-// code; with 77 (skipped) when every attempt within so many seconds failed and the machine stood still in
-// each, for then the test says nothing about the program.
+// A thread of the highest priority on each processor, woken every millisecond, is the witness. Ends with the
+// program's exit code; with 77 (skipped) when every attempt within so many seconds failed and the machine
+// stood still in each, for then the test says nothing about the program.
 #include <pthread.h>
 #include <sched.h>
 #include <sys/wait.h>
@@ -16,7 +16,9 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <memory>
 #include <thread>
+#include <vector>
 
 namespace {
 
@@ -28,13 +30,18 @@ constexpr auto calm = std::chrono::seconds(1);
 /// highest priority wait for so long.
 constexpr auto standstill = std::chrono::milliseconds(10);
 
-/// Watches, from its making to its end, by how much a sleeper of the highest priority is late.
+/// Watches, from its making to its end, by how much a sleeper of the highest priority is late on one
+/// processor: a virtual machine's stand still one by one.
 class Witness {
  public:
-  Witness() : thread_([this] { watch(); }) {
+  explicit Witness(int processor) : thread_([this] { watch(); }) {
+    cpu_set_t here;
+    CPU_ZERO(&here);
+    CPU_SET(processor, &here);
+    pthread_setaffinity_np(thread_.native_handle(), sizeof here, &here);
+    // Where the priority is not granted it watches all the same.
     const sched_param highest{sched_get_priority_max(SCHED_FIFO)};
-    pthread_setschedparam(thread_.native_handle(), SCHED_FIFO,
-                          &highest);  // where it is not granted it watches all the same
+    pthread_setschedparam(thread_.native_handle(), SCHED_FIFO, &highest);
   }
   ~Witness() { stop(); }
   Witness(const Witness&) = delete;
@@ -65,6 +72,31 @@ class Witness {
   std::thread thread_;
 };
 
+struct Observed {
+  int standstills = 0;
+  double worst_ms = 0.0;
+};
+
+/// What a witness on each processor sees while something is done.
+template <class Work>
+Observed observe(Work&& work) {
+  cpu_set_t allowed;
+  CPU_ZERO(&allowed);
+  sched_getaffinity(0, sizeof allowed, &allowed);
+  std::vector<std::unique_ptr<Witness>> witnesses;
+  for (int processor = 0; processor < CPU_SETSIZE; ++processor)
+    if (CPU_ISSET(processor, &allowed)) witnesses.push_back(std::make_unique<Witness>(processor));
+  work();
+  Observed observed;
+  for (const auto& witness : witnesses) {
+    witness->stop();
+    observed.standstills += witness->standstills();
+    const double latest_ms = std::chrono::duration<double, std::milli>(witness->latest()).count();
+    observed.worst_ms = std::max(observed.worst_ms, latest_ms);
+  }
+  return observed;
+}
+
 void leave_word() {
   const char* file = std::getenv("UPRIGHT_INTERRUPTED");
   if (file == nullptr) return;
@@ -87,10 +119,7 @@ int run(char** command) {
 /// Waits until the machine has run for a while without standing still; whether it did before the end.
 bool await_calm(Clock::time_point end) {
   while (Clock::now() < end) {
-    Witness witness;
-    std::this_thread::sleep_for(calm);
-    witness.stop();
-    if (witness.standstills() == 0) return true;
+    if (observe([] { std::this_thread::sleep_for(calm); }).standstills == 0) return true;
   }
   return false;
 }
@@ -105,13 +134,11 @@ int main(int argc, char** argv) {
   const Clock::time_point end = Clock::now() + std::chrono::seconds(std::atoi(argv[1]));
   for (int attempt = 1;; ++attempt) {
     const auto started = Clock::now();
-    Witness witness;
-    const int status = run(argv + 2);
-    witness.stop();
-    if (status == 0 || witness.standstills() == 0) return status;
-    const double worst_ms = std::chrono::duration<double, std::milli>(witness.latest()).count();
+    int status = 0;
+    const Observed observed = observe([&] { status = run(argv + 2); });
+    if (status == 0 || observed.standstills == 0) return status;
     std::printf("!! attempt %d failed (%d) while the machine stood still %d times, for %.1f ms at worst\n",
-                attempt, status, witness.standstills(), worst_ms);
+                attempt, status, observed.standstills, observed.worst_ms);
     const auto another = Clock::now() + (Clock::now() - started);
     if (another > end || !await_calm(end)) {
       std::printf("!! SKIPPED: this machine is not calm enough for a test in real time\n");
