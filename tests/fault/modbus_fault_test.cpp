@@ -102,7 +102,7 @@ std::vector<On> all() {
 /// The rig and its controller's files, for either link.
 class Setting {
  public:
-  Setting(bool serial, const Case& c) : serial_(serial) {
+  Setting(bool serial, const Case& c) {
     // The machine may be busy: what is tested here is what is done, not how fast.
     rig_ = changed(
         text_of(config + "rigs/" + (serial ? "modbus-rtu.yaml" : "modbus-tcp.yaml")),
@@ -134,7 +134,6 @@ class Setting {
     return text;
   }
 
-  bool serial_;
   Folder folder_;
   std::string rig_;
   std::unique_ptr<VirtualRigProcess> server_;
