@@ -9,7 +9,6 @@
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
-preset=ci
 cache=$PWD/build/kernel-test
 guests=2  # an emulated processor each, with a share of each program's tests
 patience_s=270
@@ -109,8 +108,8 @@ make_kernel || problem=$?
 [ -e "$cache/version" ] || skip "the kernel's packages are not to be had"
 [ "$problem" -eq 0 ] || echo "the kernel's packages are not to be had: running the $(cat "$cache/version") at hand" >&2
 
-build=build/$preset
-scripts/build.sh "$preset" kernel_tests
+build=build/ci
+scripts/build.sh ci kernel_tests
 
 guest=$(mktemp -d)
 consoles=$(mktemp -d)
