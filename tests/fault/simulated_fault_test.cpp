@@ -87,7 +87,7 @@ struct Case {
   Expectation expectation;
   Tamper tamper = {};
   Begins begins = Begins::in_cycle;
-  int first = bad;
+  int first = bad;  ///< the cycle in which it begins
   double duration_s = 1.5;
   bool real_time_only = false;
   bool broken_controller = false;
