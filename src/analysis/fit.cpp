@@ -34,6 +34,7 @@ EngineOptions engine_options() {
   options.max_step_s = 4e-3;
   options.step_fraction = 0.5;
   options.resolve_bristles = false;
+  options.quick_derivatives = true;
   options.event_tolerance_s = 1e-9;
   return options;
 }
@@ -557,8 +558,12 @@ class Fitter {
       auto former_steps = steps_;
       auto former_normals = normals_;
       double next_objective = infinity;
+      const double least_fall = options_.tolerance * sample_count() * 0.1 + 0.02;
       for (int attempt = 0; attempt < 4; ++attempt) {
-        point_ = step(damping);
+        Step next = step(damping);
+        // What does not even promise to fall is not worth looking at.
+        if (next.promised_fall < least_fall) break;
+        point_ = std::move(next.point);
         next_objective = evaluate();
         if (next_objective < objective) break;
         point_ = former;
@@ -573,7 +578,7 @@ class Fitter {
       damping = std::max(damping * 0.1, 1e-9);
       const double fall = objective - next_objective;
       objective = next_objective;
-      if (fall < options_.tolerance * sample_count() * 0.1 + 0.02) {
+      if (fall < least_fall) {
         converged_ = true;
         break;
       }
@@ -608,12 +613,19 @@ class Fitter {
     return off.dot(prior_information() * off);
   }
 
+  struct Step {
+    FitPoint point;
+    double promised_fall = 0.0;  ///< of the objective, were the residuals linear
+  };
+
   /// The Gauss-Newton step of all segments: parameters first (initial states eliminated), then each initial
   /// state.
-  FitPoint step(double damping) const {
+  Step step(double damping) const {
     const auto np = static_cast<Eigen::Index>(free_.size());
-    NormalMatrix h = prior_information();
-    Eigen::VectorXd g = -h * off_belief();
+    const NormalMatrix prior = prior_information();
+    const Eigen::VectorXd to_belief = -prior * off_belief();
+    NormalMatrix h = prior;
+    Eigen::VectorXd g = to_belief;
     std::vector<Eigen::Matrix<double, states, Eigen::Dynamic>> back(normals_.size());
     std::vector<Eigen::Matrix<double, states, 1>> base(normals_.size());
     for (std::size_t s = 0; s < normals_.size(); ++s) {
@@ -627,23 +639,35 @@ class Fitter {
       h += n.h.bottomRightCorner(np, np) - n.h.bottomLeftCorner(np, states) * back[s];
       g += n.g.tail(np) - n.h.bottomLeftCorner(np, states) * base[s];
     }
-    const Eigen::VectorXd delta = bounded_step(h, g, damping);
+    Eigen::VectorXd delta = bounded_step(h, g, damping);
     FitPoint trial = point_;
     for (Eigen::Index j = 0; j < np; ++j) {
       const FreeParameter& p = free_[static_cast<std::size_t>(j)];
       PlantEffect effect = *trial.plant.find(p.effect);
-      effect.values[p.index] = std::clamp(effect.values[p.index] + delta[j], p.low, p.high);
+      const double moved = std::clamp(effect.values[p.index] + delta[j], p.low, p.high);
+      delta[j] = moved - effect.values[p.index];
+      effect.values[p.index] = moved;
       trial.plant.set(p.effect, effect.values);
     }
+    const auto promise = [](const NormalMatrix& information, const Eigen::VectorXd& slope,
+                            const Eigen::VectorXd& way) {
+      return 2.0 * slope.dot(way) - way.dot(information * way);
+    };
+    double fall = promise(prior, to_belief, delta);
+    Eigen::VectorXd way(states + np);
+    way.tail(np) = delta;
     for (std::size_t s = 0; s < normals_.size(); ++s) {
-      const Eigen::Matrix<double, states, 1> d = base[s] - back[s] * delta;
       const auto values = as_array(trial.starts[s]);
       constexpr std::array<double, states> longest = {0.01, 0.3, 0.5, 3.0, 0.01};
-      for (int i = 0; i < states; ++i)
-        *values[static_cast<std::size_t>(i)] +=
-            std::clamp(d[i], -longest[static_cast<std::size_t>(i)], longest[static_cast<std::size_t>(i)]);
+      way.head(states) = base[s] - back[s] * delta;
+      for (int i = 0; i < states; ++i) {
+        const double limit = longest[static_cast<std::size_t>(i)];
+        way[i] = std::clamp(way[i], -limit, limit);
+        *values[static_cast<std::size_t>(i)] += way[i];
+      }
+      fall += promise(normals_[s].h, normals_[s].g, way);
     }
-    return trial;
+    return {std::move(trial), fall};
   }
 
   /// Solves for the parameters; those held at a bound by the data stay there, and no step is longer than

@@ -53,11 +53,17 @@ class EventEngine {
       look_at_bristles(value_of(state_.motor_v));
       const S step = next_step(remaining);
       FirstRate rate;
-      const PlantState<S> next = rk4(dynamics_, state_, drive_, step, &rate);
-      const PlantState<double> plain_next = plain_state(next);
+      const bool quick = linearises_in_middle();
+      PlantState<S> next{};
+      if (!quick) next = rk4(dynamics_, state_, drive_, step, &rate);
+      const PlantState<double> plain_next =
+          quick ? rk4(plain_, plain_state(state_), value_of(drive_), value_of(step), &rate)
+                : plain_state(next);
       const auto along = [&](double t) { return plain_step(t); };
       const auto found = first_event(plain_next, rate, value_of(step), held, along);
       if (!found) {
+        if constexpr (!std::is_same_v<S, double>)
+          if (quick) next = linearised_step(plain_next, step);
         state_ = next;
         remaining = remaining - step;
         time_s_ += value_of(step);
@@ -291,6 +297,85 @@ class EventEngine {
     PlantState<T> end = runge_kutta_4(rate, s, k1, h, bristles ? &*bristles : nullptr);
     end.motor_v = lagged ? lagged->after_v : drive;
     return end;
+  }
+
+  bool linearises_in_middle() const {
+    return !std::is_same_v<S, double> && options_.quick_derivatives && !dynamics_.has_motor_lag() &&
+           !dynamics_.has_bristle_state();
+  }
+
+  /// How the accelerations change with the state: columns cart_m, theta_rad, cart_mps, theta_radps.
+  struct Slopes {
+    std::array<double, 4> cart_mps2{}, theta_radps2{};
+  };
+  Slopes slopes_at(const PlantState<double>& middle, const PlantState<double>& rate) const {
+    constexpr double aside = 1e-6;
+    Slopes slopes;
+    const auto set = [&](std::size_t column, double PlantState<double>::*of) {
+      PlantState<double> moved_aside = middle;
+      moved_aside.*of += aside;
+      const PlantState<double> other = plain_.derivative(moved_aside, value_of(drive_), contacts_);
+      slopes.cart_mps2[column] = (other.cart_mps - rate.cart_mps) / aside;
+      slopes.theta_radps2[column] = (other.theta_radps - rate.theta_radps) / aside;
+    };
+    set(0, &PlantState<double>::cart_m);
+    set(2, &PlantState<double>::cart_mps);
+    if (!dynamics_.has_pendulum()) return slopes;
+    set(1, &PlantState<double>::theta_rad);
+    set(3, &PlantState<double>::theta_radps);
+    return slopes;
+  }
+
+  /// The step that leads to `end`, with derivatives: those of the motion that is linear in the middle,
+  /// x(h) = x + (h + h^2 A / 2 + h^3 A^2 / 6) (A x + b).
+  PlantState<S> linearised_step(const PlantState<double>& end, const S& h) const {
+    const PlantState<double> begin = plain_state(state_);
+    PlantState<double> middle;
+    const auto halfway = [&](double PlantState<double>::*of) { middle.*of = 0.5 * (begin.*of + end.*of); };
+    halfway(&PlantState<double>::cart_m);
+    halfway(&PlantState<double>::theta_rad);
+    halfway(&PlantState<double>::cart_mps);
+    halfway(&PlantState<double>::theta_radps);
+    PlantState<S> at = state_;
+    const auto put = [](S& number, double value) { number = number + S(value - value_of(number)); };
+    put(at.cart_m, middle.cart_m);
+    put(at.theta_rad, middle.theta_rad);
+    put(at.cart_mps, middle.cart_mps);
+    put(at.theta_radps, middle.theta_radps);
+    // Only derivatives count from here on; the values of these numbers say nothing.
+    const PlantState<S> first = dynamics_.derivative(at, drive_, contacts_);
+    const Slopes slopes = slopes_at(middle, plain_state(first));
+    const bool cart_moves = !dynamics_.cart_locked() && !cart_at_rest();
+    const bool pivot_moves = dynamics_.has_pendulum() && !pivot_at_rest();
+    const auto follow = [&](const PlantState<S>& rate) {
+      const auto row = [&](const std::array<double, 4>& slope) {
+        return rate.cart_m * slope[0] + rate.theta_rad * slope[1] + rate.cart_mps * slope[2] +
+               rate.theta_radps * slope[3];
+      };
+      PlantState<S> next{};
+      if (cart_moves) next.cart_m = rate.cart_mps;
+      if (pivot_moves) next.theta_rad = rate.theta_radps;
+      next.cart_mps = row(slopes.cart_mps2);
+      next.theta_radps = row(slopes.theta_radps2);
+      return next;
+    };
+    const PlantState<S> second = follow(first), third = follow(second);
+    const double length = value_of(h);
+    const S longer = h - S(length);  // the length of the step may move too
+    PlantState<S> result = state_;
+    const auto set = [&](S PlantState<S>::*of, double value) {
+      const double rate_at_end = value_of(first.*of) + 0.5 * length * value_of(second.*of);
+      S& number = result.*of;
+      number = number + length * (first.*of) + (0.5 * length * length) * (second.*of) +
+               (length * length * length / 6.0) * (third.*of) + rate_at_end * longer;
+      put(number, value);
+    };
+    set(&PlantState<S>::cart_m, end.cart_m);
+    set(&PlantState<S>::theta_rad, end.theta_rad);
+    set(&PlantState<S>::cart_mps, end.cart_mps);
+    set(&PlantState<S>::theta_radps, end.theta_radps);
+    result.motor_v = drive_;
+    return result;
   }
 
   /// The same with plain numbers, from the present state.
