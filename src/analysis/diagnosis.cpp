@@ -169,6 +169,26 @@ class Diagnostician {
     return candidates;
   }
 
+  /// Those that promise a share of what the best one does, and some at least. A promise is kept within a
+  /// factor of a few (measured on the matrix), so that the best is among them.
+  std::vector<std::size_t> promising(std::vector<std::size_t> candidates, int round) {
+    constexpr double share = 0.1;
+    constexpr std::size_t least_count = 8;
+    std::vector<double> promised = search_->promised_gains(current_, candidates);
+    std::vector<std::size_t> ranking(candidates.size());
+    std::iota(ranking.begin(), ranking.end(), std::size_t{0});
+    std::stable_sort(ranking.begin(), ranking.end(),
+                     [&](std::size_t a, std::size_t b) { return promised[a] > promised[b]; });
+    std::vector<std::size_t> chosen;
+    for (const std::size_t i : ranking) {
+      if (chosen.size() < least_count || promised[i] > share * promised[ranking.front()])
+        chosen.push_back(candidates[i]);
+      else if (round == 0)
+        result_.candidates.push_back({candidates[i], 0.0, std::max(promised[i], 0.0)});
+    }
+    return chosen;
+  }
+
   /// A hypothesis in which the new effect does nothing, or is of a size that makes it another effect, has
   /// lost.
   bool is_plausible(const Hypothesis& h, std::size_t effect) const {
@@ -225,14 +245,17 @@ class Diagnostician {
   }
 
   /// How far off a plain simulation of held-out runs is, in units of the sensors' noise.
-  double simulation_gap(const Hypothesis& h) {
-    Hypothesis plain = h;
-    search_->judge(plain, sensor_noise(h));
-    return gap_of(plain);
+  double simulation_gap(Hypothesis& h) const {
+    if (!h.simulation_gap) {
+      Hypothesis plain = h;
+      search_->judge(plain, sensor_noise(h));
+      h.simulation_gap = gap_of(plain);
+    }
+    return *h.simulation_gap;
   }
 
   /// Forces that look right a sample ahead can simulate badly: then the name is wrong.
-  bool simulates_as_well(const Hypothesis& h) {
+  bool simulates_as_well(Hypothesis& h) {
     constexpr double by_chance = 1.1;
     if (held_.segments.empty()) return true;
     return simulation_gap(h) < by_chance * simulation_gap(current_);
@@ -314,11 +337,12 @@ class Diagnostician {
   /// Adds effects one at a time, the best first, for as long as the data ask for one.
   void grow() {
     for (int round = 0; round < most_rounds; ++round) {
-      const std::vector<std::size_t> candidates = open_candidates();
+      tell(0.05 + 0.2 * round, "looking for what is missing");
+      const std::vector<std::size_t> candidates = promising(open_candidates(), round);
       std::vector<std::pair<double, Hypothesis>> screened;
       const double sieved = search_->sieved(current_).train.objective;
       for (std::size_t c = 0; c < candidates.size(); ++c) {
-        tell(0.05 + 0.2 * round + 0.12 * static_cast<double>(c) / static_cast<double>(candidates.size()),
+        tell(0.07 + 0.2 * round + 0.1 * static_cast<double>(c) / static_cast<double>(candidates.size()),
              "trying " + kind_of(candidates[c]));
         Hypothesis h = search_->screened(current_, candidates[c]);
         const double gain = sieved - h.train.objective - price_of(candidates[c]);
@@ -337,6 +361,7 @@ class Diagnostician {
              "fitting " + kind_of(candidates[i]));
         Hypothesis h = screened[i].second;
         search_->refine(current_, h);
+        if (round == 0) simulation_gap(h);
         if (round == 0) finalists_.emplace_back(candidates[i], h);
         Improvement improvement = compare(current_, h);
         record_trial(round, candidates[i], h, improvement);
@@ -424,8 +449,12 @@ class Diagnostician {
         const std::size_t first = finalists_[a].first, second = finalists_[b].first;
         if (found_.size() > 2 || (found_.size() == 2 && is_found(first) && is_found(second))) continue;
         tell(0.83, "trying " + kind_of(first) + " with " + kind_of(second));
+        const Hypothesis& so_far = best ? *best : current_;
+        const Hypothesis quick =
+            search_->screened_pair(given_, finalists_[a].second, finalists_[b].second);
+        if (!(quick.train.objective < search_->sieved(so_far).train.objective)) continue;
         Hypothesis h = search_->with_pair(given_, finalists_[a].second, finalists_[b].second);
-        const Improvement improvement = compare(best ? *best : current_, h);
+        const Improvement improvement = compare(so_far, h);
         const double price = parameter_price * static_cast<double>(h.free.size() - current_.free.size());
         if (improvement.train - price < least_evidence || improvement.held < 0.0) continue;
         if (!is_plausible(h, first) || !is_plausible(h, second)) continue;
@@ -528,6 +557,7 @@ class Diagnostician {
       std::vector<std::size_t> all = found_;
       all.insert(all.end(), corrections.begin(), corrections.end());
       final_ = search_->only(all, *from, nullptr, true);
+      search_->judge(final_, final_.train.point.noise);
       from = &final_;
       tell(0.9, "fitting all runs");
       known_ = search_->on_all(final_);
@@ -560,7 +590,9 @@ class Diagnostician {
       std::vector<std::size_t> others = found_;
       for (const std::size_t other : corrections)
         if (other != effect) others.push_back(other);
-      opened.emplace_back(-gap_of(search_->only(others, final_, &noise)), effect);
+      Hypothesis h = search_->only(others, final_, &noise);
+      search_->judge(h, noise);
+      opened.emplace_back(-gap_of(h), effect);
     }
     std::sort(opened.begin(), opened.end());
     for (const auto& [gap, effect] : opened) corrections_.push_back(effect);
@@ -599,10 +631,10 @@ class Diagnostician {
     result_.model = final_model();
     for (auto& candidate : result_.candidates) {
       candidate.gap_after = result_.gap_before;
-      for (const auto& [effect, h] : finalists_) {
+      for (auto& [effect, h] : finalists_) {
         if (effect != candidate.effect) continue;
         candidate.evidence = compare(given_, h).train;
-        candidate.gap_after = gap_with({effect}, h, false);
+        candidate.gap_after = simulation_gap(h) / floor;
       }
     }
     std::stable_sort(result_.candidates.begin(), result_.candidates.end(),
@@ -623,7 +655,9 @@ class Diagnostician {
     if (held_.segments.empty()) return;
     const Noise noise = final_.train.point.noise;
     result_.residual_after = smooth_residuals(held_, final_.held.point);
-    result_.residual_before = smooth_residuals(held_, search_->only({}, final_, &noise).held.point);
+    Hypothesis as_given = search_->only({}, final_, &noise);
+    search_->judge(as_given, noise);
+    result_.residual_before = smooth_residuals(held_, as_given.held.point);
   }
 
   static Noise sensor_noise(const Hypothesis& h) {
@@ -654,7 +688,7 @@ class Diagnostician {
   /// than white noise makes them, and held-out ones by as much again.
   void compare_held_out(ResidualStructure& structure) {
     if (held_.segments.empty()) return;
-    const Hypothesis told = search_->told(final_);
+    Hypothesis told = search_->told(final_);
     const double excess = simulation_gap(told) / floor_of(told);
     if (!(excess > most_excess * std::max(1.0, structure.excess))) return;
     structure.structured = true;
@@ -781,7 +815,7 @@ class Diagnostician {
         Hypothesis rival = search_->screened(*without, other);
         if (!std::isfinite(rival.train.objective)) continue;
         rival.train.point.noise = current_.train.point.noise;
-        search_->refine(*without, rival);
+        search_->refit(*without, rival);
         const Improvement worse = compare(rival, current_);
         if (!is_plausible(rival, other)) continue;
         const bool same = worse.train < confusable_evidence ||

@@ -97,7 +97,8 @@ class Whitener {
       : noise_(noise),
         present_{has_channel(run, plant, 0), has_channel(run, plant, 1)},
         sensor_variance_{square(run.has_cart() ? run.cart_noise_m() : 1.0),
-                         square(run.has_theta() ? run.theta_noise_rad() : 1.0)} {}
+                         square(run.has_theta() ? run.theta_noise_rad() : 1.0)},
+        bristles_(plant.find(bristle_effect()) != nullptr) {}
 
   /// Carries the covariance to the next sample.
   void predict(const LinearStep& step) {
@@ -123,10 +124,7 @@ class Whitener {
     const double spread = c * c * p_[channel][channel];
     variance_ += spread;
     const double with_weight = sensor / step.weight[channel] + spread;
-    for (int i = 0; i < states; ++i) gain_[i] = c * p_[i][channel] / with_weight;
-    for (int i = 0; i < states; ++i)
-      for (int j = 0; j < states; ++j) updated_[i][j] = p_[i][j] - gain_[i] * c * p_[channel][j];
-    std::copy(&updated_[0][0], &updated_[0][0] + states * states, &p_[0][0]);
+    bristles_ ? correct<states>(c, channel, with_weight) : correct<states - 1>(c, channel, with_weight);
   }
 
   double variance() const { return variance_; }
@@ -135,25 +133,42 @@ class Whitener {
  private:
   static double square(double x) { return x * x; }
 
+  static std::size_t bristle_effect() {
+    static const std::size_t effect = effect_number("bristle_friction");
+    return effect;
+  }
+
+  /// `Moving` states, the last one only with bristles. Inner loops run along rows, which SIMD likes.
+  template <int Moving>
+  void correct(double c, int channel, double variance) {
+    double seen[Moving];
+    for (int j = 0; j < Moving; ++j) seen[j] = c * p_[channel][j];
+    for (int i = 0; i < Moving; ++i) gain_[i] = seen[i] / variance;
+    for (int i = 0; i < Moving; ++i)
+      for (int j = 0; j < Moving; ++j) p_[i][j] -= gain_[i] * seen[j];
+  }
+
+  void carry(const LinearStep& step) { bristles_ ? carry<states>(step) : carry<states - 1>(step); }
+
+  template <int Moving>
   void carry(const LinearStep& step) {
     const double f = square(noise_.force) * step.period_s, t = square(noise_.torque) * step.period_s;
     for (int i = 0; i < 2; ++i)
       for (int j = 0; j < 2; ++j)
         p_[2 + i][2 + j] +=
             f * step.by_force[i] * step.by_force[j] + t * step.by_torque[i] * step.by_torque[j];
-    StateMatrix half;
-    for (int i = 0; i < states; ++i)
-      for (int j = 0; j < states; ++j) {
-        double sum = 0.0;
-        for (int k = 0; k < states; ++k) sum += step.transition[i][k] * p_[k][j];
-        half[i][j] = sum;
-      }
-    for (int i = 0; i < states; ++i)
-      for (int j = 0; j <= i; ++j) {
-        double sum = 0.0;
-        for (int k = 0; k < states; ++k) sum += half[i][k] * step.transition[j][k];
-        p_[i][j] = p_[j][i] = sum;
-      }
+    // P goes to T P T', whose transpose it is too.
+    double half[Moving][Moving] = {}, turned[Moving][Moving], carried[Moving][Moving] = {};
+    for (int i = 0; i < Moving; ++i)
+      for (int k = 0; k < Moving; ++k)
+        for (int j = 0; j < Moving; ++j) half[i][j] += step.transition[i][k] * p_[k][j];
+    for (int i = 0; i < Moving; ++i)
+      for (int j = 0; j < Moving; ++j) turned[j][i] = half[i][j];
+    for (int i = 0; i < Moving; ++i)
+      for (int k = 0; k < Moving; ++k)
+        for (int j = 0; j < Moving; ++j) carried[i][j] += step.transition[i][k] * turned[k][j];
+    for (int i = 0; i < Moving; ++i)
+      for (int j = 0; j < Moving; ++j) p_[i][j] = 0.5 * (carried[i][j] + carried[j][i]);
   }
 
   /// Dry friction under white force: a contact that rests in the model creeps at random in truth.
@@ -207,8 +222,9 @@ class Whitener {
   Noise noise_;
   bool present_[2];
   double sensor_variance_[2];
+  bool bristles_;
   bool active_ = false;
-  StateMatrix p_{}, updated_{};
+  StateMatrix p_{};
   double gain_[states] = {}, variance_ = 1.0;
 };
 
@@ -506,7 +522,9 @@ class Fitter {
     }
     for (int round = 0; round < options_.noise_rounds && std::isfinite(objective); ++round) {
       const double before = objective;
-      estimate_noise({10.0, 2.0, 1.2, 1.04, 1.01});
+      // What was estimated before is near.
+      estimate_noise(round == 0 ? std::vector<double>{10.0, 2.0, 1.2, 1.04, 1.01}
+                                : std::vector<double>{1.2, 1.04, 1.01});
       objective = evaluate();
       descend(objective);
       constexpr double settled = 2.0;
@@ -551,7 +569,7 @@ class Fitter {
   /// Gauss-Newton with damping. A step counts only if the whole objective falls, weights and log variances
   /// included.
   void descend(double& objective) {
-    double damping = 1e-4;
+    double damping = least_damping;
     converged_ = false;
     for (int iteration = 0; iteration < options_.most_iterations && std::isfinite(objective); ++iteration) {
       const FitPoint former = point_;
@@ -568,7 +586,7 @@ class Fitter {
         if (next_objective < objective) break;
         point_ = former;
         normals_ = former_normals;
-        damping = std::max(damping, 1e-4) * 30.0;
+        damping = std::max(damping, least_damping) * 30.0;
       }
       if (!(next_objective < objective)) {
         steps_ = std::move(former_steps);
@@ -612,6 +630,8 @@ class Fitter {
     const Eigen::VectorXd off = off_belief();
     return off.dot(prior_information() * off);
   }
+
+  static constexpr double least_damping = 1e-4;  ///< of a first step
 
   struct Step {
     FitPoint point;
@@ -811,6 +831,7 @@ class Fitter {
     if (!std::isfinite(result.objective)) result.objective = infinity;
     result.information = h;
     if (np == 0) return;
+    if (std::isfinite(result.objective)) result.promised_fall = step(least_damping).promised_fall;
     const NormalMatrix inverse = inverse_of(without_held(h));
     const auto segments = static_cast<double>(normals_.size());
     const double small_sample = segments > np + 1.0 ? segments / (segments - 1.0) : 2.0;

@@ -19,6 +19,15 @@ FitPoint moved_to(FitPoint point, const Plant& plant) {
   return point;
 }
 
+/// A few steps with the noise as it is.
+FitOptions screening() {
+  FitOptions options;
+  options.noise_rounds = 0;
+  options.noise_last = true;
+  options.most_iterations = 4;
+  return options;
+}
+
 /// What a fit says of its parameters, as a belief. What it says nothing of is believed to be where it is.
 Belief belief_of(const Hypothesis& h) {
   const auto n = static_cast<Eigen::Index>(h.free.size());
@@ -137,10 +146,15 @@ void Search::weigh(Hypothesis& h) const {
   if (std::isfinite(h.train.objective)) h.surprise = surprise_of(h);
 }
 
+std::vector<PlantState<double>> Search::sieve_starts(const std::vector<PlantState<double>>& starts) const {
+  std::vector<PlantState<double>> some;
+  some.reserve(sieve_places_.size());
+  for (const std::size_t place : sieve_places_) some.push_back(starts[place]);
+  return some;
+}
+
 FitPoint Search::sieve_point(const Hypothesis& base) const {
-  FitPoint point{base.train.point.plant, {}, base.train.point.noise};
-  for (const std::size_t place : sieve_places_) point.starts.push_back(base.train.point.starts[place]);
-  return point;
+  return {base.train.point.plant, sieve_starts(base.train.point.starts), base.train.point.noise};
 }
 
 double Search::surprise_of(const Hypothesis& h) const {
@@ -165,6 +179,7 @@ Hypothesis Search::told(const Hypothesis& h) const {
   Hypothesis result = h;
   result.train.point.plant = held.point.plant;
   result.held = held;
+  result.simulation_gap.reset();
   return result;
 }
 
@@ -179,36 +194,70 @@ Hypothesis Search::baseline() {
   return h;
 }
 
-Hypothesis Search::screened(const Hypothesis& base, std::size_t effect) {
+std::vector<FitPoint> Search::points_with(const FitPoint& from, std::size_t effect,
+                                          const Hypothesis& base) const {
+  if (from.plant.find(effect) != nullptr) return {from};
+  std::vector<FitPoint> points;
+  for (const std::vector<double>& values : starts_of(effect, base)) {
+    Plant plant = from.plant;
+    plant.set(effect, values);
+    points.push_back(moved_to(from, plant));
+  }
+  return points;
+}
+
+std::vector<double> Search::promised_gains(const Hypothesis& base,
+                                           const std::vector<std::size_t>& effects) const {
+  FitOptions only_look;
+  only_look.most_iterations = 0;
+  only_look.noise_rounds = 0;
+  const auto promise = [&](const FitPoint& point, const std::vector<FreeParameter>& free) {
+    const FitResult seen = fit(sieve_, point, free, only_look);
+    return seen.objective - seen.promised_fall;
+  };
+  const FitPoint from = sieve_point(base);
+  const double without = promise(from, base.free);
+  std::vector<double> gains;
+  for (const std::size_t effect : effects) {
+    std::set<std::size_t> added = base.added;
+    added.insert(effect);
+    double least = infinity;
+    for (const FitPoint& point : points_with(from, effect, base))
+      least = std::min(least, promise(point, free_of(added)));
+    gains.push_back(without - least);
+  }
+  return gains;
+}
+
+Hypothesis Search::screened(const Hypothesis& base, std::size_t effect) const {
   std::set<std::size_t> added = base.added;
   added.insert(effect);
-  const std::vector<FreeParameter> free = free_of(added);
-  FitOptions options;
-  options.noise_rounds = 0;
-  options.noise_last = true;
-  options.most_iterations = 4;
-  const FitPoint from = sieve_point(base);
   Hypothesis best;
   best.train.objective = infinity;
-  const bool correction = from.plant.find(effect) != nullptr;
-  for (const std::vector<double>& values :
-       correction ? std::vector<std::vector<double>>{{}} : starts_of(effect, base)) {
-    Plant plant = from.plant;
-    if (!correction) plant.set(effect, values);
-    const FitPoint point = moved_to(from, plant);
+  for (const FitPoint& point : points_with(sieve_point(base), effect, base)) {
     Hypothesis h;
     h.added = added;
-    h.free = free;
-    h.train = fit(sieve_, point, free, options);
+    h.free = free_of(added);
+    h.train = fit(sieve_, point, h.free, screening());
     if (h.train.objective < best.train.objective) best = std::move(h);
   }
   return best;
 }
 
+Hypothesis Search::screened_pair(const Hypothesis& base, const Hypothesis& first,
+                                 const Hypothesis& second) const {
+  FitPoint point = pair_point(base, first, second);
+  point.starts = sieve_starts(point.starts);
+  Hypothesis h;
+  h.added = first.added;
+  h.added.insert(second.added.begin(), second.added.end());
+  h.free = free_of(h.added);
+  h.train = fit(sieve_, point, h.free, screening());
+  return h;
+}
+
 Hypothesis Search::sieved(const Hypothesis& base) const {
-  FitOptions options;
-  options.noise_rounds = 0;
-  options.noise_last = true;
+  FitOptions options = screening();
   options.most_iterations = 2;
   Hypothesis h;
   h.added = base.added;
@@ -217,13 +266,18 @@ Hypothesis Search::sieved(const Hypothesis& base) const {
   return h;
 }
 
-void Search::refine(const Hypothesis& base, Hypothesis& h) {
+void Search::refit(const Hypothesis& base, Hypothesis& h) {
   if (!std::isfinite(h.train.objective)) return;
   FitOptions options;
   options.or_noise = base.train.point.noise;
   FitPoint point = moved_to(base.train.point, h.train.point.plant);
   point.noise = h.train.point.noise;
   h = fitted(h.added, point, options, h.free);
+}
+
+void Search::refine(const Hypothesis& base, Hypothesis& h) {
+  if (!std::isfinite(h.train.objective)) return;
+  refit(base, h);
   calm(h, {});
   weigh(h);
 }
@@ -274,9 +328,7 @@ Hypothesis Search::only(const std::vector<std::size_t>& effects, const Hypothesi
   FitOptions options;
   if (fixed_noise != nullptr) options.noise_rounds = 0;
   if (fixed_noise != nullptr) point.noise = *fixed_noise;
-  Hypothesis h = fitted({effects.begin(), effects.end()}, point, options, free);
-  judge(h, h.train.point.noise);
-  return h;
+  return fitted({effects.begin(), effects.end()}, point, options, free);
 }
 
 Hypothesis Search::on_all(const Hypothesis& h) const {
@@ -285,6 +337,7 @@ Hypothesis Search::on_all(const Hypothesis& h) const {
   FitPoint point = h.train.point;
   point.starts.insert(point.starts.end(), h.held.point.starts.begin(), h.held.point.starts.end());
   Hypothesis result = h;
+  result.simulation_gap.reset();
   result.train = fit(all, point, h.free, FitOptions{});
   result.valid = std::isfinite(result.train.objective);
   return result.valid ? result : h;
@@ -326,9 +379,7 @@ Hypothesis Search::opened(const Hypothesis& h, std::size_t effect) const {
   return result;
 }
 
-Hypothesis Search::with_pair(const Hypothesis& base, const Hypothesis& first, const Hypothesis& second) {
-  std::set<std::size_t> added = first.added;
-  added.insert(second.added.begin(), second.added.end());
+FitPoint Search::pair_point(const Hypothesis& base, const Hypothesis& first, const Hypothesis& second) const {
   Plant plant = base.train.point.plant;
   Noise noise = base.train.point.noise;
   for (const Hypothesis* h : {&first, &second}) {
@@ -338,7 +389,13 @@ Hypothesis Search::with_pair(const Hypothesis& base, const Hypothesis& first, co
   }
   FitPoint point = moved_to(base.train.point, plant);
   point.noise = noise;
-  Hypothesis h = fitted(added, point, FitOptions{}, free_of(added));
+  return point;
+}
+
+Hypothesis Search::with_pair(const Hypothesis& base, const Hypothesis& first, const Hypothesis& second) {
+  std::set<std::size_t> added = first.added;
+  added.insert(second.added.begin(), second.added.end());
+  Hypothesis h = fitted(added, pair_point(base, first, second), FitOptions{}, free_of(added));
   weigh(h);
   return h;
 }

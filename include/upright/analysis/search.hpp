@@ -20,6 +20,7 @@ struct Hypothesis {
                           ///< not of what `only` and `on_all` made
   std::vector<FreeParameter> free;  ///< the parameters that moved, in the order of train.covariance
   bool valid = false;               ///< fitted, and no parameter at a bound that makes it another effect
+  std::optional<double> simulation_gap;  ///< of held-out data by a plain simulation, once measured
 };
 
 /// How much better one hypothesis is than another, robust to residuals that are not white: sums over blocks
@@ -43,17 +44,24 @@ class Search {
 
   /// Base corrections and the plant's own effects within what is believed of them.
   Hypothesis baseline();
+  /// How far the objective falls on a part of the training data when each of these is added, as its
+  /// derivatives promise it from the best of its starts: quick, and only a promise.
+  std::vector<double> promised_gains(const Hypothesis& base, const std::vector<std::size_t>& effects) const;
   /// Adds an effect to a hypothesis: a few steps from every start with the noise as it is, on a part of the
   /// training data.
-  Hypothesis screened(const Hypothesis& base, std::size_t effect);
+  Hypothesis screened(const Hypothesis& base, std::size_t effect) const;
+  /// The same with two effects at once, from where each alone was fitted.
+  Hypothesis screened_pair(const Hypothesis& base, const Hypothesis& first, const Hypothesis& second) const;
   /// A hypothesis on that part alone, with which to compare.
   Hypothesis sieved(const Hypothesis& base) const;
   /// Brings a screened hypothesis to convergence on the whole training data, noise included, and judges it.
   void refine(const Hypothesis& base, Hypothesis& hypothesis);
+  /// The same without judging it, from the noise that it has.
+  void refit(const Hypothesis& base, Hypothesis& hypothesis);
   /// The same hypothesis without one effect.
   Hypothesis without(const Hypothesis& base, std::size_t effect);
   /// These effects free with nothing believed of them beforehand. Everything else as in the plant file, or
-  /// `settled`: within what is believed of it.
+  /// `settled`: within what is believed of it. Not judged.
   Hypothesis only(const std::vector<std::size_t>& effects, const Hypothesis& from, const Noise* fixed_noise,
                   bool settled = false);
   /// The same point with one effect more left open, with nothing believed of it and where it does nothing:
@@ -77,6 +85,11 @@ class Search {
   FitPoint sieve_point(const Hypothesis& base) const;
   std::vector<FreeParameter> free_of(const std::set<std::size_t>& added) const;
   std::vector<std::vector<double>> starts_of(std::size_t effect, const Hypothesis& base) const;
+  /// A point with an effect added, at each of its starts; a correction that is there already starts where it is.
+  std::vector<FitPoint> points_with(const FitPoint& from, std::size_t effect, const Hypothesis& base) const;
+  /// Where a pair starts, on all of the training data.
+  FitPoint pair_point(const Hypothesis& base, const Hypothesis& first, const Hypothesis& second) const;
+  std::vector<PlantState<double>> sieve_starts(const std::vector<PlantState<double>>& starts) const;
   std::vector<std::pair<double, double>> force_residual(const Hypothesis& base) const;
   /// Fits once more from less noise, and keeps what is better: much noise and a poor fit hold each other up.
   void calm(Hypothesis& h, const FitOptions& options);
