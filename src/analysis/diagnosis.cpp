@@ -354,9 +354,10 @@ class Diagnostician {
       std::stable_sort(ranking.begin(), ranking.end(),
                        [&](std::size_t a, std::size_t b) { return screened[a].first > screened[b].first; });
       std::vector<Believed> believed;
+      constexpr double of_best = 0.05;  // what a whole fit does not make up for
       for (std::size_t place = 0; place < std::min(finalists, ranking.size()); ++place) {
         const std::size_t i = ranking[place];
-        if (screened[i].first < 0.4 * least_evidence) break;
+        if (screened[i].first < std::max(0.4 * least_evidence, of_best * screened[ranking[0]].first)) break;
         tell(0.17 + 0.2 * round + 0.08 * static_cast<double>(place) / finalists,
              "fitting " + kind_of(candidates[i]));
         Hypothesis h = screened[i].second;
@@ -450,8 +451,7 @@ class Diagnostician {
         if (found_.size() > 2 || (found_.size() == 2 && is_found(first) && is_found(second))) continue;
         tell(0.83, "trying " + kind_of(first) + " with " + kind_of(second));
         const Hypothesis& so_far = best ? *best : current_;
-        const Hypothesis quick =
-            search_->screened_pair(given_, finalists_[a].second, finalists_[b].second);
+        const Hypothesis quick = search_->screened_pair(given_, finalists_[a].second, finalists_[b].second);
         if (!(quick.train.objective < search_->sieved(so_far).train.objective)) continue;
         Hypothesis h = search_->with_pair(given_, finalists_[a].second, finalists_[b].second);
         const Improvement improvement = compare(so_far, h);

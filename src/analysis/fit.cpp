@@ -337,11 +337,12 @@ void linearise_segment(const Measurement& run, const Segment& segment, const Eng
   const double inertia = pendulum ? pendulum->inertia_about_pivot_kgm2() : 1.0;
   const bool bristles = dynamics.has_bristle_state();
 
-  using Column = Eigen::Matrix<double, states, Eigen::Dynamic, Eigen::RowMajor, states, N + states>;
-  Column sensitivity(states, columns), moved(states, columns);
-  sensitivity.setZero();
-  for (int i = 0; i < states; ++i) sensitivity(i, i) = 1.0;
-  Eigen::Matrix<double, 1, Eigen::Dynamic, Eigen::RowMajor, 1, N + states> row(columns);
+  // As in the dual numbers: initial state first, then parameters, then nothing.
+  using Row = Eigen::Matrix<double, N, 1>;
+  std::array<Row, states> sensitivity, moved;
+  for (int i = 0; i < states; ++i) sensitivity[static_cast<std::size_t>(i)] = Row::Unit(i);
+  Eigen::Matrix<double, N, N> information = Eigen::Matrix<double, N, N>::Zero();
+  Row score = Row::Zero();
   Whitener whitener(run, point.plant, point.noise);
   steps.resize(segment.last - segment.first + 1);
   if (with_normal) {
@@ -419,12 +420,11 @@ void linearise_segment(const Measurement& run, const Segment& segment, const Eng
     if (!first) {
       whitener.predict(step);
       if (with_normal) {
-        for (int i = 0; i < states; ++i) {
-          moved.row(i).setZero();
-          for (int j = 0; j < states; ++j)
-            if (step.transition[i][j] != 0.0) moved.row(i) += step.transition[i][j] * sensitivity.row(j);
-          for (int j = 0; j < parameters; ++j)
-            moved(i, states + j) += end[static_cast<std::size_t>(i)]->v[states + j];
+        for (std::size_t i = 0; i < states; ++i) {
+          moved[i] = end[i]->v;
+          moved[i].template head<states>().setZero();
+          for (std::size_t j = 0; j < states; ++j)
+            if (step.transition[i][j] != 0.0) moved[i] += step.transition[i][j] * sensitivity[j];
         }
         sensitivity = moved;
       }
@@ -441,13 +441,14 @@ void linearise_segment(const Measurement& run, const Segment& segment, const Eng
       count(normal.likelihood, e, whitener.variance(), step.weight[channel]);
       if (!std::isfinite(e)) return;
       const Jet& shown = channel == 0 ? sensed.cart_m : sensed.theta_rad;
-      row = step.gain[channel] * sensitivity.row(channel);
-      for (int j = 0; j < parameters; ++j) row[states + j] += shown.v[states + j];
+      Row row = shown.v;
+      row.template head<states>().setZero();
+      row += step.gain[channel] * sensitivity[static_cast<std::size_t>(channel)];
       const double weight = step.weight[channel] / whitener.variance();
-      normal.h.template selfadjointView<Eigen::Lower>().rankUpdate(row.transpose(), weight);
-      normal.g += row.transpose() * (weight * e);
-      for (int i = 0; i < states; ++i)
-        if (whitener.gain()[i] != 0.0) sensitivity.row(i) -= whitener.gain()[i] * row;
+      for (int j = 0; j < columns; ++j) information.col(j) += (weight * row[j]) * row;
+      score += (weight * e) * row;
+      for (std::size_t i = 0; i < states; ++i)
+        if (whitener.gain()[i] != 0.0) sensitivity[i] -= whitener.gain()[i] * row;
     }
     correct_state(simulator.engine(), update);
     if (!with_normal) continue;
@@ -458,7 +459,9 @@ void linearise_segment(const Measurement& run, const Segment& segment, const Eng
     normal.blocks.back() += normal.likelihood.objective() - counted;
     counted = normal.likelihood.objective();
   }
-  if (with_normal) normal.h.template triangularView<Eigen::StrictlyUpper>() = normal.h.transpose();
+  if (!with_normal) return;
+  normal.h = information.topLeftCorner(columns, columns);
+  normal.g = score.head(columns);
 }
 
 template <class Work>

@@ -133,6 +133,44 @@ TEST(EventEngine, DualNumbersAreRightAcrossEvents) {
   }
 }
 
+// The quick ones against the full ones, on the same motion, where a delay moves the ends of steps and a
+// contact sticks.
+TEST(EventEngine, QuickDerivativesAreNearlyRight) {
+  using Jet = ceres::Jet<double, 8>;
+  Plant plant = paper_plant();
+  plant.set("viscous_friction", {3.0});
+  plant.set("coulomb_friction", {0.43});
+  plant.set("stribeck_friction", {0.43, 0.105, 2.0});
+  plant.set("cogging_force", {0.2, 0.05, 0.3});
+  plant.set("input_delay", {0.0033});
+  const char* names[] = {"viscous_friction", "coulomb_friction", "stribeck_friction", "input_delay"};
+  PlantModel<Jet> model = make_model<Jet>(plant);
+  for (int i = 0; i < 4; ++i)
+    model.parameters[effect_parameter_offset(effect_number(names[i]))].v[4 + i] = 1.0;
+  const auto run = [&](bool quick) {
+    EngineOptions options;
+    options.max_step_s = 4e-3;
+    options.step_fraction = 0.5;
+    options.quick_derivatives = quick;
+    Simulator<Jet> simulator(model, options);
+    PlantState<Jet> start{Jet(0.0, 0), Jet(std::numbers::pi + 0.3, 1), Jet(0.4, 2), Jet(0.0, 3)};
+    simulator.start(start);
+    for (int k = 0; k < 1000; ++k) {
+      simulator.command(k * 2e-3, 2.0 * std::sin(k * 2e-3 * 4.0));
+      simulator.advance_to((k + 1) * 2e-3);
+    }
+    EXPECT_GE(simulator.engine().event_count(), 4u);
+    return simulator.engine().state();
+  };
+  const PlantState<Jet> full = run(false), quick = run(true);
+  for (Jet PlantState<Jet>::*of : {&PlantState<Jet>::cart_m, &PlantState<Jet>::theta_rad,
+                                   &PlantState<Jet>::cart_mps, &PlantState<Jet>::theta_radps}) {
+    EXPECT_NEAR((full.*of).a, (quick.*of).a, 1e-10);
+    const double largest = (full.*of).v.cwiseAbs().maxCoeff();
+    for (int i = 0; i < 8; ++i) EXPECT_NEAR((full.*of).v[i], (quick.*of).v[i], 1e-3 * largest) << i;
+  }
+}
+
 // A cart that the pendulum tears loose for less than a step and that friction stops again at once: neither
 // missed nor repeated without end.
 TEST(EventEngine, DualNumbersAreRightThroughStiffBristles) {

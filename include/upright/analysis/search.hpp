@@ -18,8 +18,8 @@ struct Hypothesis {
   double surprise = 0.0;  ///< of the held-out data: minus twice the log of their likelihood, with noise of
                           ///< their own, averaged over what the training data leave open of the parameters;
                           ///< not of what `only` and `on_all` made
-  std::vector<FreeParameter> free;  ///< the parameters that moved, in the order of train.covariance
-  bool valid = false;               ///< fitted, and no parameter at a bound that makes it another effect
+  std::vector<FreeParameter> free;       ///< the parameters that moved, in the order of train.covariance
+  bool valid = false;                    ///< fitted, and no parameter at a bound that makes it another effect
   std::optional<double> simulation_gap;  ///< of held-out data by a plain simulation, once measured
 };
 
@@ -85,7 +85,8 @@ class Search {
   FitPoint sieve_point(const Hypothesis& base) const;
   std::vector<FreeParameter> free_of(const std::set<std::size_t>& added) const;
   std::vector<std::vector<double>> starts_of(std::size_t effect, const Hypothesis& base) const;
-  /// A point with an effect added, at each of its starts; a correction that is there already starts where it is.
+  /// A point with an effect added, at each of its starts; a correction that is there already starts where it
+  /// is.
   std::vector<FitPoint> points_with(const FitPoint& from, std::size_t effect, const Hypothesis& base) const;
   /// Where a pair starts, on all of the training data.
   FitPoint pair_point(const Hypothesis& base, const Hypothesis& first, const Hypothesis& second) const;

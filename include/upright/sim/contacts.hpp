@@ -48,7 +48,7 @@ struct EngineOptions {
   std::optional<double> fall_angle_rad;  ///< the run halts where |theta| reaches it
   std::optional<double> track_limit_m;   ///< the run halts where |x| reaches it
   /// Derivatives of the Runge-Kutta engine on dual numbers, where a step has no event, no motor lag and no
-  /// bristles: of the step's motion linearised in its middle, at a third of the cost. They err by some 1e-5
+  /// bristles: of the step's motion linearised in its middle, at a third of the cost. They err by some 1e-4
   /// of their size then, of the order of the square of the step; the motion itself is the same.
   bool quick_derivatives = false;
 };

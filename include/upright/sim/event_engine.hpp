@@ -326,9 +326,10 @@ class EventEngine {
     return slopes;
   }
 
-  /// The step that leads to `end`, with derivatives: those of the motion that is linear in the middle,
-  /// x(h) = x + (h + h^2 A / 2 + h^3 A^2 / 6) (A x + b).
-  PlantState<S> linearised_step(const PlantState<double>& end, const S& h) const {
+  /// The step that leads to `end`, with derivatives (dual numbers only): those of the motion that is linear
+  /// in the middle, x(h) = x + (h + h^2 A / 2 + h^3 A^2 / 6) (A x + b).
+  PlantState<S> linearised_step(const PlantState<double>& end, const S& h) const
+      requires(!std::is_same_v<S, double>) {
     const PlantState<double> begin = plain_state(state_);
     PlantState<double> middle;
     const auto halfway = [&](double PlantState<double>::*of) { middle.*of = 0.5 * (begin.*of + end.*of); };
@@ -337,43 +338,47 @@ class EventEngine {
     halfway(&PlantState<double>::cart_mps);
     halfway(&PlantState<double>::theta_radps);
     PlantState<S> at = state_;
-    const auto put = [](S& number, double value) { number = number + S(value - value_of(number)); };
-    put(at.cart_m, middle.cart_m);
-    put(at.theta_rad, middle.theta_rad);
-    put(at.cart_mps, middle.cart_mps);
-    put(at.theta_radps, middle.theta_radps);
-    // Only derivatives count from here on; the values of these numbers say nothing.
-    const PlantState<S> first = dynamics_.derivative(at, drive_, contacts_);
-    const Slopes slopes = slopes_at(middle, plain_state(first));
-    const bool cart_moves = !dynamics_.cart_locked() && !cart_at_rest();
-    const bool pivot_moves = dynamics_.has_pendulum() && !pivot_at_rest();
-    const auto follow = [&](const PlantState<S>& rate) {
-      const auto row = [&](const std::array<double, 4>& slope) {
-        return rate.cart_m * slope[0] + rate.theta_rad * slope[1] + rate.cart_mps * slope[2] +
-               rate.theta_radps * slope[3];
-      };
-      PlantState<S> next{};
-      if (cart_moves) next.cart_m = rate.cart_mps;
-      if (pivot_moves) next.theta_rad = rate.theta_radps;
-      next.cart_mps = row(slopes.cart_mps2);
-      next.theta_radps = row(slopes.theta_radps2);
-      return next;
+    at.cart_m.a = middle.cart_m;
+    at.theta_rad.a = middle.theta_rad;
+    at.cart_mps.a = middle.cart_mps;
+    at.theta_radps.a = middle.theta_radps;
+    const PlantState<S> rate = dynamics_.derivative(at, drive_, contacts_);
+    const PlantState<double> plain_rate = plain_state(rate);
+    const Slopes slopes = slopes_at(middle, plain_rate);
+    const double cart_moves = dynamics_.cart_locked() || cart_at_rest() ? 0.0 : 1.0;
+    const double pivot_moves = !dynamics_.has_pendulum() || pivot_at_rest() ? 0.0 : 1.0;
+    // Derivatives of what follows: rate is A x + b, `second` A (A x + b), `third` A A (A x + b).
+    using Slope = decltype(S::v);
+    const auto bend = [](const std::array<double, 4>& slope, const Slope& x, const Slope& theta,
+                         const Slope& v, const Slope& omega) -> Slope {
+      return slope[0] * x + slope[1] * theta + slope[2] * v + slope[3] * omega;
     };
-    const PlantState<S> second = follow(first), third = follow(second);
-    const double length = value_of(h);
-    const S longer = h - S(length);  // the length of the step may move too
+    const Slope second_v =
+        bend(slopes.cart_mps2, rate.cart_m.v, rate.theta_rad.v, rate.cart_mps.v, rate.theta_radps.v);
+    const Slope second_omega =
+        bend(slopes.theta_radps2, rate.cart_m.v, rate.theta_rad.v, rate.cart_mps.v, rate.theta_radps.v);
+    const Slope second_x = cart_moves * rate.cart_mps.v, second_theta = pivot_moves * rate.theta_radps.v;
+    const Slope third_v = bend(slopes.cart_mps2, second_x, second_theta, second_v, second_omega);
+    const Slope third_omega = bend(slopes.theta_radps2, second_x, second_theta, second_v, second_omega);
+    const double length = h.a, half_square = 0.5 * length * length, cube = half_square * length / 3.0;
+    const auto bent = [&](const std::array<double, 4>& slope) {
+      return slope[0] * plain_rate.cart_m + slope[1] * plain_rate.theta_rad + slope[2] * plain_rate.cart_mps +
+             slope[3] * plain_rate.theta_radps;
+    };
+    // The length of the step may move too.
+    const double v_rate = plain_rate.cart_mps + 0.5 * length * bent(slopes.cart_mps2);
+    const double omega_rate = plain_rate.theta_radps + 0.5 * length * bent(slopes.theta_radps2);
     PlantState<S> result = state_;
-    const auto set = [&](S PlantState<S>::*of, double value) {
-      const double rate_at_end = value_of(first.*of) + 0.5 * length * value_of(second.*of);
-      S& number = result.*of;
-      number = number + length * (first.*of) + (0.5 * length * length) * (second.*of) +
-               (length * length * length / 6.0) * (third.*of) + rate_at_end * longer;
-      put(number, value);
+    const auto set = [&](S& number, double value, const Slope& first, const Slope& second, const Slope& third,
+                         double rate_at_end) {
+      number.a = value;
+      number.v += length * first + half_square * second + cube * third + rate_at_end * h.v;
     };
-    set(&PlantState<S>::cart_m, end.cart_m);
-    set(&PlantState<S>::theta_rad, end.theta_rad);
-    set(&PlantState<S>::cart_mps, end.cart_mps);
-    set(&PlantState<S>::theta_radps, end.theta_radps);
+    set(result.cart_m, end.cart_m, rate.cart_m.v, second_x, cart_moves * second_v, cart_moves * end.cart_mps);
+    set(result.theta_rad, end.theta_rad, rate.theta_rad.v, second_theta, pivot_moves * second_omega,
+        pivot_moves * end.theta_radps);
+    set(result.cart_mps, end.cart_mps, rate.cart_mps.v, second_v, third_v, v_rate);
+    set(result.theta_radps, end.theta_radps, rate.theta_radps.v, second_omega, third_omega, omega_rate);
     result.motor_v = drive_;
     return result;
   }
