@@ -124,16 +124,15 @@ bool check_all(const std::vector<std::string>& files, bool as_json) {
 
 }  // namespace
 
-void add_check(CLI::App& app, int& exit_code) {
-  CLI::App* command = app.add_subcommand("check", "Validate files without hardware");
-  command->footer("Example:  upright check config/plants/*.yaml config/gains/*.yaml config/rigs/*.yaml");
+void add_check(CommandLine& line) {
+  const Command command =
+      line.command("check", "Validate files without hardware",
+                   "Example:  upright check config/plants/*.yaml config/gains/*.yaml config/rigs/*.yaml");
   const auto files = std::make_shared<std::vector<std::string>>();
   const auto as_json = std::make_shared<bool>(false);
-  command->add_option("files", *files, "The files to read")->required();
-  command->add_flag("--json", *as_json, "One JSON document");
-  command->callback([files, as_json, &exit_code] {
-    exit_code = static_cast<int>(check_all(*files, *as_json) ? ExitCode::done : ExitCode::usage);
-  });
+  command.option("files", *files, "The files to read").required();
+  command.flag("--json", *as_json, "One JSON document");
+  command.does([files, as_json] { return check_all(*files, *as_json) ? ExitCode::done : ExitCode::usage; });
 }
 
 }  // namespace upright::cli

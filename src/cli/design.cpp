@@ -9,7 +9,6 @@
 #include <string>
 
 #include "commands.hpp"
-#include "options.hpp"
 #include "upright/analysis/gain_design.hpp"
 #include "upright/control/gain_file.hpp"
 #include "upright/model/error.hpp"
@@ -125,37 +124,38 @@ void design(const DesignOptions& options) {
 
 }  // namespace
 
-void add_design(CLI::App& app, int&) {
-  CLI::App* command = app.add_subcommand("design", "Design gains for a plant (linear-quadratic)");
-  command->footer(
+void add_design(CommandLine& line) {
+  const Command command = line.command(
+      "design", "Design gains for a plant (linear-quadratic)",
       "Examples:\n"
       "  upright design config/plants/exponential.yaml --q 5000,3000,20,20 --r 1 --out gains.yaml\n"
       "  upright design config/plants/viscous.yaml --delay 0.1 --rate 1000 --out compensated.yaml\n"
       "With --delay the gains feed back the state predicted to when the voltage acts (delay_compensation: "
       "predictor).");
   const auto options = std::make_shared<DesignOptions>();
-  command->add_option("plant", options->plant, "Plant file")->required();
-  command->add_option("--q", options->q, "Weights on x, theta, x_dot, theta_dot")
-      ->delimiter(',')
-      ->expected(4)
-      ->check(number_in(Range::not_negative()));
-  command->add_option("--r", options->r, "Weight on the voltage")->check(number_in(Range::positive()));
-  command->add_option("--smoothing", options->smoothing, "sgn(v) is taken as tanh(smoothing v)")
-      ->check(number_in(Range::positive()));
+  command.option("plant", options->plant, "Plant file").required();
+  command.option("--q", options->q, "Weights on x, theta, x_dot, theta_dot")
+      .list_of(4)
+      .in(Range::not_negative());
+  command.option("--r", options->r, "Weight on the voltage").in(Range::positive());
+  command.option("--smoothing", options->smoothing, "sgn(v) is taken as tanh(smoothing v)")
+      .in(Range::positive());
   command
-      ->add_option("--delay", options->delay_s,
-                   "Loop delay to design for [s]: sampled design, for the predictor")
-      ->check(number_in(Range::within(0.0, 10.0)));
-  command->add_option("--rate", options->rate_hz, "Sample rate [Hz]; with --delay, and for the gain file")
-      ->check(number_in(Range::within(lowest_sample_rate_hz, highest_sample_rate_hz)));
-  command->add_option("--cutoff", options->cutoff_hz, "Velocity filter in the gain file: cutoff [Hz]")
-      ->check(number_in(Range::positive()));
-  command->add_option("--damping", options->damping, "Velocity filter in the gain file: damping")
-      ->check(number_in(Range::positive()));
-  command->add_option("--out", options->out, "Write a gain file");
-  command->add_flag("--force", options->force, "Replace the gain file if it exists");
-  command->add_flag("--json", options->as_json, "One JSON document");
-  command->callback([options] { design(*options); });
+      .option("--delay", options->delay_s, "Loop delay to design for [s]: sampled design, for the predictor")
+      .in(Range::within(0.0, 10.0));
+  command.option("--rate", options->rate_hz, "Sample rate [Hz]; with --delay, and for the gain file")
+      .in(Range::within(lowest_sample_rate_hz, highest_sample_rate_hz));
+  command.option("--cutoff", options->cutoff_hz, "Velocity filter in the gain file: cutoff [Hz]")
+      .in(Range::positive());
+  command.option("--damping", options->damping, "Velocity filter in the gain file: damping")
+      .in(Range::positive());
+  command.option("--out", options->out, "Write a gain file");
+  command.flag("--force", options->force, "Replace the gain file if it exists");
+  command.flag("--json", options->as_json, "One JSON document");
+  command.does([options] {
+    design(*options);
+    return ExitCode::done;
+  });
 }
 
 }  // namespace upright::cli

@@ -243,18 +243,20 @@ void run_diagnose(const DiagnoseFlags& flags) {
 
 }  // namespace
 
-void add_diagnose(CLI::App& app, int&) {
-  CLI::App* command =
-      app.add_subcommand("diagnose", "Find the effect that a model lacks, from measured runs");
-  command->footer(
+void add_diagnose(CommandLine& line) {
+  const Command command = line.command(
+      "diagnose", "Find the effect that a model lacks, from measured runs",
       "Example:  upright diagnose --model config/plants/viscous.yaml --data runs/a runs/b --out diagnosis");
   const auto flags = std::make_shared<DiagnoseFlags>();
-  command->add_option("--model", flags->model, "Plant file: what is believed of the rig")->required();
-  command->add_option("--data", flags->data, "Runs: run directories, CSV or dataset files")->required();
-  command->add_option("--out", flags->out, "Folder for diagnosis.json and model.yaml");
-  command->add_flag("--trials", flags->trials, "Show every fit of the search, and which were taken");
-  command->add_flag("--json", flags->as_json, "One JSON document on stdout");
-  command->callback([flags] { run_diagnose(*flags); });
+  command.option("--model", flags->model, "Plant file: what is believed of the rig").required();
+  command.option("--data", flags->data, "Runs: run directories, CSV or dataset files").required();
+  command.option("--out", flags->out, "Folder for diagnosis.json and model.yaml");
+  command.flag("--trials", flags->trials, "Show every fit of the search, and which were taken");
+  command.flag("--json", flags->as_json, "One JSON document on stdout");
+  command.does([flags] {
+    run_diagnose(*flags);
+    return ExitCode::done;
+  });
 }
 
 }  // namespace upright::cli

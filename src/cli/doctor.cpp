@@ -11,7 +11,6 @@
 
 #include "commands.hpp"
 #include "histogram_json.hpp"
-#include "options.hpp"
 #include "signals.hpp"
 #include "upright/control/gain_file.hpp"
 #include "upright/hal/gpio_rig.hpp"
@@ -203,28 +202,25 @@ ExitCode run(const Arguments& arguments) {
 
 }  // namespace
 
-void add_doctor(CLI::App& app, int& exit_code) {
-  CLI::App* command = app.add_subcommand("doctor", "What this machine and a rig's link are good for");
-  command->footer(
-      "Example:  upright doctor --rig config/rigs/modbus-tcp.yaml --rate 500\n"
-      "Writes no voltage. Each line has its remedy; exit code 4 when the verdict is bad.");
+void add_doctor(CommandLine& line) {
+  const Command command =
+      line.command("doctor", "What this machine and a rig's link are good for",
+                   "Example:  upright doctor --rig config/rigs/modbus-tcp.yaml --rate 500\n"
+                   "Writes no voltage. Each line has its remedy; exit code 4 when the verdict is bad.");
   const auto a = std::make_shared<Arguments>();
-  command->add_option("--rig", a->rig, "Rig file, to examine its link too");
-  command->add_option("--gains", a->gains, "Gain file, for its sample rate");
+  command.option("--rig", a->rig, "Rig file, to examine its link too");
+  command.option("--gains", a->gains, "Gain file, for its sample rate");
   command
-      ->add_option("--rate", a->rate_hz,
-                   "Sample rate to examine [Hz] (the gain file's, or what suits the link)")
-      ->check(number_in(Range::within(lowest_sample_rate_hz, highest_sample_rate_hz)));
+      .option("--rate", a->rate_hz, "Sample rate to examine [Hz] (the gain file's, or what suits the link)")
+      .in(Range::within(lowest_sample_rate_hz, highest_sample_rate_hz));
   constexpr double longest_s = 3600.0;
-  command->add_option("--seconds", a->seconds, "How long to measure each [s] (10)")
-      ->check(number_in({0.0, longest_s, true}));
-  command->add_flag(
-      "--by-hand", a->by_hand,
-      "Check encoders' signs, emergency stop and limit switches: asks you to move and press them");
-  command->add_option("--hand-wait", a->hand_s, "How long to wait for each move [s] (30)")
-      ->check(number_in({0.0, longest_s, true}));
-  command->add_flag("--json", a->as_json, "One JSON document");
-  command->callback([a, &exit_code] { exit_code = static_cast<int>(run(*a)); });
+  command.option("--seconds", a->seconds, "How long to measure each [s] (10)").in({0.0, longest_s, true});
+  command.flag("--by-hand", a->by_hand,
+               "Check encoders' signs, emergency stop and limit switches: asks you to move and press them");
+  command.option("--hand-wait", a->hand_s, "How long to wait for each move [s] (30)")
+      .in({0.0, longest_s, true});
+  command.flag("--json", a->as_json, "One JSON document");
+  command.does([a] { return run(*a); });
 }
 
 }  // namespace upright::cli

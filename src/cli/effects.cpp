@@ -60,12 +60,15 @@ void print_all(bool as_json) {
 
 }  // namespace
 
-void add_effects(CLI::App& app, int&) {
-  CLI::App* command = app.add_subcommand("effects", "List every effect a plant can have");
-  command->footer("Example:  upright effects --json");
+void add_effects(CommandLine& line) {
+  const Command command =
+      line.command("effects", "List every effect a plant can have", "Example:  upright effects --json");
   const auto as_json = std::make_shared<bool>(false);
-  command->add_flag("--json", *as_json, "One JSON document");
-  command->callback([as_json] { print_all(*as_json); });
+  command.flag("--json", *as_json, "One JSON document");
+  command.does([as_json] {
+    print_all(*as_json);
+    return ExitCode::done;
+  });
 }
 
 }  // namespace upright::cli

@@ -316,28 +316,28 @@ ExitCode run(const Arguments& arguments) {
 
 }  // namespace
 
-void add_experiment(CLI::App& app, int& exit_code) {
-  CLI::App* command = app.add_subcommand("experiment", "Run a list of measurements on a rig, unattended");
-  command->footer(
+void add_experiment(CommandLine& line) {
+  const Command command = line.command(
+      "experiment", "Run a list of measurements on a rig, unattended",
       "Example:  upright experiment config/experiments/friction.yaml --rig config/rigs/simulated.yaml "
       "--fast\n"
       "Every piece is planned and rehearsed on a simulated rig before anything moves; --dry-run ends there.\n"
       "The same command goes on where an interrupted one stopped.");
   const auto a = std::make_shared<Arguments>();
-  command->add_option("file", a->file, "Experiment file")->required();
-  command->add_option("--rig", a->rig, "Rig file")->required();
-  command->add_option("--plant", a->plant, "Plant file to plan with (the experiment's, the simulated rig's)");
-  command->add_option("--rate", a->rate_hz, "Sample rate [Hz] (the experiment's, the gain file's, 1000)")
-      ->check(number_in(Range::within(lowest_sample_rate_hz, highest_sample_rate_hz)));
-  command->add_option("--seed", a->seed, "Of noise and jitter, simulated rigs only (1)");
-  command->add_flag("--fast", a->fast, "Virtual time: as fast as it goes, simulated rigs only");
-  command->add_flag("--dry-run", a->dry_run, "Plan and rehearse, then stop: nothing moves");
-  command->add_flag("--ready", a->ready, "What pieces ask of an operator is done: do not wait for Enter");
-  command->add_option("--out", a->out, "Folder of this experiment (runs/<UTC start>-<name>)");
-  add_realtime(*command, a->realtime);
-  add_live(*command, a->live_port);
-  command->add_flag("--json", a->as_json, "One JSON document");
-  command->callback([a, &exit_code] { exit_code = static_cast<int>(run(*a)); });
+  command.option("file", a->file, "Experiment file").required();
+  command.option("--rig", a->rig, "Rig file").required();
+  command.option("--plant", a->plant, "Plant file to plan with (the experiment's, the simulated rig's)");
+  command.option("--rate", a->rate_hz, "Sample rate [Hz] (the experiment's, the gain file's, 1000)")
+      .in(Range::within(lowest_sample_rate_hz, highest_sample_rate_hz));
+  command.option("--seed", a->seed, "Of noise and jitter, simulated rigs only (1)");
+  command.flag("--fast", a->fast, "Virtual time: as fast as it goes, simulated rigs only");
+  command.flag("--dry-run", a->dry_run, "Plan and rehearse, then stop: nothing moves");
+  command.flag("--ready", a->ready, "What pieces ask of an operator is done: do not wait for Enter");
+  command.option("--out", a->out, "Folder of this experiment (runs/<UTC start>-<name>)");
+  add_realtime(command, a->realtime);
+  add_live(command, a->live_port);
+  command.flag("--json", a->as_json, "One JSON document");
+  command.does([a] { return run(*a); });
 }
 
 }  // namespace upright::cli

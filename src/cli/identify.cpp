@@ -153,19 +153,22 @@ void run_identify(const IdentifyFlags& flags) {
 
 }  // namespace
 
-void add_identify(CLI::App& app, int&) {
-  CLI::App* command = app.add_subcommand("identify", "Friction and motor constants from measured runs");
-  command->footer(
+void add_identify(CommandLine& line) {
+  const Command command = line.command(
+      "identify", "Friction and motor constants from measured runs",
       "Example:  upright identify --data runs/20260101T120000Z-friction --plant config/plants/viscous.yaml "
       "--out identified\n"
       "Of the plant file the masses, the length and the motor are used; its friction is found anew.");
   const auto flags = std::make_shared<IdentifyFlags>();
-  command->add_option("--data", flags->data, "Experiment folders, run directories, CSV or dataset files")
-      ->required();
-  command->add_option("--plant", flags->plant, "Plant file with masses and motor (a simulated run's own)");
-  command->add_option("--out", flags->out, "Folder for identification.json, plant.yaml and report.html");
-  command->add_flag("--json", flags->as_json, "One JSON document on stdout");
-  command->callback([flags] { run_identify(*flags); });
+  command.option("--data", flags->data, "Experiment folders, run directories, CSV or dataset files")
+      .required();
+  command.option("--plant", flags->plant, "Plant file with masses and motor (a simulated run's own)");
+  command.option("--out", flags->out, "Folder for identification.json, plant.yaml and report.html");
+  command.flag("--json", flags->as_json, "One JSON document on stdout");
+  command.does([flags] {
+    run_identify(*flags);
+    return ExitCode::done;
+  });
 }
 
 }  // namespace upright::cli

@@ -30,11 +30,11 @@ double pendulum_length_m(const Plant* plant) {
 
 }  // namespace
 
-void add_live(CLI::App& command, std::string& port) {
-  command.add_flag(std::string("--live{") + usual_port + "}", port,
-                   std::string("Serve a page that shows the run and can stop it, on this machine only "
-                               "(--live=PORT; 0: any free port; ") +
-                       usual_port + ")");
+void add_live(const Command& command, std::string& port) {
+  command.flag_or_text("--live", usual_port, port,
+                       std::string("Serve a page that shows the run and can stop it, on this machine only "
+                                   "(--live=PORT; 0: any free port; ") +
+                           usual_port + ")");
 }
 
 std::unique_ptr<LiveView> open_live(const std::string& port, const LiveSubject& subject, std::FILE* out) {

@@ -1,12 +1,12 @@
 // What commands with --live share: the flag, and the page of a run.
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <cstdio>
 #include <exception>
 #include <memory>
 #include <string>
 
+#include "command_line.hpp"
 #include "upright/hal/rig_file.hpp"
 #include "upright/live/live_view.hpp"
 #include "upright/model/plant.hpp"
@@ -15,7 +15,7 @@
 namespace upright::cli {
 
 /// Adds --live[=PORT]; `port` stays empty where it is not given.
-void add_live(CLI::App& command, std::string& port);
+void add_live(const Command& command, std::string& port);
 
 /// What the page of a command shows.
 struct LiveSubject {

@@ -7,7 +7,6 @@
 #include <string>
 
 #include "commands.hpp"
-#include "options.hpp"
 #include "upright/analysis/delay_margin.hpp"
 #include "upright/model/linear_plant.hpp"
 #include "upright/model/plant_file.hpp"
@@ -112,16 +111,20 @@ void margin(const MarginOptions& options) {
 
 }  // namespace
 
-void add_margin(CLI::App& app, int&) {
-  CLI::App* command = app.add_subcommand("margin", "How much delay a plant with its gains bears");
-  command->footer("Example:  upright margin config/plants/exponential.yaml config/gains/exponential.yaml");
+void add_margin(CommandLine& line) {
+  const Command command =
+      line.command("margin", "How much delay a plant with its gains bears",
+                   "Example:  upright margin config/plants/exponential.yaml config/gains/exponential.yaml");
   const auto options = std::make_shared<MarginOptions>();
-  command->add_option("plant", options->plant, "Plant file")->required();
-  command->add_option("gains", options->gains, "Gain file")->required();
-  command->add_option("--smoothing", options->smoothing, "sgn(v) is taken as tanh(smoothing v)")
-      ->check(number_in(Range::positive()));
-  command->add_flag("--json", options->as_json, "One JSON document");
-  command->callback([options] { margin(*options); });
+  command.option("plant", options->plant, "Plant file").required();
+  command.option("gains", options->gains, "Gain file").required();
+  command.option("--smoothing", options->smoothing, "sgn(v) is taken as tanh(smoothing v)")
+      .in(Range::positive());
+  command.flag("--json", options->as_json, "One JSON document");
+  command.does([options] {
+    margin(*options);
+    return ExitCode::done;
+  });
 }
 
 }  // namespace upright::cli

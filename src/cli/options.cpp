@@ -1,31 +1,13 @@
 #include "options.hpp"
 
 #include <cerrno>
-#include <charconv>
-#include <cmath>
 #include <iostream>
-#include <string>
-
-#include "upright/model/error.hpp"
 
 namespace upright::cli {
 
-CLI::Validator number_in(const Range& range) {
-  const auto check = [range](std::string& text) {
-    double value = 0.0;
-    const char* end = text.data() + text.size();
-    const auto result = std::from_chars(text.data(), end, value);
-    const bool good = result.ec == std::errc{} && result.ptr == end && std::isfinite(value);
-    return good && range.contains(value) ? std::string() : "give it a number " + range.text();
-  };
-  return CLI::Validator(check, "");
-}
-
-void add_realtime(CLI::App& command, RealtimeRequest& realtime) {
-  command.add_option("--priority", realtime.priority, "Real-time priority to ask for (80)")
-      ->check(CLI::Range(1, 99));
-  command.add_option("--cpu", realtime.cpu, "Processor to stay on (the last one)")
-      ->check(CLI::Range(0, 1023));
+void add_realtime(const Command& command, RealtimeRequest& realtime) {
+  command.option("--priority", realtime.priority, "Real-time priority to ask for (80)").from_to(1, 99);
+  command.option("--cpu", realtime.cpu, "Processor to stay on (the last one)").from_to(0, 1023);
 }
 
 void finish_output() {

@@ -10,19 +10,20 @@
 
 namespace upright::cli {
 
-void add_paper(CLI::App& app, int&) {
-  CLI::App* command = app.add_subcommand("paper", "Recompute the paper's figures and tables");
-  command->footer("Example:  upright paper --out docs   (scripts/reproduce-paper.sh does this)");
+void add_paper(CommandLine& line) {
+  const Command command =
+      line.command("paper", "Recompute the paper's figures and tables",
+                   "Example:  upright paper --out docs   (scripts/reproduce-paper.sh does this)");
   const auto options = std::make_shared<PaperOptions>();
   const auto out = std::make_shared<std::string>("runs/paper");
   const auto config = std::make_shared<std::string>("config");
   const auto overwrite = std::make_shared<bool>(false);
-  command->add_option("--out", *out, "Folder for paper.md and its plots; runs/paper when not given");
-  command->add_option("--config", *config, "The folder with gains, plants and rigs");
-  command->add_option("--threads", options->threads, "Threads; one per processor when not given")
-      ->check(CLI::Range(1u, 1024u));
-  command->add_flag("--overwrite", *overwrite, "Replace the document that is in the folder");
-  command->callback([=] {
+  command.option("--out", *out, "Folder for paper.md and its plots; runs/paper when not given");
+  command.option("--config", *config, "The folder with gains, plants and rigs");
+  command.option("--threads", options->threads, "Threads; one per processor when not given")
+      .from_to(1u, 1024u);
+  command.flag("--overwrite", *overwrite, "Replace the document that is in the folder");
+  command.does([=] {
     const std::filesystem::path file = std::filesystem::path(*out) / "paper.md";
     if (std::filesystem::exists(file) && !*overwrite)
       throw ConfigError("give another --out, or --overwrite to replace it: " + file.string() + " exists");
@@ -31,6 +32,7 @@ void add_paper(CLI::App& app, int&) {
     write_paper(*out, *options);
     std::printf("%s\n", file.c_str());
     std::fflush(stdout);
+    return ExitCode::done;
   });
 }
 

@@ -65,18 +65,16 @@ ExitCode replay_run(const std::string& directory, bool as_json) {
 
 }  // namespace
 
-void add_replay(CLI::App& app, int& exit_code) {
-  CLI::App* command = app.add_subcommand(
-      "replay", "Feed a run's counts through its controller: the voltages must come out bit for bit");
-  command->footer(
+void add_replay(CommandLine& line) {
+  const Command command = line.command(
+      "replay", "Feed a run's counts through its controller: the voltages must come out bit for bit",
       "Example:  upright replay runs/20260101T120000Z-run\n"
       "Exit code 3 when a voltage differs.");
   const auto directory = std::make_shared<std::string>();
   const auto as_json = std::make_shared<bool>(false);
-  command->add_option("run", *directory, "The run directory")->required();
-  command->add_flag("--json", *as_json, "One JSON document");
-  command->callback(
-      [directory, as_json, &exit_code] { exit_code = static_cast<int>(replay_run(*directory, *as_json)); });
+  command.option("run", *directory, "The run directory").required();
+  command.flag("--json", *as_json, "One JSON document");
+  command.does([directory, as_json] { return replay_run(*directory, *as_json); });
 }
 
 }  // namespace upright::cli

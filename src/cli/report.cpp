@@ -31,13 +31,16 @@ std::filesystem::path write_report(const std::filesystem::path& path) {
 
 }  // namespace
 
-void add_report(CLI::App& app, int&) {
-  CLI::App* command =
-      app.add_subcommand("report", "One self-contained HTML file for a run, a sweep or a diagnosis");
-  command->footer("Example:  upright report runs/20260101T120000Z-run\nPrints the path of the report.");
+void add_report(CommandLine& line) {
+  const Command command =
+      line.command("report", "One self-contained HTML file for a run, a sweep or a diagnosis",
+                   "Example:  upright report runs/20260101T120000Z-run\nPrints the path of the report.");
   const auto path = std::make_shared<std::string>();
-  command->add_option("path", *path, "A run directory, or the folder of a sweep or a diagnosis")->required();
-  command->callback([path] { std::cout << write_report(*path).string() << "\n"; });
+  command.option("path", *path, "A run directory, or the folder of a sweep or a diagnosis").required();
+  command.does([path] {
+    std::cout << write_report(*path).string() << "\n";
+    return ExitCode::done;
+  });
 }
 
 }  // namespace upright::cli

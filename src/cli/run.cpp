@@ -337,36 +337,35 @@ ExitCode run(const Arguments& arguments) {
 
 }  // namespace
 
-void add_run(CLI::App& app, int& exit_code) {
-  CLI::App* command = app.add_subcommand("run", "Close the loop on a rig and log it");
-  command->footer(
+void add_run(CommandLine& line) {
+  const Command command = line.command(
+      "run", "Close the loop on a rig and log it",
       "Example:  upright run --rig config/rigs/simulated.yaml --gains config/gains/exponential.yaml "
       "--duration 60 --theta0-deg 3 --fast\n"
       "The last line of the output is the run directory.");
   const auto a = std::make_shared<Arguments>();
-  command->add_option("--rig", a->rig, "Rig file")->required();
-  command->add_option("--gains", a->gains, "Gain file")->required();
-  command->add_option("--plant", a->plant,
-                      "Model of the rig, whose delay margin limits overruns (a simulated rig's own)");
-  command->add_option("--delay", a->delay_s, "Delay of the feedback [s], in place of the gain file's")
-      ->check(number_in(Range::within(0.0, DelayLine::longest_delay_s)));
+  command.option("--rig", a->rig, "Rig file").required();
+  command.option("--gains", a->gains, "Gain file").required();
+  command.option("--plant", a->plant,
+                 "Model of the rig, whose delay margin limits overruns (a simulated rig's own)");
+  command.option("--delay", a->delay_s, "Delay of the feedback [s], in place of the gain file's")
+      .in(Range::within(0.0, DelayLine::longest_delay_s));
   constexpr double longest_run_s = 1e6;
-  command->add_option("--duration", a->duration_s, "How long to run [s] (10)")
-      ->check(number_in({0.0, longest_run_s, true}));
+  command.option("--duration", a->duration_s, "How long to run [s] (10)").in({0.0, longest_run_s, true});
   command
-      ->add_option("--wait", a->wait_s,
-                   "How long to wait at zero volts for the pendulum to be lifted upright [s], real rigs (30)")
-      ->check(number_in(Range::within(0.0, 86400.0)));
-  command->add_option("--theta0-deg", a->theta0_deg, "Initial angle [degree], simulated rigs only")
-      ->check(number_in(Range::within(-180.0, 180.0)));
-  command->add_option("--seed", a->seed, "Of noise and jitter, simulated rigs only (1)");
-  command->add_flag("--fast", a->fast, "Virtual time: as fast as it goes, simulated rigs only");
-  command->add_option("--out", a->out, "The folder that the run directory is made in (runs)");
-  command->add_option("--label", a->label, "End of the run directory's name (run)");
-  add_realtime(*command, a->realtime);
-  add_live(*command, a->live_port);
-  command->add_flag("--json", a->as_json, "One JSON document");
-  command->callback([a, &exit_code] { exit_code = static_cast<int>(run(*a)); });
+      .option("--wait", a->wait_s,
+              "How long to wait at zero volts for the pendulum to be lifted upright [s], real rigs (30)")
+      .in(Range::within(0.0, 86400.0));
+  command.option("--theta0-deg", a->theta0_deg, "Initial angle [degree], simulated rigs only")
+      .in(Range::within(-180.0, 180.0));
+  command.option("--seed", a->seed, "Of noise and jitter, simulated rigs only (1)");
+  command.flag("--fast", a->fast, "Virtual time: as fast as it goes, simulated rigs only");
+  command.option("--out", a->out, "The folder that the run directory is made in (runs)");
+  command.option("--label", a->label, "End of the run directory's name (run)");
+  add_realtime(command, a->realtime);
+  add_live(command, a->live_port);
+  command.flag("--json", a->as_json, "One JSON document");
+  command.does([a] { return run(*a); });
 }
 
 }  // namespace upright::cli

@@ -138,7 +138,7 @@ void print(const SweepResult& result, const std::string& folder) {
   std::fflush(stdout);
 }
 
-int run_here(const SweepArguments& arguments, const SweepRanks& ranks) {
+ExitCode run_here(const SweepArguments& arguments, const SweepRanks& ranks) {
   const SweepConfig config = read_sweep_file(arguments.file);
   const std::string folder = !arguments.out.empty()
                                  ? arguments.out
@@ -160,45 +160,45 @@ int run_here(const SweepArguments& arguments, const SweepRanks& ranks) {
     std::cout << json_of(config, result, folder).dump(2) << "\n";
   else if (!result.interrupted)
     print(result, folder);
-  if (!result.interrupted) return static_cast<int>(ExitCode::done);
+  if (!result.interrupted) return ExitCode::done;
   throw Error(ExitCode::stopped,
               "give the same command again, it goes on from there: the sweep was stopped after " +
                   std::to_string(result.runs_made) + " runs, kept in " + folder);
 }
 
 /// On the ranks other than the first: it is the first that speaks, of errors too.
-int run_elsewhere(const SweepArguments& arguments, const SweepRanks& ranks) {
+ExitCode run_elsewhere(const SweepArguments& arguments, const SweepRanks& ranks) {
   const StopOnSignal until_the_first_lets_go;
   try {
     ranks.serve(read_sweep_file(arguments.file), arguments.threads);
   } catch (const Error& error) {
-    return static_cast<int>(error.code());
+    return error.code();
   }
-  return static_cast<int>(ExitCode::done);
+  return ExitCode::done;
 }
 
-int run(const SweepArguments& arguments) {
+ExitCode run(const SweepArguments& arguments) {
   const SweepRanks ranks;
   return ranks.first() ? run_here(arguments, ranks) : run_elsewhere(arguments, ranks);
 }
 
 }  // namespace
 
-void add_sweep(CLI::App& app, int& exit_code) {
-  CLI::App* command = app.add_subcommand("sweep", "Outcomes over starting angle and delay");
-  command->footer(
+void add_sweep(CommandLine& line) {
+  const Command command = line.command(
+      "sweep", "Outcomes over starting angle and delay",
       "Example:  upright sweep config/sweeps/exponential.yaml --out runs/map && upright report runs/map\n"
       "Stopped with Ctrl-C it keeps what is done; the same command goes on from there.");
   const auto arguments = std::make_shared<SweepArguments>();
-  command->add_option("sweep", arguments->file, "Sweep file")->required();
-  command->add_option("--out", arguments->out, "Folder for the results; runs/sweep-NAME when not given");
-  command->add_option("--threads", arguments->threads, "Threads; one per processor when not given")
-      ->check(CLI::Range(1u, 1024u));
-  command->add_flag("--transitions-only", arguments->transitions_only,
-                    "Search the delays at which the outcome changes, without the whole grid");
-  command->add_flag("--overwrite", arguments->overwrite, "Replace the results that are in the folder");
-  command->add_flag("--json", arguments->as_json, "One JSON document");
-  command->callback([arguments, &exit_code] { exit_code = run(*arguments); });
+  command.option("sweep", arguments->file, "Sweep file").required();
+  command.option("--out", arguments->out, "Folder for the results; runs/sweep-NAME when not given");
+  command.option("--threads", arguments->threads, "Threads; one per processor when not given")
+      .from_to(1u, 1024u);
+  command.flag("--transitions-only", arguments->transitions_only,
+               "Search the delays at which the outcome changes, without the whole grid");
+  command.flag("--overwrite", arguments->overwrite, "Replace the results that are in the folder");
+  command.flag("--json", arguments->as_json, "One JSON document");
+  command.does([arguments] { return run(*arguments); });
 }
 
 }  // namespace upright::cli

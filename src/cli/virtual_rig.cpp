@@ -5,6 +5,7 @@
 #include <iostream>
 #include <memory>
 #include <numbers>
+#include <optional>
 #include <string>
 
 #include "commands.hpp"
@@ -17,8 +18,8 @@ namespace {
 
 struct Flags {
   std::string rig, tcp, rtu, plant, trace, stuck_encoder = "cart";
-  double theta0_deg = 0.0, hang_s = 0.0, duration_s = 0.0, late_ms = 0.0;
-  bool theta0_given = false;
+  std::optional<double> theta0_deg;
+  double hang_s = 0.0, duration_s = 0.0, late_ms = 0.0;
   bool no_pace = false;
   InjectedFaults faults;
 };
@@ -72,7 +73,7 @@ void serve(const Flags& flags) {
     options.theta0_rad = rig.simulated->initial.theta_rad;
     options.cart0_m = rig.simulated->initial.cart_m;
   }
-  if (flags.theta0_given) options.theta0_rad = flags.theta0_deg * std::numbers::pi / 180.0;
+  if (flags.theta0_deg) options.theta0_rad = *flags.theta0_deg * std::numbers::pi / 180.0;
   options.hang_s = flags.hang_s;
   options.trace = flags.trace;
   options.duration_s = flags.duration_s;
@@ -89,61 +90,55 @@ void serve(const Flags& flags) {
 
 }  // namespace
 
-void add_virtual_rig(CLI::App& app, int& exit_code) {
+void add_virtual_rig(CommandLine& line) {
   auto flags = std::make_shared<Flags>();
-  CLI::App* command = app.add_subcommand("virtual-rig", "Serve a plant in real time behind a Modbus server");
-  command->footer(
+  const Command command = line.command(
+      "virtual-rig", "Serve a plant in real time behind a Modbus server",
       "Example: upright virtual-rig --rig config/rigs/modbus-tcp.yaml --tcp 127.0.0.1:1502 --theta0-deg 3\n"
       "prints 'listening on 127.0.0.1:1502' and serves until interrupted. The pendulum is held until the\n"
       "controller takes over. Faults are injected into replies from then on.");
-  command->add_option("--rig", flags->rig, "Rig file with the register map")->required();
-  command->add_option(
+  command.option("--rig", flags->rig, "Rig file with the register map").required();
+  command.option(
       "--tcp", flags->tcp,
       "HOST:PORT to listen on; without HOST this machine only (127.0.0.1); port 0 takes a free one");
-  command->add_option("--rtu", flags->rtu,
-                      "Serial line; where nothing exists, a pseudo-terminal gets this name");
-  CLI::Option* theta0 = command->add_option("--theta0-deg", flags->theta0_deg, "Initial angle, 0 upright")
-                            ->check(CLI::Range(-360.0, 360.0));
+  command.option("--rtu", flags->rtu, "Serial line; where nothing exists, a pseudo-terminal gets this name");
+  command.option("--theta0-deg", flags->theta0_deg, "Initial angle, 0 upright").from_to(-360.0, 360.0);
   command
-      ->add_option("--hang", flags->hang_s,
-                   "The pendulum hangs for so many seconds from the first request on, then it is lifted")
-      ->check(CLI::Range(0.0, 1e6));
-  command->add_option("--plant", flags->plant, "Plant file, in place of the rig file's");
-  command->add_option("--trace", flags->trace, "CSV of the plant's side: time, voltage, position, angle");
-  command->add_option("--duration", flags->duration_s, "Seconds to serve; 0 until interrupted")
-      ->check(CLI::Range(0.0, 1e6));
-  command->add_flag("--no-pace", flags->no_pace, "Do not slow a pseudo-terminal down to its baud rate");
-  const auto every = CLI::Range(0, 1'000'000'000);
-  command->add_option("--inject-seed", flags->faults.seed, "Seed of the injected faults");
-  command->add_option("--inject-late-ms", flags->late_ms, "How late a late reply is")
-      ->check(CLI::Range(0.0, 1e5));
-  command->add_option("--inject-late-every", flags->faults.late_every, "One reply in N is late")
-      ->check(every);
-  command->add_option("--inject-drop-every", flags->faults.drop_every, "One reply in N is dropped")
-      ->check(every);
-  command->add_option("--inject-corrupt-every", flags->faults.corrupt_every, "One reply in N has a wrong bit")
-      ->check(every);
-  command->add_option("--inject-stale-every", flags->faults.stale_every, "One reply in N is the one before")
-      ->check(every);
+      .option("--hang", flags->hang_s,
+              "The pendulum hangs for so many seconds from the first request on, then it is lifted")
+      .from_to(0.0, 1e6);
+  command.option("--plant", flags->plant, "Plant file, in place of the rig file's");
+  command.option("--trace", flags->trace, "CSV of the plant's side: time, voltage, position, angle");
+  command.option("--duration", flags->duration_s, "Seconds to serve; 0 until interrupted").from_to(0.0, 1e6);
+  command.flag("--no-pace", flags->no_pace, "Do not slow a pseudo-terminal down to its baud rate");
+  constexpr int most_replies = 1'000'000'000;
+  command.option("--inject-seed", flags->faults.seed, "Seed of the injected faults");
+  command.option("--inject-late-ms", flags->late_ms, "How late a late reply is").from_to(0.0, 1e5);
+  command.option("--inject-late-every", flags->faults.late_every, "One reply in N is late")
+      .from_to(0, most_replies);
+  command.option("--inject-drop-every", flags->faults.drop_every, "One reply in N is dropped")
+      .from_to(0, most_replies);
+  command.option("--inject-corrupt-every", flags->faults.corrupt_every, "One reply in N has a wrong bit")
+      .from_to(0, most_replies);
+  command.option("--inject-stale-every", flags->faults.stale_every, "One reply in N is the one before")
+      .from_to(0, most_replies);
   command
-      ->add_option("--inject-reorder-every", flags->faults.reorder_every,
-                   "One reply in N leaves after the next")
-      ->check(every);
-  const auto once = [command](const char* name, double& after_s, const std::string& what) {
-    command->add_option(name, after_s, what + " once, this many seconds after the controller took over")
-        ->check(CLI::Range(0.0, 1e6));
+      .option("--inject-reorder-every", flags->faults.reorder_every, "One reply in N leaves after the next")
+      .from_to(0, most_replies);
+  const auto once = [&command](const char* name, double& after_s, const std::string& what) {
+    command.option(name, after_s, what + " once, this many seconds after the controller took over")
+        .from_to(0.0, 1e6);
   };
   once("--inject-restart-after", flags->faults.restart_after_s, "Restart the device");
   once("--inject-cut-after", flags->faults.cut_after_s, "Cut the link");
   once("--inject-stick-after", flags->faults.stick_after_s, "Stop an encoder");
   once("--inject-jump-after", flags->faults.jump_after_s, "Let the cart's counts jump");
-  command->add_option("--inject-stick", flags->stuck_encoder, "Which encoder stops (cart)")
-      ->check(CLI::IsMember({"cart", "pendulum"}));
-  command->add_option("--inject-jump-counts", flags->faults.jump_counts, "How far the cart's counts jump");
-  command->callback([flags, theta0, &exit_code] {
-    flags->theta0_given = theta0->count() > 0;
+  command.option("--inject-stick", flags->stuck_encoder, "Which encoder stops (cart)")
+      .one_of({"cart", "pendulum"});
+  command.option("--inject-jump-counts", flags->faults.jump_counts, "How far the cart's counts jump");
+  command.does([flags] {
     serve(*flags);
-    exit_code = static_cast<int>(ExitCode::done);
+    return ExitCode::done;
   });
 }
 
