@@ -1,10 +1,10 @@
 #include "upright/analysis/characteristic_roots.hpp"
 
-#include <Eigen/Dense>
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+
+#include "upright/analysis/dense_algebra.hpp"
 
 namespace upright {
 
@@ -70,16 +70,16 @@ Complex polished(const DelayedFeedback& loop, double delay_s, Complex guess) {
 Complex transfer(const DelayedFeedback& loop, Complex s) {
   Eigen::MatrixXcd m = -loop.a.cast<Complex>();
   m.diagonal().array() += s;
-  const Eigen::VectorXcd response = m.partialPivLu().solve(loop.b.cast<Complex>());
+  const Eigen::VectorXcd response = solve(m, loop.b.cast<Complex>());
   return (loop.k.cast<Complex>() * response)(0);
 }
 
 Complex rightmost_root(const DelayedFeedback& loop, double delay_s) {
-  if (delay_s <= 0.0) return rightmost((loop.a + loop.b * loop.k).eigenvalues());
+  if (delay_s <= 0.0) return rightmost(eigenvalues(loop.a + loop.b * loop.k));
   // Enough points for the oscillations that the loop's own rates fit into the delay.
-  const double rate = (loop.a + loop.b * loop.k).eigenvalues().cwiseAbs().maxCoeff();
+  const double rate = eigenvalues(loop.a + loop.b * loop.k).cwiseAbs().maxCoeff();
   const auto count = static_cast<Index>(std::clamp(16.0 + rate * delay_s, 16.0, 80.0));
-  return polished(loop, delay_s, rightmost(generator(loop, delay_s, count).eigenvalues()));
+  return polished(loop, delay_s, rightmost(eigenvalues(generator(loop, delay_s, count))));
 }
 
 }  // namespace upright

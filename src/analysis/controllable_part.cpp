@@ -1,10 +1,10 @@
 #include "upright/analysis/controllable_part.hpp"
 
-#include <Eigen/Dense>
-#include <Eigen/Eigenvalues>
+#include <Eigen/LU>
 #include <cmath>
 #include <cstdio>
 
+#include "upright/analysis/dense_algebra.hpp"
 #include "upright/model/error.hpp"
 
 namespace upright {
@@ -58,7 +58,7 @@ std::string combination(const Eigen::RowVectorXd& weights, const std::vector<std
 }
 
 std::complex<double> largest_eigenvalue(const MatrixXd& matrix) {
-  const Eigen::VectorXcd values = matrix.eigenvalues();
+  const Eigen::VectorXcd values = eigenvalues(matrix);
   Index at = 0;
   values.real().maxCoeff(&at);
   return values(at);
@@ -97,7 +97,7 @@ ControllablePart controllable_part(const LinearPlant& linear) {
   part.a = (linear.a * part.follow).topRows(r);
   part.b = linear.b.head(r);
   if (r == n) return part;
-  const MatrixXd whole = basis.householderQr().householderQ();
+  const MatrixXd whole = completed_basis(basis);
   const MatrixXd rest = whole.rightCols(n - r);
   const std::complex<double> eigenvalue = largest_eigenvalue(rest.transpose() * linear.a * rest);
   if (eigenvalue.real() > 1e-9 * linear.a.norm())

@@ -1,7 +1,5 @@
 #include "upright/analysis/delay_margin.hpp"
 
-#include <Eigen/Dense>
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -11,6 +9,7 @@
 
 #include "upright/analysis/characteristic_roots.hpp"
 #include "upright/analysis/controllable_part.hpp"
+#include "upright/analysis/dense_algebra.hpp"
 #include "upright/analysis/linear_sampled_loop.hpp"
 #include "upright/model/error.hpp"
 
@@ -102,7 +101,7 @@ std::vector<double> unit_gain_frequencies(const DelayedFeedback& loop, const Loo
   const Index n = loop.a.rows();
   MatrixXd hamiltonian(2 * n, 2 * n);
   hamiltonian << loop.a, loop.b * loop.b.transpose(), -loop.k.transpose() * loop.k, -loop.a.transpose();
-  const Eigen::VectorXcd values = hamiltonian.eigenvalues();
+  const Eigen::VectorXcd values = eigenvalues(hamiltonian);
   std::vector<double> candidates;
   for (const Complex& value : values)
     if (value.imag() > 0.0) candidates.push_back(value.imag());

@@ -1,11 +1,10 @@
 #include "upright/analysis/gain_design.hpp"
 
-#include <Eigen/Dense>
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
 
+#include "upright/analysis/dense_algebra.hpp"
 #include "upright/analysis/riccati.hpp"
 #include "upright/model/error.hpp"
 
@@ -60,7 +59,7 @@ std::array<double, 4> measured_gains(const LinearPlant& linear, const RowVectorX
 }
 
 std::vector<std::complex<double>> sorted_eigenvalues(const MatrixXd& matrix) {
-  const Eigen::VectorXcd values = matrix.eigenvalues();
+  const Eigen::VectorXcd values = eigenvalues(matrix);
   std::vector<std::complex<double>> list(values.begin(), values.end());
   std::sort(list.begin(), list.end(), [](const auto& a, const auto& b) {
     return a.real() != b.real() ? a.real() > b.real() : a.imag() > b.imag();
@@ -71,7 +70,7 @@ std::vector<std::complex<double>> sorted_eigenvalues(const MatrixXd& matrix) {
 /// The paper's (10) prints the gain of an eliminated state's partner as the share that orthogonal coordinates
 /// leave it.
 void add_shares(GainDesign& design, const ControllablePart& part, const RowVectorXd& k) {
-  const RowVectorXd shares = k * (part.follow.transpose() * part.follow).inverse() * part.follow.transpose();
+  const RowVectorXd shares = k * inverse(part.follow.transpose() * part.follow) * part.follow.transpose();
   for (std::size_t i = 0; i < design.eliminated.size(); ++i) {
     EliminatedState& state = design.eliminated[i];
     for (Index j = 0; j < k.size(); ++j) {

@@ -1,10 +1,9 @@
 #include "upright/analysis/linear_sampled_loop.hpp"
 
-#include <Eigen/Dense>
-#include <Eigen/Eigenvalues>
 #include <cmath>
 
 #include "upright/analysis/controllable_part.hpp"
+#include "upright/analysis/dense_algebra.hpp"
 #include "upright/model/error.hpp"
 #include "upright/model/plant_file.hpp"
 
@@ -91,7 +90,7 @@ Complex LinearSampledLoop::line(Complex z, double delay_s) const {
 Complex LinearSampledLoop::transfer(Complex z) const {
   Eigen::MatrixXcd m = -a_.cast<Complex>();
   m.diagonal().array() += z;
-  const Eigen::VectorXcd states = m.partialPivLu().solve(b_.cast<Complex>());
+  const Eigen::VectorXcd states = solve(m, b_.cast<Complex>());
   const Eigen::Vector4cd shown = shows_.cast<Complex>() * states;
   const Complex input_delay = std::pow(z, -input_periods_);
   if (!predictor_) return (gains_.cast<Complex>() * shown)(0) * input_delay;
@@ -174,7 +173,7 @@ MatrixXd LinearSampledLoop::closed_loop(double delay_s) const {
 }
 
 Complex LinearSampledLoop::rightmost_root(double delay_s) const {
-  const Eigen::VectorXcd roots = closed_loop(delay_s).eigenvalues();
+  const Eigen::VectorXcd roots = eigenvalues(closed_loop(delay_s));
   Index at = 0;
   roots.cwiseAbs().maxCoeff(&at);
   return std::log(Complex(roots(at).real(), std::abs(roots(at).imag()))) / period_s_;
