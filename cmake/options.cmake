@@ -69,6 +69,8 @@ function(upright_test name)
   cmake_parse_arguments(arg "REAL_TIME" "TIMEOUT" "SOURCES;LINK;LABELS" ${ARGN})
   add_executable(${name} ${arg_SOURCES})
   target_link_libraries(${name} PRIVATE ${arg_LINK} GTest::gtest_main upright_options)
+  target_compile_options(${name} PRIVATE ${UPRIGHT_PRELUDE_OPTIONS})
+  target_precompile_headers(${name} REUSE_FROM ${UPRIGHT_TEST_PRELUDE})
   target_compile_definitions(${name} PRIVATE UPRIGHT_SOURCE_DIR="${PROJECT_SOURCE_DIR}"
                              UPRIGHT_BINARY="$<TARGET_FILE:upright>")
   if(NOT "unit" IN_LIST arg_LABELS)

@@ -17,6 +17,7 @@ options=()
 if command -v ccache >/dev/null; then
   options+=(-DCMAKE_CXX_COMPILER_LAUNCHER=ccache)
   export CCACHE_BASEDIR=$PWD CCACHE_NOHASHDIR=1
+  export CCACHE_SLOPPINESS=pch_defines,time_macros  # which its manual asks for where headers are precompiled
 fi
 log=$(mktemp)
 trap 'rm -f "$log"' EXIT
