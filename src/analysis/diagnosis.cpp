@@ -171,10 +171,10 @@ class Diagnostician {
 
   /// Those that promise a share of what the best one does, and some at least. A promise is kept within a
   /// factor of a few (measured on the matrix), so that the best is among them.
-  std::vector<std::size_t> promising(std::vector<std::size_t> candidates, int round) {
+  std::vector<std::size_t> promising(const std::vector<std::size_t>& candidates, int round) {
     constexpr double share = 0.1;
     constexpr std::size_t least_count = 8;
-    std::vector<double> promised = search_->promised_gains(current_, candidates);
+    const std::vector<double> promised = search_->promised_gains(current_, candidates);
     std::vector<std::size_t> ranking(candidates.size());
     std::iota(ranking.begin(), ranking.end(), std::size_t{0});
     std::stable_sort(ranking.begin(), ranking.end(),
