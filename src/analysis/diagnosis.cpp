@@ -169,8 +169,8 @@ class Diagnostician {
     return candidates;
   }
 
-  /// Those that promise a share of what the best one does, and some at least. A promise is kept within a
-  /// factor of a few (measured on the matrix), so that the best is among them.
+  /// Those that promise a share of what the best one does, some at least, and all that cannot promise. A
+  /// promise is kept within a factor of a few (measured on the matrix), so that the best is among them.
   std::vector<std::size_t> promising(const std::vector<std::size_t>& candidates, int round) {
     constexpr double share = 0.1;
     constexpr std::size_t least_count = 8;
@@ -179,12 +179,19 @@ class Diagnostician {
     std::iota(ranking.begin(), ranking.end(), std::size_t{0});
     std::stable_sort(ranking.begin(), ranking.end(),
                      [&](std::size_t a, std::size_t b) { return promised[a] > promised[b]; });
+    double best = 0.0;
+    for (const double gain : promised)
+      if (std::isfinite(gain)) best = std::max(best, gain);
     std::vector<std::size_t> chosen;
+    std::size_t kept = 0;
     for (const std::size_t i : ranking) {
-      if (chosen.size() < least_count || promised[i] > share * promised[ranking.front()])
+      const bool unknown = !std::isfinite(promised[i]);
+      if (unknown || kept < least_count || promised[i] > share * best) {
         chosen.push_back(candidates[i]);
-      else if (round == 0)
+        kept += unknown ? 0 : 1;
+      } else if (round == 0) {
         result_.candidates.push_back({candidates[i], 0.0, std::max(promised[i], 0.0)});
+      }
     }
     return chosen;
   }

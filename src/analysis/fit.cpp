@@ -582,8 +582,9 @@ class Fitter {
       const double least_fall = options_.tolerance * sample_count() * 0.1 + 0.02;
       for (int attempt = 0; attempt < 4; ++attempt) {
         Step next = step(damping);
-        // What does not even promise to fall is not worth looking at.
-        if (next.promised_fall < least_fall) break;
+        // What does not even promise to fall is not worth looking at. (A step that was cut short promises
+        // less than it is good for.)
+        if (next.promised_fall < least_fall && !next.cut_short) break;
         point_ = std::move(next.point);
         next_objective = evaluate();
         if (next_objective < objective) break;
@@ -639,6 +640,7 @@ class Fitter {
   struct Step {
     FitPoint point;
     double promised_fall = 0.0;  ///< of the objective, were the residuals linear
+    bool cut_short = false;      ///< at a bound, or for its length
   };
 
   /// The Gauss-Newton step of all segments: parameters first (initial states eliminated), then each initial
@@ -662,12 +664,14 @@ class Fitter {
       h += n.h.bottomRightCorner(np, np) - n.h.bottomLeftCorner(np, states) * back[s];
       g += n.g.tail(np) - n.h.bottomLeftCorner(np, states) * base[s];
     }
-    Eigen::VectorXd delta = bounded_step(h, g, damping);
-    FitPoint trial = point_;
+    Step result{point_};
+    FitPoint& trial = result.point;
+    Eigen::VectorXd delta = bounded_step(h, g, damping, result.cut_short);
     for (Eigen::Index j = 0; j < np; ++j) {
       const FreeParameter& p = free_[static_cast<std::size_t>(j)];
       PlantEffect effect = *trial.plant.find(p.effect);
-      const double moved = std::clamp(effect.values[p.index] + delta[j], p.low, p.high);
+      const double wanted = effect.values[p.index] + delta[j], moved = std::clamp(wanted, p.low, p.high);
+      result.cut_short = result.cut_short || moved != wanted;
       delta[j] = moved - effect.values[p.index];
       effect.values[p.index] = moved;
       trial.plant.set(p.effect, effect.values);
@@ -676,7 +680,7 @@ class Fitter {
                             const Eigen::VectorXd& way) {
       return 2.0 * slope.dot(way) - way.dot(information * way);
     };
-    double fall = promise(prior, to_belief, delta);
+    result.promised_fall = promise(prior, to_belief, delta);
     Eigen::VectorXd way(states + np);
     way.tail(np) = delta;
     for (std::size_t s = 0; s < normals_.size(); ++s) {
@@ -685,17 +689,19 @@ class Fitter {
       way.head(states) = base[s] - back[s] * delta;
       for (int i = 0; i < states; ++i) {
         const double limit = longest[static_cast<std::size_t>(i)];
+        result.cut_short = result.cut_short || std::abs(way[i]) > limit;
         way[i] = std::clamp(way[i], -limit, limit);
         *values[static_cast<std::size_t>(i)] += way[i];
       }
-      fall += promise(normals_[s].h, normals_[s].g, way);
+      result.promised_fall += promise(normals_[s].h, normals_[s].g, way);
     }
-    return {std::move(trial), fall};
+    return result;
   }
 
   /// Solves for the parameters; those held at a bound by the data stay there, and no step is longer than
   /// makes sense.
-  Eigen::VectorXd bounded_step(const NormalMatrix& h, const Eigen::VectorXd& g, double damping) const {
+  Eigen::VectorXd bounded_step(const NormalMatrix& h, const Eigen::VectorXd& g, double damping,
+                               bool& cut_short) const {
     const Eigen::Index np = g.size();
     std::vector<bool> held(static_cast<std::size_t>(np), false);
     Eigen::VectorXd delta = Eigen::VectorXd::Zero(np);
@@ -723,7 +729,9 @@ class Fitter {
         const FreeParameter& p = free_[static_cast<std::size_t>(j)];
         const double value = point_.plant.find(p.effect)->values[p.index];
         const double limit = longest_step(p, value);
-        delta[j] = std::clamp(std::isfinite(solved[a]) ? solved[a] * p.scale : 0.0, -limit, limit);
+        const double wanted = std::isfinite(solved[a]) ? solved[a] * p.scale : 0.0;
+        delta[j] = std::clamp(wanted, -limit, limit);
+        cut_short = cut_short || delta[j] != wanted;
         const bool below = value <= p.low && delta[j] < 0.0;
         const bool above = value >= p.high && delta[j] > 0.0;
         if (below || above) {
@@ -834,11 +842,13 @@ class Fitter {
     if (!std::isfinite(result.objective)) result.objective = infinity;
     result.information = h;
     if (np == 0) return;
-    if (std::isfinite(result.objective)) result.promised_fall = step(least_damping).promised_fall;
     const NormalMatrix inverse = inverse_of(without_held(h));
     const auto segments = static_cast<double>(normals_.size());
     const double small_sample = segments > np + 1.0 ? segments / (segments - 1.0) : 2.0;
     result.covariance = inverse * (robust_spread(h - prior, spread * small_sample) + prior) * inverse;
+    if (!std::isfinite(result.objective)) return;
+    const Step further = step(least_damping);
+    if (!further.cut_short) result.promised_fall = further.promised_fall;
   }
 
   const FitData& data_;

@@ -213,7 +213,7 @@ std::vector<double> Search::promised_gains(const Hypothesis& base,
   only_look.noise_rounds = 0;
   const auto promise = [&](const FitPoint& point, const std::vector<FreeParameter>& free) {
     const FitResult seen = fit(sieve_, point, free, only_look);
-    return seen.objective - seen.promised_fall;
+    return seen.promised_fall ? seen.objective - *seen.promised_fall : -infinity;
   };
   const FitPoint from = sieve_point(base);
   const double without = promise(from, base.free);
@@ -224,7 +224,7 @@ std::vector<double> Search::promised_gains(const Hypothesis& base,
     double least = infinity;
     for (const FitPoint& point : points_with(from, effect, base))
       least = std::min(least, promise(point, free_of(added)));
-    gains.push_back(without - least);
+    gains.push_back(std::isfinite(without) ? without - least : infinity);
   }
   return gains;
 }
@@ -252,7 +252,8 @@ Hypothesis Search::screened_pair(const Hypothesis& base, const Hypothesis& first
   h.added = first.added;
   h.added.insert(second.added.begin(), second.added.end());
   h.free = free_of(h.added);
-  h.train = fit(sieve_, point, h.free, screening());
+  // Each was fitted as if it were alone: the way from there is longer than a few steps.
+  h.train = fit(sieve_, point, h.free, FitOptions{});
   return h;
 }
 

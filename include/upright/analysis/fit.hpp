@@ -96,8 +96,9 @@ struct FitPoint {
 
 struct FitResult {
   FitPoint point;
-  double objective = 0.0;                  ///< minus twice the log of likelihood and priors
-  double promised_fall = 0.0;              ///< of the objective in a further step, were residuals linear
+  double objective = 0.0;  ///< minus twice the log of likelihood and priors
+  /// Of the objective in a further step, were residuals linear; nothing where a step must be cut short.
+  std::optional<double> promised_fall;
   std::vector<double> segment_objective;   ///< the likelihood part, by segment
   std::vector<double> block_objective;     ///< the same by blocks of a quarter of a second, in order
   std::vector<double> segment_chi_square;  ///< sum of squared whitened residuals, by segment

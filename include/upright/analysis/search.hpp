@@ -45,12 +45,13 @@ class Search {
   /// Base corrections and the plant's own effects within what is believed of them.
   Hypothesis baseline();
   /// How far the objective falls on a part of the training data when each of these is added, as its
-  /// derivatives promise it from the best of its starts: quick, and only a promise.
+  /// derivatives promise it from the best of its starts: quick, and only a promise. Infinite where they do
+  /// not reach so far.
   std::vector<double> promised_gains(const Hypothesis& base, const std::vector<std::size_t>& effects) const;
   /// Adds an effect to a hypothesis: a few steps from every start with the noise as it is, on a part of the
   /// training data.
   Hypothesis screened(const Hypothesis& base, std::size_t effect) const;
-  /// The same with two effects at once, from where each alone was fitted.
+  /// Two effects at once on that part, from where each alone was fitted, to convergence.
   Hypothesis screened_pair(const Hypothesis& base, const Hypothesis& first, const Hypothesis& second) const;
   /// A hypothesis on that part alone, with which to compare.
   Hypothesis sieved(const Hypothesis& base) const;
