@@ -19,6 +19,12 @@ FitPoint moved_to(FitPoint point, const Plant& plant) {
   return point;
 }
 
+std::set<std::size_t> effects_of_both(const Hypothesis& first, const Hypothesis& second) {
+  std::set<std::size_t> effects = first.added;
+  effects.insert(second.added.begin(), second.added.end());
+  return effects;
+}
+
 /// A few steps with the noise as it is.
 FitOptions screening() {
   FitOptions options;
@@ -221,9 +227,10 @@ std::vector<double> Search::promised_gains(const Hypothesis& base,
   for (const std::size_t effect : effects) {
     std::set<std::size_t> added = base.added;
     added.insert(effect);
+    const std::vector<FreeParameter> free = free_of(added);
     double least = infinity;
     for (const FitPoint& point : points_with(from, effect, base))
-      least = std::min(least, promise(point, free_of(added)));
+      least = std::min(least, promise(point, free));
     gains.push_back(std::isfinite(without) ? without - least : infinity);
   }
   return gains;
@@ -232,13 +239,14 @@ std::vector<double> Search::promised_gains(const Hypothesis& base,
 Hypothesis Search::screened(const Hypothesis& base, std::size_t effect) const {
   std::set<std::size_t> added = base.added;
   added.insert(effect);
+  const std::vector<FreeParameter> free = free_of(added);
   Hypothesis best;
   best.train.objective = infinity;
   for (const FitPoint& point : points_with(sieve_point(base), effect, base)) {
     Hypothesis h;
     h.added = added;
-    h.free = free_of(added);
-    h.train = fit(sieve_, point, h.free, screening());
+    h.free = free;
+    h.train = fit(sieve_, point, free, screening());
     if (h.train.objective < best.train.objective) best = std::move(h);
   }
   return best;
@@ -249,8 +257,7 @@ Hypothesis Search::screened_pair(const Hypothesis& base, const Hypothesis& first
   FitPoint point = pair_point(base, first, second);
   point.starts = sieve_starts(point.starts);
   Hypothesis h;
-  h.added = first.added;
-  h.added.insert(second.added.begin(), second.added.end());
+  h.added = effects_of_both(first, second);
   h.free = free_of(h.added);
   // Each was fitted as if it were alone: the way from there is longer than a few steps.
   h.train = fit(sieve_, point, h.free, FitOptions{});
@@ -394,8 +401,7 @@ FitPoint Search::pair_point(const Hypothesis& base, const Hypothesis& first, con
 }
 
 Hypothesis Search::with_pair(const Hypothesis& base, const Hypothesis& first, const Hypothesis& second) {
-  std::set<std::size_t> added = first.added;
-  added.insert(second.added.begin(), second.added.end());
+  const std::set<std::size_t> added = effects_of_both(first, second);
   Hypothesis h = fitted(added, pair_point(base, first, second), FitOptions{}, free_of(added));
   weigh(h);
   return h;
