@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <utility>
 
 #include "upright/analysis/parallel.hpp"
 #include "upright/sim/simulator.hpp"
@@ -302,6 +303,32 @@ double least_dry_level(const Dynamics<S>& dynamics, const S& cart_m) {
                   value_of(dynamics.cart_dry_level(cart_m, S(0.0), S(-1.0))));
 }
 
+/// Adds weight * row * row', of which the lower triangle counts, in blocks that SIMD likes.
+template <int N>
+void add_square(const Eigen::Matrix<double, N, 1>& row, double weight, int columns,
+                Eigen::Matrix<double, N, N>& sum) {
+  constexpr int width = 4;
+  const auto add_block = [&]<int First>(std::integral_constant<int, First>) {
+    if (First >= columns) return;
+    const auto below = row.template tail<N - First>();
+    for (int j = First; j < First + width; ++j)
+      sum.template block<N - First, 1>(First, j) += (weight * row[j]) * below;
+  };
+  [&]<int... Block>(std::integer_sequence<int, Block...>) {
+    (add_block(std::integral_constant<int, Block * width>{}), ...);
+  }
+  (std::make_integer_sequence<int, N / width>{});
+}
+
+/// What the sensors, which are linear, show of a unit of cart and pendulum.
+template <class S>
+std::array<double, 2> sensor_gains(const Dynamics<S>& dynamics) {
+  PlantState<S> unit;
+  unit.cart_m = unit.theta_rad = S(1.0);
+  const Outputs<S> at_0 = dynamics.measure(PlantState<S>{}), at_1 = dynamics.measure(unit);
+  return {value_of(at_1.cart_m) - value_of(at_0.cart_m), value_of(at_1.theta_rad) - value_of(at_0.theta_rad)};
+}
+
 /// Follows a segment with dual numbers, a sample at a time; chains the derivatives and whitens them on the
 /// way.
 template <int N>
@@ -336,10 +363,11 @@ void linearise_segment(const Measurement& run, const Segment& segment, const Eng
   const double coupling = pendulum ? pendulum->mass_kg * pendulum->length_to_com_m : 0.0;
   const double inertia = pendulum ? pendulum->inertia_about_pivot_kgm2() : 1.0;
   const bool bristles = dynamics.has_bristle_state();
+  const std::array<double, 2> sensors = sensor_gains(dynamics);
 
   // As in the dual numbers: initial state first, then parameters, then nothing.
   using Row = Eigen::Matrix<double, N, 1>;
-  std::array<Row, states> sensitivity, moved;
+  std::array<Row, states> sensitivity, former;
   for (int i = 0; i < states; ++i) sensitivity[static_cast<std::size_t>(i)] = Row::Unit(i);
   Eigen::Matrix<double, N, N> information = Eigen::Matrix<double, N, N>::Zero();
   Row score = Row::Zero();
@@ -358,50 +386,31 @@ void linearise_segment(const Measurement& run, const Segment& segment, const Eng
     LinearStep& step = steps[k - segment.first];
     const bool first = k == segment.first;
     step.period_s = first ? 0.0 : run.time_s[k] - run.time_s[k - 1];
-    // Each sample starts with fresh unit derivatives; a contact at rest forgets a push on its velocity at
-    // once.
-    PlantState<Jet> seeded = simulator.engine().state();
-    const auto seed = as_array(seeded);
-    const bool rests[states] = {run.cart_locked, !dynamics.has_pendulum(),
-                                run.cart_locked || simulator.engine().cart_at_rest(),
-                                !dynamics.has_pendulum() || simulator.engine().pivot_at_rest(), !bristles};
-    for (int i = 0; i < states; ++i) {
-      seed[static_cast<std::size_t>(i)]->v.setZero();
-      if (!rests[i]) seed[static_cast<std::size_t>(i)]->v[i] = 1.0;
-    }
-    simulator.engine().correct(seeded);
+    // Each sample starts with fresh unit derivatives.
+    simulator.engine().seed();
     if (!first) {
       simulator.command(run.time_s[k - 1], run.voltage_v[k - 1]);
       simulator.advance_to(run.time_s[k]);
     }
-    PlantState<Jet> reached = simulator.engine().state();
+    const PlantState<Jet>& reached = simulator.engine().state();
     step.holds[0] = step.holds[1] = 0.0;
     if (!run.cart_locked && !bristles && simulator.engine().cart_at_rest())
       step.holds[0] = least_dry_level(dynamics, reached.cart_m);
     if (dynamics.has_pendulum() && simulator.engine().pivot_at_rest())
       step.holds[1] = value_of(dynamics.pivot_dry_level());
-    const auto end = as_array(reached);
+    const std::array<const Jet*, states> end = {&reached.cart_m, &reached.theta_rad, &reached.cart_mps,
+                                                &reached.theta_radps, &reached.bristle_m};
     for (int i = 0; i < states; ++i)
       for (int j = 0; j < states; ++j)
         step.transition[i][j] = first ? (i == j ? 1.0 : 0.0) : end[static_cast<std::size_t>(i)]->v[j];
     const Outputs<Jet> outputs = simulator.engine().outputs();
     const double simulated[2] = {value_of(outputs.cart_m), value_of(outputs.theta_rad)};
     for (int channel = 0; channel < 2; ++channel) {
-      step.gain[channel] = 1.0;
+      step.gain[channel] = sensors[channel];
       step.weight[channel] = weight_of(run, channel, k);
       step.residual[channel] =
           whitener.present(channel) ? measured(run, channel, k) - simulated[channel] : 0.0;
     }
-    // Sensor scales: d measured / d state, by re-measuring a unit seed.
-    PlantState<Jet> unit = reached;
-    const auto units = as_array(unit);
-    for (int i = 0; i < states; ++i) {
-      units[static_cast<std::size_t>(i)]->v.setZero();
-      units[static_cast<std::size_t>(i)]->v[i] = 1.0;
-    }
-    const Outputs<Jet> sensed = dynamics.measure(unit);
-    step.gain[0] = sensed.cart_m.v[0];
-    step.gain[1] = sensed.theta_rad.v[1];
     step.rate[0] = value_of(reached.cart_mps);
     step.rate[1] = value_of(reached.theta_radps);
     const double off = coupling * std::cos(value_of(reached.theta_rad));
@@ -420,13 +429,14 @@ void linearise_segment(const Measurement& run, const Segment& segment, const Eng
     if (!first) {
       whitener.predict(step);
       if (with_normal) {
+        former = sensitivity;
         for (std::size_t i = 0; i < states; ++i) {
-          moved[i] = end[i]->v;
-          moved[i].template head<states>().setZero();
+          Row moved = end[i]->v;
+          moved.template head<states>().setZero();
           for (std::size_t j = 0; j < states; ++j)
-            if (step.transition[i][j] != 0.0) moved[i] += step.transition[i][j] * sensitivity[j];
+            if (step.transition[i][j] != 0.0) moved += step.transition[i][j] * former[j];
+          sensitivity[i] = moved;
         }
-        sensitivity = moved;
       }
     }
     double update[states] = {};
@@ -440,12 +450,13 @@ void linearise_segment(const Measurement& run, const Segment& segment, const Eng
       if (!with_normal) continue;
       count(normal.likelihood, e, whitener.variance(), step.weight[channel]);
       if (!std::isfinite(e)) return;
-      const Jet& shown = channel == 0 ? sensed.cart_m : sensed.theta_rad;
-      Row row = shown.v;
+      // Of what the sensor shows, what is its own, and what comes with the state.
+      Row row = channel == 0 ? outputs.cart_m.v : outputs.theta_rad.v;
+      row -= step.gain[channel] * end[static_cast<std::size_t>(channel)]->v;
       row.template head<states>().setZero();
       row += step.gain[channel] * sensitivity[static_cast<std::size_t>(channel)];
       const double weight = step.weight[channel] / whitener.variance();
-      for (int j = 0; j < columns; ++j) information.col(j) += (weight * row[j]) * row;
+      add_square(row, weight, columns, information);
       score += (weight * e) * row;
       for (std::size_t i = 0; i < states; ++i)
         if (whitener.gain()[i] != 0.0) sensitivity[i] -= whitener.gain()[i] * row;
@@ -460,7 +471,8 @@ void linearise_segment(const Measurement& run, const Segment& segment, const Eng
     counted = normal.likelihood.objective();
   }
   if (!with_normal) return;
-  normal.h = information.topLeftCorner(columns, columns);
+  const Eigen::Matrix<double, N, N> whole = information.template selfadjointView<Eigen::Lower>();
+  normal.h = whole.topLeftCorner(columns, columns);
   normal.g = score.head(columns);
 }
 
@@ -469,6 +481,7 @@ void with_jet_size(std::size_t parameters, Work&& work) {
   const std::size_t slots = parameters + states;
   if (slots <= 8) return work.template operator()<8>();
   if (slots <= 16) return work.template operator()<16>();
+  if (slots <= 24) return work.template operator()<24>();
   return work.template operator()<32>();
 }
 
@@ -507,8 +520,8 @@ class Fitter {
   Fitter(const FitData& data, const FitPoint& start, const std::vector<FreeParameter>& free,
          const FitOptions& options)
       : data_(data), free_(free), options_(options), point_(start) {
-    steps_.resize(data.segments.size());
-    normals_.resize(data.segments.size());
+    for (auto* steps : {&steps_, &former_steps_}) steps->resize(data.segments.size());
+    for (auto* normals : {&normals_, &former_normals_}) normals->resize(data.segments.size());
   }
 
   FitResult run() {
@@ -576,8 +589,6 @@ class Fitter {
     converged_ = false;
     for (int iteration = 0; iteration < options_.most_iterations && std::isfinite(objective); ++iteration) {
       const FitPoint former = point_;
-      auto former_steps = steps_;
-      auto former_normals = normals_;
       double next_objective = infinity;
       const double least_fall = options_.tolerance * sample_count() * 0.1 + 0.02;
       for (int attempt = 0; attempt < 4; ++attempt) {
@@ -586,14 +597,14 @@ class Fitter {
         // less than it is good for.)
         if (next.promised_fall < least_fall && !next.cut_short) break;
         point_ = std::move(next.point);
+        swap_with_former();
         next_objective = evaluate();
         if (next_objective < objective) break;
         point_ = former;
-        normals_ = former_normals;
+        swap_with_former();
         damping = std::max(damping, least_damping) * 30.0;
       }
       if (!(next_objective < objective)) {
-        steps_ = std::move(former_steps);
         converged_ = true;
         break;
       }
@@ -605,6 +616,11 @@ class Fitter {
         break;
       }
     }
+  }
+
+  void swap_with_former() {
+    steps_.swap(former_steps_);
+    normals_.swap(former_normals_);
   }
 
   /// How far the parameters are from where they are believed to be.
@@ -855,8 +871,8 @@ class Fitter {
   std::vector<FreeParameter> free_;
   FitOptions options_;
   FitPoint point_;
-  std::vector<std::vector<LinearStep>> steps_;
-  std::vector<Normal> normals_;
+  std::vector<std::vector<LinearStep>> steps_, former_steps_;
+  std::vector<Normal> normals_, former_normals_;
   bool converged_ = false;
 };
 

@@ -97,7 +97,8 @@ Search::Search(const Plant& plant, const std::vector<Measurement>& runs, const F
     plant_.set(effect, std::vector<double>{effect_registry()[effect].parameters[0].neutral});
   }
   // Runs differ, segments of a run are alike: take them in turn.
-  const std::size_t stride = train_.segments.size() >= 24 ? 3 : 1;
+  constexpr std::size_t least_segments = 8, most_stride = 3;
+  const std::size_t stride = std::clamp<std::size_t>(train_.segments.size() / least_segments, 1, most_stride);
   sieve_.runs = &runs;
   for (std::size_t s = 0; s < train_.segments.size(); s += stride) {
     sieve_.segments.push_back(train_.segments[s]);

@@ -235,17 +235,14 @@ class Dynamics {
     at_rest.cart_mps = S(0.0);
     const S force = cart_smooth_force(at_rest, motor_v);
     if (!model_.has_pendulum) return force;
-    using std::cos;
-    using std::sin;
-    const S s = sin(state.theta_rad);
+    const auto [s, c] = sine_and_cosine(state.theta_rad);
     S theta_acceleration(0.0);
     if (!(pivot == Contact::stick && pivot_can_stick())) {
       S torque = pivot_smooth_torque(state.theta_radps);
       if (pivot_dry_) torque = torque + pivot_sliding_torque(state.theta_radps, pivot);
       theta_acceleration = (gravity_torque_ * s + torque) / base_.inertia_about_pivot_kgm2;
     }
-    return force + coupling_ * (s * state.theta_radps * state.theta_radps -
-                                cos(state.theta_rad) * theta_acceleration);
+    return force + coupling_ * (s * state.theta_radps * state.theta_radps - c * theta_acceleration);
   }
 
   /// The torque that dry friction would have to balance to hold a resting pendulum, with the cart as it is.
@@ -340,15 +337,13 @@ class Dynamics {
 
   void accelerate(const PlantState<S>& state, const S& force, const S& torque, bool cart_rests,
                   bool pivot_rests, PlantState<S>& rate) const {
-    using std::cos;
-    using std::sin;
     rate.cart_mps = S(0.0);
     rate.theta_radps = S(0.0);
     if (!model_.has_pendulum) {
       if (!cart_rests) rate.cart_mps = force / total_mass_;
       return;
     }
-    const S s = sin(state.theta_rad);
+    const auto [s, c] = sine_and_cosine(state.theta_rad);
     const S push = force + coupling_ * s * state.theta_radps * state.theta_radps;
     if (pivot_rests) {
       if (!cart_rests) rate.cart_mps = push / total_mass_;
@@ -359,7 +354,7 @@ class Dynamics {
       rate.theta_radps = turn / base_.inertia_about_pivot_kgm2;
       return;
     }
-    const S off_diagonal = coupling_ * cos(state.theta_rad);
+    const S off_diagonal = coupling_ * c;
     const S inverse_determinant =
         S(1.0) / (total_mass_ * base_.inertia_about_pivot_kgm2 - off_diagonal * off_diagonal);
     rate.cart_mps = (base_.inertia_about_pivot_kgm2 * push - off_diagonal * turn) * inverse_determinant;

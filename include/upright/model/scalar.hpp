@@ -35,6 +35,26 @@ inline bool is_plainly(double x, double number) {
   return x == number;
 }
 
+/// Both for the price of one, where a scalar has them so.
+template <class S>
+struct SineAndCosine {
+  S sine, cosine;
+};
+template <class S>
+SineAndCosine<S> sine_and_cosine(const S& angle) {
+  using std::cos;
+  using std::sin;
+  return {sin(angle), cos(angle)};
+}
+template <class S>
+requires requires(const S& x) {
+  x.v;
+}
+SineAndCosine<S> sine_and_cosine(const S& angle) {
+  const SineAndCosine<double> plain = sine_and_cosine(angle.a);
+  return {S(plain.sine, plain.cosine * angle.v), S(plain.cosine, -plain.sine * angle.v)};
+}
+
 template <class S>
 S absolute(const S& x) {
   return select(x < S(0.0), S(-x), x);

@@ -29,6 +29,7 @@ class EventEngine {
   /// Starts from a state at a time, at rest or moving, under `voltage_v` (after the input delay).
   void start(const PlantState<S>& state, double time_s = 0.0, const S& voltage_v = S(0.0)) {
     state_ = state;
+    seeded_ = false;
     time_s_ = time_s;
     halted_.reset();
     event_count_ = 0;
@@ -62,9 +63,10 @@ class EventEngine {
       const auto along = [&](double t) { return plain_step(t); };
       const auto found = first_event(plain_next, rate, value_of(step), held, along);
       if (!found) {
+        if (!quick) state_ = next;
         if constexpr (!std::is_same_v<S, double>)
-          if (quick) next = linearised_step(plain_next, step);
-        state_ = next;
+          if (quick) step_linearised(plain_next, step);
+        seeded_ = false;
         remaining = remaining - step;
         time_s_ += value_of(step);
         continue;
@@ -135,8 +137,25 @@ class EventEngine {
   /// velocity stays zero.
   void correct(const PlantState<S>& state) {
     state_ = state;
+    seeded_ = false;
     if (value_of(state.cart_mps) != 0.0) contacts_.cart = direction_of(value_of(state.cart_mps));
     if (value_of(state.theta_radps) != 0.0) contacts_.pivot = direction_of(value_of(state.theta_radps));
+  }
+  /// Forgets the derivatives of the state (dual numbers only) and gives it those by itself, in the order x,
+  /// theta, v, omega, bristle, which no parameter may have. Of what cannot move there are none, nor of the
+  /// velocity of a contact at rest, which forgets a push at once.
+  void seed() requires(!std::is_same_v<S, double>) {
+    const bool cart = !dynamics_.cart_locked(), pendulum = dynamics_.has_pendulum();
+    const auto set = [](S& number, int place, bool moves) {
+      number.v.setZero();
+      if (moves) number.v[place] = 1.0;
+    };
+    set(state_.cart_m, 0, cart);
+    set(state_.theta_rad, 1, pendulum);
+    set(state_.cart_mps, 2, cart && !cart_at_rest());
+    set(state_.theta_radps, 3, pendulum && !pivot_at_rest());
+    set(state_.bristle_m, 4, dynamics_.has_bristle_state());
+    seeded_ = true;
   }
   Contacts contacts() const { return contacts_; }
   double time_s() const { return time_s_; }
@@ -308,6 +327,15 @@ class EventEngine {
   struct Slopes {
     std::array<double, 4> cart_mps2{}, theta_radps2{};
   };
+  /// As the derivatives of `rate` say, of a state with its seeds.
+  static Slopes seeded_slopes(const PlantState<S>& rate) requires(!std::is_same_v<S, double>) {
+    Slopes slopes;
+    for (int i = 0; i < 4; ++i) {
+      slopes.cart_mps2[static_cast<std::size_t>(i)] = rate.cart_mps.v[i];
+      slopes.theta_radps2[static_cast<std::size_t>(i)] = rate.theta_radps.v[i];
+    }
+    return slopes;
+  }
   Slopes slopes_at(const PlantState<double>& middle, const PlantState<double>& rate) const {
     constexpr double aside = 1e-6;
     Slopes slopes;
@@ -326,32 +354,32 @@ class EventEngine {
     return slopes;
   }
 
-  /// The step that leads to `end`, with derivatives (dual numbers only): those of the motion that is linear
-  /// in the middle, x(h) = x + (h + h^2 A / 2 + h^3 A^2 / 6) (A x + b).
-  PlantState<S> linearised_step(const PlantState<double>& end, const S& h) const
-      requires(!std::is_same_v<S, double>) {
+  /// Steps to `end`, with derivatives (dual numbers only): those of the motion that is linear in the middle,
+  /// x(h) = x + (h + h^2 A / 2 + h^3 A^2 / 6) (A x + b).
+  void step_linearised(const PlantState<double>& end, const S& h) requires(!std::is_same_v<S, double>) {
     const PlantState<double> begin = plain_state(state_);
+    // The derivatives are taken in the middle, of the state as it is at the beginning.
     PlantState<double> middle;
-    const auto halfway = [&](double PlantState<double>::*of) { middle.*of = 0.5 * (begin.*of + end.*of); };
-    halfway(&PlantState<double>::cart_m);
-    halfway(&PlantState<double>::theta_rad);
-    halfway(&PlantState<double>::cart_mps);
-    halfway(&PlantState<double>::theta_radps);
-    PlantState<S> at = state_;
-    at.cart_m.a = middle.cart_m;
-    at.theta_rad.a = middle.theta_rad;
-    at.cart_mps.a = middle.cart_mps;
-    at.theta_radps.a = middle.theta_radps;
-    const PlantState<S> rate = dynamics_.derivative(at, drive_, contacts_);
+    const auto halfway = [&](double PlantState<double>::*of, S& number) {
+      number.a = middle.*of = 0.5 * (begin.*of + end.*of);
+    };
+    halfway(&PlantState<double>::cart_m, state_.cart_m);
+    halfway(&PlantState<double>::theta_rad, state_.theta_rad);
+    halfway(&PlantState<double>::cart_mps, state_.cart_mps);
+    halfway(&PlantState<double>::theta_radps, state_.theta_radps);
+    const PlantState<S> rate = dynamics_.derivative(state_, drive_, contacts_);
     const PlantState<double> plain_rate = plain_state(rate);
-    const Slopes slopes = slopes_at(middle, plain_rate);
     const double cart_moves = dynamics_.cart_locked() || cart_at_rest() ? 0.0 : 1.0;
     const double pivot_moves = !dynamics_.has_pendulum() || pivot_at_rest() ? 0.0 : 1.0;
+    // What has begun to move since then has no seed.
+    const bool all_seeded =
+        seeded_ && state_.cart_mps.v[2] == cart_moves && state_.theta_radps.v[3] == pivot_moves;
+    const Slopes slopes = all_seeded ? seeded_slopes(rate) : slopes_at(middle, plain_rate);
     // Derivatives of what follows: rate is A x + b, `second` A (A x + b), `third` A A (A x + b).
     using Slope = decltype(S::v);
-    const auto bend = [](const std::array<double, 4>& slope, const Slope& x, const Slope& theta,
-                         const Slope& v, const Slope& omega) -> Slope {
-      return slope[0] * x + slope[1] * theta + slope[2] * v + slope[3] * omega;
+    const auto bend = [](const std::array<double, 4>& slope, const auto& x, const auto& theta, const auto& v,
+                         const auto& omega) {
+      return std::decay_t<decltype(v)>(slope[0] * x + slope[1] * theta + slope[2] * v + slope[3] * omega);
     };
     const Slope second_v =
         bend(slopes.cart_mps2, rate.cart_m.v, rate.theta_rad.v, rate.cart_mps.v, rate.theta_radps.v);
@@ -362,25 +390,23 @@ class EventEngine {
     const Slope third_omega = bend(slopes.theta_radps2, second_x, second_theta, second_v, second_omega);
     const double length = h.a, half_square = 0.5 * length * length, cube = half_square * length / 3.0;
     const auto bent = [&](const std::array<double, 4>& slope) {
-      return slope[0] * plain_rate.cart_m + slope[1] * plain_rate.theta_rad + slope[2] * plain_rate.cart_mps +
-             slope[3] * plain_rate.theta_radps;
+      return bend(slope, plain_rate.cart_m, plain_rate.theta_rad, plain_rate.cart_mps,
+                  plain_rate.theta_radps);
     };
     // The length of the step may move too.
     const double v_rate = plain_rate.cart_mps + 0.5 * length * bent(slopes.cart_mps2);
     const double omega_rate = plain_rate.theta_radps + 0.5 * length * bent(slopes.theta_radps2);
-    PlantState<S> result = state_;
-    const auto set = [&](S& number, double value, const Slope& first, const Slope& second, const Slope& third,
+    const auto set = [&](S& number, double value, const Slope& first, const Slope& second, const auto& third,
                          double rate_at_end) {
       number.a = value;
       number.v += length * first + half_square * second + cube * third + rate_at_end * h.v;
     };
-    set(result.cart_m, end.cart_m, rate.cart_m.v, second_x, cart_moves * second_v, cart_moves * end.cart_mps);
-    set(result.theta_rad, end.theta_rad, rate.theta_rad.v, second_theta, pivot_moves * second_omega,
+    set(state_.cart_m, end.cart_m, rate.cart_m.v, second_x, cart_moves * second_v, cart_moves * end.cart_mps);
+    set(state_.theta_rad, end.theta_rad, rate.theta_rad.v, second_theta, pivot_moves * second_omega,
         pivot_moves * end.theta_radps);
-    set(result.cart_mps, end.cart_mps, rate.cart_mps.v, second_v, third_v, v_rate);
-    set(result.theta_radps, end.theta_radps, rate.theta_radps.v, second_omega, third_omega, omega_rate);
-    result.motor_v = drive_;
-    return result;
+    set(state_.cart_mps, end.cart_mps, rate.cart_mps.v, second_v, third_v, v_rate);
+    set(state_.theta_radps, end.theta_radps, rate.theta_radps.v, second_omega, third_omega, omega_rate);
+    state_.motor_v = drive_;
   }
 
   /// The same with plain numbers, from the present state.
@@ -493,6 +519,7 @@ class EventEngine {
       taken = taken + shift;
     }
     state_ = at;
+    seeded_ = false;
     time_s_ += found.after_s;
     enter(found.watch, held);
     return taken;
@@ -523,6 +550,7 @@ class EventEngine {
   ActuatorCorners<S> corners_;
   EngineOptions options_;
   PlantState<S> state_{};
+  bool seeded_ = false;  ///< the derivatives of the state are those by itself
   Contacts contacts_;
   S drive_{};
   Bristles bristles_;                  ///< at the beginning of this step
