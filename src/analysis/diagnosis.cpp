@@ -40,6 +40,8 @@ constexpr double parameter_price = 10.0;
 /// Two explanations whose evidence differs by less than this, or by less than its own scatter, are not told
 /// apart.
 constexpr double confusable_evidence = 16.0;
+/// However much it scatters, by this at most.
+constexpr double most_scattered = 10.0 * confusable_evidence;
 /// A correction of the plant file is there when it is this many standard errors from nothing.
 constexpr double least_correction_z = 4.0;
 /// What is left goes with something when it does so by this many standard errors: of a dozen dependences
@@ -812,6 +814,7 @@ class Diagnostician {
       declare(rival.instead_of, rival.effect);
       rivals.emplace_back(rival.effect, rival.plant);
     }
+    std::optional<double> sieved;
     for (const std::size_t effect : found_) {
       std::optional<Hypothesis> without;
       for (const std::size_t other : near_[effect]) {
@@ -820,13 +823,16 @@ class Diagnostician {
         if (!without) without = search_->without(current_, effect);
         if (!std::isfinite(without->train.objective)) break;
         Hypothesis rival = search_->screened(*without, other);
-        if (!std::isfinite(rival.train.objective)) continue;
+        search_->settle_on_sieve(rival);
+        if (!sieved) sieved = search_->sieved(current_).train.objective;
+        // So much worse on a part, it is no better on the whole.
+        if (!(rival.train.objective - *sieved < most_scattered)) continue;
         rival.train.point.noise = current_.train.point.noise;
         search_->refit(*without, rival);
         const Improvement worse = compare(rival, current_);
         if (!is_plausible(rival, other)) continue;
-        const bool same = worse.train < confusable_evidence ||
-                          (worse.train < 10.0 * confusable_evidence && worse.t_value < 2.0);
+        const bool same =
+            worse.train < confusable_evidence || (worse.train < most_scattered && worse.t_value < 2.0);
         if (!same) continue;
         declare(effect, other);
         rivals.emplace_back(other, rival.train.point.plant);

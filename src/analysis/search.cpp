@@ -97,7 +97,7 @@ Search::Search(const Plant& plant, const std::vector<Measurement>& runs, const F
     plant_.set(effect, std::vector<double>{effect_registry()[effect].parameters[0].neutral});
   }
   // Runs differ, segments of a run are alike: take them in turn.
-  constexpr std::size_t least_segments = 8, most_stride = 3;
+  constexpr std::size_t least_segments = 6, most_stride = 3;
   const std::size_t stride = std::clamp<std::size_t>(train_.segments.size() / least_segments, 1, most_stride);
   sieve_.runs = &runs;
   for (std::size_t s = 0; s < train_.segments.size(); s += stride) {
@@ -139,6 +139,19 @@ void Search::calm(Hypothesis& h, const FitOptions& options) {
   point.noise = calmed(point.noise);
   Hypothesis again = fitted(h.added, point, options, h.free);
   if (again.train.objective < h.train.objective) h = std::move(again);
+}
+
+bool Search::may_calm(const Hypothesis& base, const Hypothesis& h) const {
+  // Where every bit of evidence counts, the whole data are asked.
+  constexpr double clear_evidence = 1000.0;
+  if (sieve_.segments.size() == train_.segments.size()) return true;
+  if (!(base.train.objective - h.train.objective > clear_evidence)) return true;
+  FitPoint point = sieve_point(h);
+  const double as_it_is = fit(sieve_, point, h.free, screening()).objective;
+  point.noise = calmed(point.noise);
+  // What another way to the same place makes of an objective.
+  constexpr double of_the_way = 10.0;
+  return fit(sieve_, point, h.free, {}).objective < as_it_is - of_the_way;
 }
 
 void Search::judge(Hypothesis& h, const Noise& noise) const {
@@ -265,6 +278,10 @@ Hypothesis Search::screened_pair(const Hypothesis& base, const Hypothesis& first
   return h;
 }
 
+void Search::settle_on_sieve(Hypothesis& h) const {
+  if (std::isfinite(h.train.objective)) h.train = fit(sieve_, h.train.point, h.free, {});
+}
+
 Hypothesis Search::sieved(const Hypothesis& base) const {
   FitOptions options = screening();
   options.most_iterations = 2;
@@ -287,7 +304,7 @@ void Search::refit(const Hypothesis& base, Hypothesis& h) {
 void Search::refine(const Hypothesis& base, Hypothesis& h) {
   if (!std::isfinite(h.train.objective)) return;
   refit(base, h);
-  calm(h, {});
+  if (may_calm(base, h)) calm(h, {});
   weigh(h);
 }
 

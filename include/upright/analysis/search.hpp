@@ -51,6 +51,8 @@ class Search {
   /// Adds an effect to a hypothesis: a few steps from every start with the noise as it is, on a part of the
   /// training data.
   Hypothesis screened(const Hypothesis& base, std::size_t effect) const;
+  /// Brings a screened hypothesis to convergence on that part, noise included.
+  void settle_on_sieve(Hypothesis& screened) const;
   /// Two effects at once on that part, from where each alone was fitted, to convergence.
   Hypothesis screened_pair(const Hypothesis& base, const Hypothesis& first, const Hypothesis& second) const;
   /// A hypothesis on that part alone, with which to compare.
@@ -95,6 +97,9 @@ class Search {
   std::vector<std::pair<double, double>> force_residual(const Hypothesis& base) const;
   /// Fits once more from less noise, and keeps what is better: much noise and a poor fit hold each other up.
   void calm(Hypothesis& h, const FitOptions& options);
+  /// Whether a fit from less noise may find better: of what is far better than `base`, as a part of the
+  /// training data says.
+  bool may_calm(const Hypothesis& base, const Hypothesis& h) const;
   Hypothesis fitted(const std::set<std::size_t>& added, const FitPoint& start, const FitOptions& options,
                     const std::vector<FreeParameter>& free);
 
