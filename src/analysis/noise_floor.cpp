@@ -6,6 +6,8 @@
 #include <random>
 #include <vector>
 
+#include "upright/analysis/parallel.hpp"
+
 namespace upright {
 
 namespace {
@@ -81,24 +83,34 @@ std::array<double, 2> draw(const std::vector<LinearStep>& steps, const std::arra
 
 }  // namespace
 
-double simulation_floor(const FitData& data, const FitPoint& point) {
+SimulationFloor simulation_floor(const FitData& data, const FitPoint& point) {
   FitPoint plain = point;
   plain.noise.force = plain.noise.torque = 0.0;
   plain.noise.sensors = 1.0;
   const std::vector<std::vector<LinearStep>> steps = linearise(data, plain);
-  constexpr int draws = 16;
-  std::mt19937_64 random(1);
-  double sum = 0.0, count = 0.0;
-  for (std::size_t s = 0; s < steps.size(); ++s) {
-    const Measurement& run = (*data.runs)[data.segments[s].run];
-    const std::array<bool, 2> present = {run.has_cart(), run.has_theta() && point.plant.pendulum.has_value()};
-    for (int i = 0; i < draws; ++i) {
-      const std::array<double, 2> sums = draw(steps[s], present, point.noise, random);
-      sum += sums[0];
-      count += sums[1];
+  constexpr std::size_t draws = 32;
+  std::array<double, draws> sums{};
+  double count = 0.0;
+  parallel_for(draws, [&](std::size_t i) {
+    std::mt19937_64 random(i + 1);
+    double counted = 0.0;
+    for (std::size_t s = 0; s < steps.size(); ++s) {
+      const Measurement& run = (*data.runs)[data.segments[s].run];
+      const std::array<double, 2> drawn =
+          draw(steps[s], {run.has_cart(), run.has_theta() && point.plant.pendulum.has_value()}, point.noise,
+               random);
+      sums[i] += drawn[0];
+      counted += drawn[1];
     }
+    if (i == 0) count = counted;
+  });
+  if (!(count > 0.0)) return {};
+  double all = 0.0, most = 0.0;
+  for (const double sum : sums) {
+    all += sum / draws;
+    most = std::max(most, sum);
   }
-  return count > 0.0 ? std::max(1.0, std::sqrt(sum / count)) : 1.0;
+  return {std::max(1.0, std::sqrt(all / count)), std::max(1.0, std::sqrt(most / count))};
 }
 
 }  // namespace upright

@@ -302,6 +302,16 @@ double kurtosis_of(const std::vector<double>& values) {
   return n > 30.0 && second > 0.0 ? fourth * n / (second * second) : 3.0;
 }
 
+/// Standard deviation of numbers that are Gaussian but for a few.
+double robust_deviation(std::vector<double> values) {
+  if (values.empty()) return 0.0;
+  for (double& v : values) v = std::abs(v);
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  constexpr double median_of_gaussian = 0.6745;
+  return *middle / median_of_gaussian;
+}
+
 /// How certainly the residual goes with a probe, by the scatter of its scores over blocks: honest where the
 /// innovations are not white.
 double certainty_of(const std::vector<Score>& scores) {
@@ -336,6 +346,8 @@ ResidualStructure examine_residuals(const FitData& data, const FitPoint& point) 
         blocks.rms[blocks.rms.size() * 95 / 100] / std::max(blocks.rms[blocks.rms.size() / 2], 1e-12);
   }
   result.tails = std::max(kurtosis_of(blocks.pulses[0]), kurtosis_of(blocks.pulses[1]));
+  result.slow_force = std::max(1.0, robust_deviation(blocks.pulses[0]));
+  result.slow_torque = std::max(1.0, robust_deviation(blocks.pulses[1]));
   for (std::size_t i = 0; i < probes.size(); ++i) {
     const double certainty = certainty_of(blocks.probe[i]);
     if (certainty <= result.certainty) continue;
@@ -344,6 +356,12 @@ ResidualStructure examine_residuals(const FitData& data, const FitPoint& point) 
     result.in_pendulum = probes[i].torque;
   }
   return result;
+}
+
+Noise as_slow_as_left(Noise noise, const ResidualStructure& structure) {
+  noise.force *= structure.slow_force;
+  noise.torque *= structure.slow_torque;
+  return noise;
 }
 
 }  // namespace upright

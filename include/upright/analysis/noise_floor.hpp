@@ -9,6 +9,10 @@ namespace upright {
 /// in units of the sensors' noise: 1 without disturbances. `point` holds the plant, starts for the segments
 /// and the noise; disturbances are drawn from it (always the same ones) and carried along the linearised
 /// motion.
-double simulation_floor(const FitData& data, const FitPoint& point);
+struct SimulationFloor {
+  double usual = 1.0;    ///< root mean square over all draws
+  double highest = 1.0;  ///< of one draw along all segments, as chance makes it at most in some dozens
+};
+SimulationFloor simulation_floor(const FitData& data, const FitPoint& point);
 
 }  // namespace upright

@@ -4,6 +4,7 @@
 // goes with the voltage whatever it is):
 // - dispersion: the whitened innovations of short blocks are as large everywhere as chance allows;
 // - tails: short pulses of force or torque, fitted block by block, have no heavier tails than a Gaussian;
+// - colour: over a tenth of a second and more force and torque are not much larger than as white noise;
 // - dependence: forces that no effect of the registry has (that drift with time, friction that changes with
 // time,
 //   what fades after a reversal) do not show.
@@ -13,20 +14,28 @@
 #include <vector>
 
 #include "upright/analysis/diagnosis.hpp"
+#include "upright/analysis/fit.hpp"
 
 namespace upright {
 
 struct ResidualStructure {
   double noise_ratio = 1.0;  ///< rms of a plain simulation's residual over the sensors' noise
-  double excess = 1.0;       ///< the same over what noise like what is left would make of it
+  double excess = 1.0;       ///< the same over what noise like what is left makes of it at most
   double dispersion = 1.0;   ///< 95th percentile of block rms over its median
   double tails = 3.0;        ///< kurtosis of the pulses
   double certainty = 0.0;    ///< of the dependence that shows most [standard errors]
   std::string goes_with;     ///< that dependence
   bool in_pendulum = false;  ///< it is a torque, not a force
+  /// How much larger slow force and torque are, a few hertz and below, than white noise that accounts for the
+  /// samples: a disturbance whose colour the filter does not know is estimated where the samples show it
+  /// best, and a plain simulation is moved by what is slow. At least 1.
+  double slow_force = 1.0, slow_torque = 1.0;
   bool structured = false;
   std::string sentence;
 };
+
+/// White noise that moves a plain simulation as what is left does.
+Noise as_slow_as_left(Noise noise, const ResidualStructure& structure);
 
 /// Examines what a fit leaves at `point`.
 ResidualStructure examine_residuals(const FitData& data, const FitPoint& point);
