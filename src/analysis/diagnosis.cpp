@@ -44,9 +44,9 @@ constexpr double confusable_evidence = 16.0;
 constexpr double most_scattered = 10.0 * confusable_evidence;
 /// A correction of the plant file is there when it is this many standard errors from nothing.
 constexpr double least_correction_z = 4.0;
-/// What is left goes with something when it does so by this many standard errors: of a dozen dependences
-/// tried, chance makes none.
-constexpr double least_dependence = 4.0;
+/// What is left goes with something when it does so by this many standard errors: of the dozen dependences
+/// that are tried, chance makes one in two hundred times.
+constexpr double least_dependence = 3.5;
 /// A plain simulation may be this many times as far off as noise like what is left makes it at most.
 constexpr double most_excess = 2.0;
 /// What is left may push this many times as hard over a tenth of a second and more as white noise that
@@ -55,6 +55,9 @@ constexpr double most_excess = 2.0;
 constexpr double slowest = 2.5;
 constexpr int most_rounds = 4;
 constexpr std::size_t finalists = 4;
+/// What gains this share of what the best does may be the same thing by another name, or half of it.
+constexpr double resembles = 0.3;
+constexpr std::size_t most_resembling = 8;
 
 std::string kind_of(std::size_t effect) {
   return std::string(effect_registry()[effect].kind);
@@ -155,10 +158,10 @@ class Diagnostician {
       throw ConfigError("check the plant file: the model cannot be simulated with these runs");
     current_ = given_;
     grow();
-    try_pairs();
-    prune();
-    settle_corrections();
-    conclude();
+    try_pairs(finalists_);
+    ResidualStructure left = settle();
+    if (left.structured && try_pairs(resembling_)) left = settle();
+    conclude(left);
     return std::move(result_);
   }
 
@@ -365,6 +368,11 @@ class Diagnostician {
       for (std::size_t i = 0; i < ranking.size(); ++i) ranking[i] = i;
       std::stable_sort(ranking.begin(), ranking.end(),
                        [&](std::size_t a, std::size_t b) { return screened[a].first > screened[b].first; });
+      if (round == 0)
+        for (const std::size_t i : ranking)
+          if (resembling_.size() < most_resembling &&
+              screened[i].first > resembles * screened[ranking[0]].first)
+            resembling_.emplace_back(candidates[i], screened[i].second);
       std::vector<Believed> believed;
       constexpr double of_best = 0.05;  // what a whole fit does not make up for
       for (std::size_t place = 0; place < std::min(finalists, ranking.size()); ++place) {
@@ -403,7 +411,8 @@ class Diagnostician {
       const auto winner = std::find(candidates.begin(), candidates.end(), best_effect) - candidates.begin();
       const double winning = screened[static_cast<std::size_t>(winner)].first;
       for (std::size_t i = 0; i < candidates.size(); ++i)
-        if (candidates[i] != best_effect && screened[i].first > 0.3 * winning) near.push_back(candidates[i]);
+        if (candidates[i] != best_effect && screened[i].first > resembles * winning)
+          near.push_back(candidates[i]);
       record_step();
       while (exchange()) {
       }
@@ -452,20 +461,20 @@ class Diagnostician {
   }
 
   /// Two effects can hide each other, so that a third, which resembles both, is found instead. Every pair of
-  /// the first round's best candidates is tried in the place of what was found of them.
-  void try_pairs() {
-    if (finalists_.size() < 2) return;
+  /// these is tried in the place of what was found of them, once. Whether one is better.
+  bool try_pairs(const std::vector<std::pair<std::size_t, Hypothesis>>& contenders) {
     std::optional<Hypothesis> best;
     std::vector<std::size_t> best_found;
-    for (std::size_t a = 0; a < finalists_.size(); ++a)
-      for (std::size_t b = a + 1; b < finalists_.size(); ++b) {
-        const std::size_t first = finalists_[a].first, second = finalists_[b].first;
+    for (std::size_t a = 0; a < contenders.size(); ++a)
+      for (std::size_t b = a + 1; b < contenders.size(); ++b) {
+        const std::size_t first = contenders[a].first, second = contenders[b].first;
         if (found_.size() > 2 || (found_.size() == 2 && is_found(first) && is_found(second))) continue;
+        if (!paired_.insert(std::minmax(first, second)).second) continue;
         tell(0.83, "trying " + kind_of(first) + " with " + kind_of(second));
         const Hypothesis& so_far = best ? *best : current_;
-        const Hypothesis quick = search_->screened_pair(given_, finalists_[a].second, finalists_[b].second);
+        const Hypothesis quick = search_->screened_pair(given_, contenders[a].second, contenders[b].second);
         if (!(quick.train.objective < search_->sieved(so_far).train.objective)) continue;
-        Hypothesis h = search_->with_pair(given_, finalists_[a].second, finalists_[b].second);
+        Hypothesis h = search_->with_pair(given_, contenders[a].second, contenders[b].second);
         const Improvement improvement = compare(so_far, h);
         const double price = parameter_price * static_cast<double>(h.free.size() - current_.free.size());
         if (improvement.train - price < least_evidence || improvement.held < 0.0) continue;
@@ -475,12 +484,23 @@ class Diagnostician {
         best = std::move(h);
         best_found = {first, second};
       }
-    if (!best) return;
+    if (!best) return false;
     for (const std::size_t effect : best_found)
       if (!where_.contains(effect)) where_[effect] = where_.empty() ? locate(given_) : where_.begin()->second;
     current_ = std::move(*best);
     found_ = best_found;
     record_step();
+    return true;
+  }
+
+  /// Drops what is not needed, settles the corrections, and looks at what is left.
+  ResidualStructure settle() {
+    prune();
+    settle_corrections();
+    tell(0.92, "measuring the gap");
+    ResidualStructure left = examine();
+    if (!left.structured) compare_held_out(left);
+    return left;
   }
 
   /// Backward deletion: what is no longer needed once others are there goes.
@@ -607,13 +627,12 @@ class Diagnostician {
       opened.emplace_back(-gap_of(h), effect);
     }
     std::sort(opened.begin(), opened.end());
+    corrections_.clear();
     for (const auto& [gap, effect] : opened) corrections_.push_back(effect);
   }
 
-  void conclude() {
-    tell(0.92, "measuring the gap");
-    ResidualStructure structure = examine();
-    if (!structure.structured) compare_held_out(structure);
+  void conclude(const ResidualStructure& structure) {
+    tell(0.93, "measuring the gap");
     result_.noise = known_.train.point.noise;
     const std::vector<std::size_t> all = all_found();
     const Noise& fitted_noise = final_.train.point.noise;
@@ -882,6 +901,8 @@ class Diagnostician {
   std::map<std::size_t, std::vector<std::size_t>> near_;
   std::map<std::size_t, std::string> where_;
   std::vector<std::pair<std::size_t, Hypothesis>> finalists_;
+  std::vector<std::pair<std::size_t, Hypothesis>> resembling_;  ///< screened, of the first round
+  std::set<std::pair<std::size_t, std::size_t>> paired_;        ///< tried already
   Diagnosis result_;
 };
 

@@ -105,12 +105,9 @@ SimulationFloor simulation_floor(const FitData& data, const FitPoint& point) {
     if (i == 0) count = counted;
   });
   if (!(count > 0.0)) return {};
-  double all = 0.0, most = 0.0;
-  for (const double sum : sums) {
-    all += sum / draws;
-    most = std::max(most, sum);
-  }
-  return {std::max(1.0, std::sqrt(all / count)), std::max(1.0, std::sqrt(most / count))};
+  std::sort(sums.begin(), sums.end());
+  const auto as_rms = [&](double sum) { return std::max(1.0, std::sqrt(sum / count)); };
+  return {as_rms(sums[draws / 2]), as_rms(sums[draws - 1])};
 }
 
 }  // namespace upright

@@ -6,13 +6,14 @@
 namespace upright {
 
 /// Root mean square of what disturbances and sensors make of a plain simulation with fitted initial states,
-/// in units of the sensors' noise: 1 without disturbances. `point` holds the plant, starts for the segments
-/// and the noise; disturbances are drawn from it (always the same ones) and carried along the linearised
-/// motion.
+/// in units of the sensors' noise: 1 without disturbances.
 struct SimulationFloor {
-  double usual = 1.0;    ///< root mean square over all draws
-  double highest = 1.0;  ///< of one draw along all segments, as chance makes it at most in some dozens
+  double usual = 1.0;    ///< in the middle of all draws
+  double highest = 1.0;  ///< the largest of some dozens
 };
+
+/// `point` holds the plant, starts for the segments and the noise; disturbances are drawn from it (always the
+/// same ones) and carried along the linearised motion.
 SimulationFloor simulation_floor(const FitData& data, const FitPoint& point);
 
 }  // namespace upright
