@@ -259,21 +259,37 @@ class Diagnostician {
     return improvement.t_value > least_t || evidence > overwhelming_evidence;
   }
 
-  /// How far off a plain simulation of held-out runs is, in units of the sensors' noise.
-  double simulation_gap(Hypothesis& h) const {
-    if (!h.simulation_gap) {
+  const PlainSimulation& simulation(Hypothesis& h) const {
+    if (!h.simulation) {
       Hypothesis plain = h;
       search_->judge(plain, sensor_noise(h));
-      h.simulation_gap = gap_of(plain);
+      const FitResult& simulated = held_.segments.empty() ? plain.train : plain.held;
+      h.simulation.emplace(PlainSimulation{gap_of(plain), {}});
+      for (std::size_t s = 0; s < simulated.segment_chi_square.size(); ++s)
+        h.simulation->segment_gap.push_back(
+            std::sqrt(simulated.segment_chi_square[s] / std::max(simulated.segment_samples[s], 1e-9)));
     }
-    return *h.simulation_gap;
+    return *h.simulation;
   }
+  double simulation_gap(Hypothesis& h) const { return simulation(h).gap; }
 
-  /// Forces that look right a sample ahead can simulate badly: then the name is wrong.
+  /// Forces that look right a sample ahead can simulate badly: then the name is wrong. By how much segments
+  /// are further off, as far as their number can show it: while more is missing, one and the other come out
+  /// better or worse by half.
   bool simulates_as_well(Hypothesis& h) {
-    constexpr double by_chance = 1.1;
     if (held_.segments.empty()) return true;
-    return simulation_gap(h) < by_chance * simulation_gap(current_);
+    const std::vector<double>& now = simulation(h).segment_gap;
+    const std::vector<double>& before = simulation(current_).segment_gap;
+    const auto n = static_cast<double>(now.size());
+    double mean = 0.0, square = 0.0;
+    for (std::size_t s = 0; s < now.size(); ++s) {
+      const double worse = std::log(std::max(now[s], 1e-9) / std::max(before[s], 1e-9));
+      mean += worse / n;
+      square += worse * worse / n;
+    }
+    constexpr double by_chance = 0.1, least_scatter = 0.5;
+    const double scatter = std::max(least_scatter, std::sqrt(std::max(square - mean * mean, 0.0)));
+    return mean < by_chance + scatter / std::sqrt(n);
   }
 
   /// Where a hypothesis and the data disagree most: in which equation, with what it goes, and when.

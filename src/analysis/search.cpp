@@ -199,7 +199,7 @@ Hypothesis Search::told(const Hypothesis& h) const {
   Hypothesis result = h;
   result.train.point.plant = held.point.plant;
   result.held = held;
-  result.simulation_gap.reset();
+  result.simulation.reset();
   return result;
 }
 
@@ -363,7 +363,7 @@ Hypothesis Search::on_all(const Hypothesis& h) const {
   FitPoint point = h.train.point;
   point.starts.insert(point.starts.end(), h.held.point.starts.begin(), h.held.point.starts.end());
   Hypothesis result = h;
-  result.simulation_gap.reset();
+  result.simulation.reset();
   result.train = fit(all, point, h.free, FitOptions{});
   result.valid = std::isfinite(result.train.objective);
   return result.valid ? result : h;

@@ -10,6 +10,12 @@
 
 namespace upright {
 
+/// A plain simulation of held-out data, in units of the sensors' noise.
+struct PlainSimulation {
+  double gap = 0.0;                 ///< root mean square of all that is off
+  std::vector<double> segment_gap;  ///< the same, by segment
+};
+
 /// A set of effects fitted to the training data and judged on held-out data.
 struct Hypothesis {
   std::set<std::size_t> added;  ///< effects freed beyond what the plant file says
@@ -18,9 +24,9 @@ struct Hypothesis {
   double surprise = 0.0;  ///< of the held-out data: minus twice the log of their likelihood, with noise of
                           ///< their own, averaged over what the training data leave open of the parameters;
                           ///< not of what `only` and `on_all` made
-  std::vector<FreeParameter> free;       ///< the parameters that moved, in the order of train.covariance
-  bool valid = false;                    ///< fitted, and no parameter at a bound that makes it another effect
-  std::optional<double> simulation_gap;  ///< of held-out data by a plain simulation, once measured
+  std::vector<FreeParameter> free;  ///< the parameters that moved, in the order of train.covariance
+  bool valid = false;               ///< fitted, and no parameter at a bound that makes it another effect
+  std::optional<PlainSimulation> simulation;  ///< once measured
 };
 
 /// How much better one hypothesis is than another, robust to residuals that are not white: sums over blocks
