@@ -47,6 +47,8 @@ constexpr double least_correction_z = 4.0;
 /// What is left goes with something when it does so by this many standard errors: of the dozen dependences
 /// that are tried, chance makes one in two hundred times.
 constexpr double least_dependence = 3.5;
+/// Kurtosis of the pulses of a disturbance that does not come in bursts. A Gaussian's is 3.
+constexpr double heaviest_tails = 5.5;
 /// A plain simulation may be this many times as far off as noise like what is left makes it at most.
 constexpr double most_excess = 2.0;
 /// What is left may push this many times as hard over a tenth of a second and more as white noise that
@@ -238,6 +240,19 @@ class Diagnostician {
            std::sqrt(std::max(held, 1.0));
   }
 
+  /// Whether the size of an effect is certain. A fit that is less certain than its evidence says has not
+  /// arrived: it goes on first.
+  bool is_certain(Hypothesis& h, std::size_t effect) {
+    const double so_far = certainty(h, effect);
+    if (so_far >= least_certainty) return true;
+    constexpr double of_noise_not_white = 4.0;
+    if (compare(current_, h).train < of_noise_not_white * std::max(so_far * so_far, 1.0)) return false;
+    Hypothesis further = h;
+    search_->refine(h, further);
+    if (further.train.objective < h.train.objective) h = std::move(further);
+    return certainty(h, effect) >= least_certainty;
+  }
+
   /// Gives the simpler hypothesis the richer one's noise to start from, so that a better estimate of the
   /// noise is not taken for an effect. What `current_` becomes is at least as good as before.
   void level_noise(const Hypothesis& richer) {
@@ -409,9 +424,9 @@ class Diagnostician {
           if (!is_believed(improvement, candidates[i])) continue;
         }
         const bool correction = current_.train.point.plant.find(candidates[i]) != nullptr;
-        if (!correction && certainty(h, candidates[i]) < least_certainty) continue;
+        if (!correction && !is_certain(h, candidates[i])) continue;
         if (!simulates_as_well(h)) continue;
-        const double score = improvement.train - price_of(candidates[i]);
+        const double score = compare(current_, h).train - price_of(candidates[i]);
         believed.push_back({candidates[i], std::move(h), score});
       }
       if (believed.empty()) return;
@@ -761,9 +776,9 @@ class Diagnostician {
       s.structured = true;
       text << "what is left comes in bursts: some stretches are " << s.dispersion
            << " times as far off as most";
-    } else if (s.tails > 5.5) {
+    } else if (s.tails.kurtosis > heaviest_tails && s.tails.certainty > least_dependence) {
       s.structured = true;
-      text << "what is left comes in bursts: short pulses of force have a kurtosis of " << s.tails
+      text << "what is left comes in bursts: short pulses of force have a kurtosis of " << s.tails.kurtosis
            << ", chance gives 3 (largest blocks " << s.dispersion << " times the median, dependence "
            << s.certainty << " standard errors)";
     } else if (std::max(s.slow_force, s.slow_torque) > slowest) {
@@ -786,7 +801,7 @@ class Diagnostician {
       text << "what is left is a disturbance that is the same all along and goes with nothing that was "
               "measured "
               "(largest blocks "
-           << s.dispersion << " times the median, kurtosis of pulses " << s.tails << ", dependence "
+           << s.dispersion << " times the median, kurtosis of pulses " << s.tails.kurtosis << ", dependence "
            << s.certainty << " standard errors, simulation " << s.excess
            << " times as far off as such noise makes it at most, slow pushes "
            << std::max(s.slow_force, s.slow_torque) << " times)";

@@ -18,11 +18,17 @@
 
 namespace upright {
 
+/// How heavy the tails of a distribution are.
+struct Tails {
+  double kurtosis = 3.0;   ///< 3: as a Gaussian's
+  double certainty = 0.0;  ///< that they are heavier [standard errors of so many numbers]
+};
+
 struct ResidualStructure {
   double noise_ratio = 1.0;  ///< rms of a plain simulation's residual over the sensors' noise
   double excess = 1.0;       ///< the same over what noise like what is left makes of it at most
   double dispersion = 1.0;   ///< 95th percentile of block rms over its median
-  double tails = 3.0;        ///< kurtosis of the pulses
+  Tails tails;               ///< of the pulses
   double certainty = 0.0;    ///< of the dependence that shows most [standard errors]
   std::string goes_with;     ///< that dependence
   bool in_pendulum = false;  ///< it is a torque, not a force
