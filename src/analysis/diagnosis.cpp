@@ -159,10 +159,11 @@ class Diagnostician {
     if (!std::isfinite(given_.train.objective))
       throw ConfigError("check the plant file: the model cannot be simulated with these runs");
     current_ = given_;
-    grow();
+    grow(0, most_rounds, false);
     try_pairs(finalists_);
     ResidualStructure left = settle();
     if (left.structured && try_pairs(resembling_)) left = settle();
+    if (left.structured && grow(most_rounds, 2 * most_rounds, true)) left = settle();
     conclude(left);
     return std::move(result_);
   }
@@ -181,10 +182,11 @@ class Diagnostician {
 
   /// Those that promise a share of what the best one does, some at least, and all that cannot promise. A
   /// promise is kept within a factor of a few (measured on the matrix), so that the best is among them.
-  std::vector<std::size_t> promising(const std::vector<std::size_t>& candidates, int round) {
+  std::vector<std::size_t> promising(const Hypothesis& from, const std::vector<std::size_t>& candidates,
+                                     int round) {
     constexpr double share = 0.1;
     constexpr std::size_t least_count = 8;
-    const std::vector<double> promised = search_->promised_gains(current_, candidates);
+    const std::vector<double> promised = search_->promised_gains(from, candidates);
     std::vector<std::size_t> ranking(candidates.size());
     std::iota(ranking.begin(), ranking.end(), std::size_t{0});
     std::stable_sort(ranking.begin(), ranking.end(),
@@ -238,6 +240,27 @@ class Diagnostician {
     const double held = correlation.completeOrthogonalDecomposition().pseudoInverse()(0, 0);
     return std::abs(h.train.point.plant.find(effect)->values[0] - nothing) / scale[0] *
            std::sqrt(std::max(held, 1.0));
+  }
+
+  /// Evidence on the training runs that only something missing can hold against: held-out runs may excite
+  /// what is missing still, and speak against a right effect until it is found too.
+  static bool is_overwhelming(const Improvement& improvement, std::size_t effect) {
+    return improvement.train - price_of(effect) > overwhelming_evidence && improvement.t_value > least_t;
+  }
+
+  /// What held-out runs spoke against while more was missing must have them on its side in the end, or all
+  /// that was added since goes.
+  void end_doubt() {
+    if (!standing_) return;
+    Hypothesis grown = std::move(current_);
+    current_ = std::move(standing_->hypothesis);
+    if (compare(current_, grown).held > 0.0 && simulates_as_well(grown)) {
+      current_ = std::move(grown);
+    } else {
+      found_ = std::move(standing_->found);
+      record_step();
+    }
+    standing_.reset();
   }
 
   /// Whether the size of an effect is certain. A fit that is less certain than its evidence says has not
@@ -342,6 +365,12 @@ class Diagnostician {
     result_.trials.push_back(trial);
   }
 
+  /// What was found before an effect was added that held-out runs spoke against.
+  struct Standing {
+    Hypothesis hypothesis;
+    std::vector<std::size_t> found;
+  };
+
   /// An effect that might be added, and what it saves beyond its price.
   struct Believed {
     std::size_t effect = 0;
@@ -380,74 +409,97 @@ class Diagnostician {
     return chosen;
   }
 
-  /// Adds effects one at a time, the best first, for as long as the data ask for one.
-  void grow() {
-    for (int round = 0; round < most_rounds; ++round) {
-      tell(0.05 + 0.2 * round, "looking for what is missing");
-      const std::vector<std::size_t> candidates = promising(open_candidates(), round);
-      std::vector<std::pair<double, Hypothesis>> screened;
-      const double sieved = search_->sieved(current_).train.objective;
-      for (std::size_t c = 0; c < candidates.size(); ++c) {
-        tell(0.07 + 0.2 * round + 0.1 * static_cast<double>(c) / static_cast<double>(candidates.size()),
-             "trying " + kind_of(candidates[c]));
-        Hypothesis h = search_->screened(current_, candidates[c]);
-        const double gain = sieved - h.train.objective - price_of(candidates[c]);
-        if (round == 0) result_.candidates.push_back({candidates[c], 0.0, std::max(gain, 0.0)});
-        screened.emplace_back(gain, std::move(h));
+  /// Adds effects one at a time, the best first, for as long as the data ask for one. `calmly`: as they show
+  /// with little noise, for much noise can account for the whole of an effect. Whether one was added.
+  bool grow(int first_round, int last_round, bool calmly) {
+    const std::vector<std::size_t> before = found_;
+    for (int round = first_round; round < last_round && add_best(round, calmly); ++round) {
+    }
+    end_doubt();
+    return found_ != before;
+  }
+
+  /// One round: whether an effect was added.
+  bool add_best(int round, bool calmly) {
+    const double done = std::min(0.05 + 0.2 * round, 0.7);
+    tell(done, "looking for what is missing");
+    Hypothesis from = current_;
+    if (calmly) from.train.point.noise = calmed(from.train.point.noise);
+    const std::vector<std::size_t> candidates = promising(from, open_candidates(), round);
+    std::vector<std::pair<double, Hypothesis>> screened;
+    const double sieved = search_->sieved(from).train.objective;
+    for (std::size_t c = 0; c < candidates.size(); ++c) {
+      tell(done + 0.02 + 0.1 * static_cast<double>(c) / static_cast<double>(candidates.size()),
+           "trying " + kind_of(candidates[c]));
+      Hypothesis h = search_->screened(from, candidates[c]);
+      const double gain = sieved - h.train.objective - price_of(candidates[c]);
+      if (round == 0) result_.candidates.push_back({candidates[c], 0.0, std::max(gain, 0.0)});
+      screened.emplace_back(gain, std::move(h));
+    }
+    std::vector<std::size_t> ranking(candidates.size());
+    for (std::size_t i = 0; i < ranking.size(); ++i) ranking[i] = i;
+    std::stable_sort(ranking.begin(), ranking.end(),
+                     [&](std::size_t a, std::size_t b) { return screened[a].first > screened[b].first; });
+    if (round == 0)
+      for (const std::size_t i : ranking)
+        if (resembling_.size() < most_resembling &&
+            screened[i].first > resembles * screened[ranking[0]].first)
+          resembling_.emplace_back(candidates[i], screened[i].second);
+    std::vector<Believed> believed, doubtful;
+    constexpr double of_best = 0.05;  // what a whole fit does not make up for
+    for (std::size_t place = 0; place < std::min(finalists, ranking.size()); ++place) {
+      const std::size_t i = ranking[place];
+      if (screened[i].first < std::max(0.4 * least_evidence, of_best * screened[ranking[0]].first)) break;
+      tell(done + 0.12 + 0.08 * static_cast<double>(place) / finalists, "fitting " + kind_of(candidates[i]));
+      Hypothesis h = screened[i].second;
+      search_->refine(current_, h);
+      if (round == 0) simulation_gap(h);
+      if (round == 0) finalists_.emplace_back(candidates[i], h);
+      Improvement improvement = compare(current_, h);
+      record_trial(round, candidates[i], h, improvement);
+      if (!is_plausible(h, candidates[i])) continue;
+      if (!is_believed(improvement, candidates[i])) {
+        if (is_overwhelming(improvement, candidates[i]) && is_certain(h, candidates[i]))
+          doubtful.push_back({candidates[i], h, improvement.train - price_of(candidates[i])});
+        continue;
       }
-      std::vector<std::size_t> ranking(candidates.size());
-      for (std::size_t i = 0; i < ranking.size(); ++i) ranking[i] = i;
-      std::stable_sort(ranking.begin(), ranking.end(),
-                       [&](std::size_t a, std::size_t b) { return screened[a].first > screened[b].first; });
-      if (round == 0)
-        for (const std::size_t i : ranking)
-          if (resembling_.size() < most_resembling &&
-              screened[i].first > resembles * screened[ranking[0]].first)
-            resembling_.emplace_back(candidates[i], screened[i].second);
-      std::vector<Believed> believed;
-      constexpr double of_best = 0.05;  // what a whole fit does not make up for
-      for (std::size_t place = 0; place < std::min(finalists, ranking.size()); ++place) {
-        const std::size_t i = ranking[place];
-        if (screened[i].first < std::max(0.4 * least_evidence, of_best * screened[ranking[0]].first)) break;
-        tell(0.17 + 0.2 * round + 0.08 * static_cast<double>(place) / finalists,
-             "fitting " + kind_of(candidates[i]));
-        Hypothesis h = screened[i].second;
-        search_->refine(current_, h);
-        if (round == 0) simulation_gap(h);
-        if (round == 0) finalists_.emplace_back(candidates[i], h);
-        Improvement improvement = compare(current_, h);
-        record_trial(round, candidates[i], h, improvement);
-        if (!is_plausible(h, candidates[i]) || !is_believed(improvement, candidates[i])) continue;
-        if (improvement.train < overwhelming_evidence) {
-          level_noise(h);
-          improvement = compare(current_, h);
-          if (!is_believed(improvement, candidates[i])) continue;
-        }
-        const bool correction = current_.train.point.plant.find(candidates[i]) != nullptr;
-        if (!correction && !is_certain(h, candidates[i])) continue;
-        if (!simulates_as_well(h)) continue;
-        const double score = compare(current_, h).train - price_of(candidates[i]);
+      if (improvement.train < overwhelming_evidence) {
+        level_noise(h);
+        improvement = compare(current_, h);
+        if (!is_believed(improvement, candidates[i])) continue;
+      }
+      const bool correction = current_.train.point.plant.find(candidates[i]) != nullptr;
+      if (!correction && !is_certain(h, candidates[i])) continue;
+      const double score = compare(current_, h).train - price_of(candidates[i]);
+      if (simulates_as_well(h)) {
         believed.push_back({candidates[i], std::move(h), score});
-      }
-      if (believed.empty()) return;
-      Believed& best = believed[choose(believed)];
-      const std::size_t best_effect = best.effect;
-      for (Trial& trial : result_.trials)
-        if (trial.round == static_cast<std::size_t>(round) && trial.effect == best_effect) trial.taken = true;
-      where_[best_effect] = locate(current_);
-      current_ = std::move(best.hypothesis);
-      found_.push_back(best_effect);
-      // What gained a fair share of the same may be the same thing by another name.
-      std::vector<std::size_t>& near = near_[best_effect];
-      const auto winner = std::find(candidates.begin(), candidates.end(), best_effect) - candidates.begin();
-      const double winning = screened[static_cast<std::size_t>(winner)].first;
-      for (std::size_t i = 0; i < candidates.size(); ++i)
-        if (candidates[i] != best_effect && screened[i].first > resembles * winning)
-          near.push_back(candidates[i]);
-      record_step();
-      while (exchange()) {
+      } else if (is_overwhelming(improvement, candidates[i])) {
+        doubtful.push_back({candidates[i], std::move(h), score});
       }
     }
+    if (believed.empty() && !doubtful.empty()) {
+      if (!standing_) standing_.emplace(Standing{current_, found_});
+      believed = std::move(doubtful);
+    }
+    if (believed.empty()) return false;
+    Believed& best = believed[choose(believed)];
+    const std::size_t best_effect = best.effect;
+    for (Trial& trial : result_.trials)
+      if (trial.round == static_cast<std::size_t>(round) && trial.effect == best_effect) trial.taken = true;
+    where_[best_effect] = locate(current_);
+    current_ = std::move(best.hypothesis);
+    found_.push_back(best_effect);
+    // What gained a fair share of the same may be the same thing by another name.
+    std::vector<std::size_t>& near = near_[best_effect];
+    const auto winner = std::find(candidates.begin(), candidates.end(), best_effect) - candidates.begin();
+    const double winning = screened[static_cast<std::size_t>(winner)].first;
+    for (std::size_t i = 0; i < candidates.size(); ++i)
+      if (candidates[i] != best_effect && screened[i].first > resembles * winning)
+        near.push_back(candidates[i]);
+    record_step();
+    while (exchange()) {
+    }
+    return true;
   }
 
   void record_step() {
@@ -927,6 +979,7 @@ class Diagnostician {
   Hypothesis given_, current_;
   Hypothesis final_;  ///< fitted to the training runs, judged on the others
   Hypothesis known_;  ///< the same effects fitted to all runs: what the model says in the end
+  std::optional<Standing> standing_;
   std::vector<std::size_t> found_, corrections_;
   std::set<std::pair<std::size_t, std::size_t>> exchanged_;  ///< tried already
   std::map<std::size_t, std::vector<std::size_t>> near_;

@@ -305,6 +305,7 @@ Tails tails_of(const std::vector<double>& values) {
   tails.kurtosis = fourth * n / std::pow(std::max(second, n), 2);
   // Anscombe and Glynn, Biometrika 70 (1983) 227: a Gaussian variable of the kurtosis of n numbers.
   const double mean = 3.0 * (n - 1.0) / (n + 1.0);
+  if (tails.kurtosis <= mean) return tails;
   const double variance = 24.0 * n * (n - 2.0) * (n - 3.0) / ((n + 1.0) * (n + 1.0) * (n + 3.0) * (n + 5.0));
   const double skewness = 6.0 * (n * n - 5.0 * n + 2.0) / ((n + 7.0) * (n + 9.0)) *
                           std::sqrt(6.0 * (n + 3.0) * (n + 5.0) / (n * (n - 2.0) * (n - 3.0)));

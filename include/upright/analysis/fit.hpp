@@ -116,7 +116,7 @@ struct Belief {
 
 struct FitOptions {
   int most_iterations = 12;
-  int noise_rounds = 2;           ///< how often the noise is estimated anew; 0: as given
+  int noise_rounds = 6;           ///< how often the noise is estimated anew at most; 0: as given
   std::optional<Noise> or_noise;  ///< another place from which to search for the noise, if it is the better
   bool noise_last = false;        ///< with no rounds: estimate the noise once, roughly, after the descent
   std::optional<Belief> belief;   ///< in the place of what each free parameter says of itself
