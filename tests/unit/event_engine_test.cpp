@@ -171,6 +171,38 @@ TEST(EventEngine, QuickDerivativesAreNearlyRight) {
   }
 }
 
+// Derivatives of accelerations by the state are read from its seeds, or found beside it: as well while the
+// cart slides as in the step in which it breaks away, whose velocity has no seed.
+TEST(EventEngine, SeedsGiveTheSameDerivatives) {
+  using Jet = ceres::Jet<double, 8>;
+  Plant plant = paper_plant();
+  plant.set("viscous_friction", {3.0});
+  plant.set("coulomb_friction", {0.43});
+  EngineOptions options;
+  options.max_step_s = 4e-3;
+  options.step_fraction = 0.5;
+  options.quick_derivatives = true;
+  PlantModel<Jet> model = make_model<Jet>(plant);
+  model.parameters[effect_parameter_offset(effect_number("viscous_friction"))].v[5] = 1.0;
+  for (const double cart_mps : {0.3, -0.2, 0.0}) {
+    PlantState<Jet> start{Jet(0.01), Jet(std::numbers::pi + 0.3), Jet(cart_mps), Jet(-0.4)};
+    EventEngine<Jet> seeded(model, options), plain(model, options);
+    seeded.start(start);
+    seeded.seed();
+    plain.start(start);
+    PlantState<Jet> unit = seeded.state();
+    plain.correct(unit);
+    seeded.advance(Jet(2e-3), Jet(4.0));
+    plain.advance(Jet(2e-3), Jet(4.0));
+    EXPECT_NE(seeded.state().cart_mps.a, cart_mps);
+    for (Jet PlantState<Jet>::*of : {&PlantState<Jet>::cart_m, &PlantState<Jet>::theta_rad,
+                                     &PlantState<Jet>::cart_mps, &PlantState<Jet>::theta_radps}) {
+      EXPECT_EQ((seeded.state().*of).a, (plain.state().*of).a);
+      for (int i = 0; i < 8; ++i) EXPECT_NEAR((seeded.state().*of).v[i], (plain.state().*of).v[i], 1e-7) << i;
+    }
+  }
+}
+
 // A cart that the pendulum tears loose for less than a step and that friction stops again at once: neither
 // missed nor repeated without end.
 TEST(EventEngine, DualNumbersAreRightThroughStiffBristles) {

@@ -15,14 +15,9 @@
 
 #include "upright/analysis/diagnosis.hpp"
 #include "upright/analysis/fit.hpp"
+#include "upright/analysis/tails.hpp"
 
 namespace upright {
-
-/// How heavy the tails of a distribution are.
-struct Tails {
-  double kurtosis = 3.0;   ///< 3: as a Gaussian's
-  double certainty = 0.0;  ///< that they are heavier [standard errors of so many numbers]
-};
 
 struct ResidualStructure {
   double noise_ratio = 1.0;  ///< rms of a plain simulation's residual over the sensors' noise
