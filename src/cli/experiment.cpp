@@ -329,8 +329,7 @@ void add_experiment(CommandLine& line) {
   command.option("--plant", a->plant, "Plant file to plan with (the experiment's, the simulated rig's)");
   command.option("--rate", a->rate_hz, "Sample rate [Hz] (the experiment's, the gain file's, 1000)")
       .in(Range::within(lowest_sample_rate_hz, highest_sample_rate_hz));
-  command.option("--seed", a->seed, "Of noise and jitter, simulated rigs only (1)");
-  command.flag("--fast", a->fast, "Virtual time: as fast as it goes, simulated rigs only");
+  add_simulated(command, a->seed, a->fast);
   command.flag("--dry-run", a->dry_run, "Plan and rehearse, then stop: nothing moves");
   command.flag("--ready", a->ready, "What pieces ask of an operator is done: do not wait for Enter");
   command.option("--out", a->out, "Folder of this experiment (runs/<UTC start>-<name>)");

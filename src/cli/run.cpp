@@ -358,8 +358,7 @@ void add_run(CommandLine& line) {
       .in(Range::within(0.0, 86400.0));
   command.option("--theta0-deg", a->theta0_deg, "Initial angle [degree], simulated rigs only")
       .in(Range::within(-180.0, 180.0));
-  command.option("--seed", a->seed, "Of noise and jitter, simulated rigs only (1)");
-  command.flag("--fast", a->fast, "Virtual time: as fast as it goes, simulated rigs only");
+  add_simulated(command, a->seed, a->fast);
   command.option("--out", a->out, "The folder that the run directory is made in (runs)");
   command.option("--label", a->label, "End of the run directory's name (run)");
   add_realtime(command, a->realtime);
