@@ -88,6 +88,31 @@ Improvement compare(const Hypothesis& simpler, const Hypothesis& richer) {
   return result;
 }
 
+std::vector<ParameterEstimate> estimates_of(std::size_t effect, const Hypothesis& h) {
+  std::vector<ParameterEstimate> result;
+  const EffectInfo& info = effect_registry()[effect];
+  for (std::size_t i = 0; i < info.parameters.size(); ++i) {
+    ParameterEstimate e;
+    e.name = info.parameters[i].name;
+    e.unit = info.parameters[i].unit;
+    e.value = h.train.point.plant.find(effect)->values[i];
+    e.low = e.high = e.value;
+    for (std::size_t j = 0; j < h.free.size(); ++j) {
+      if (h.free[j].effect != effect || h.free[j].index != i) continue;
+      const auto at = static_cast<Eigen::Index>(j);
+      const double sigma = std::sqrt(std::max(h.train.covariance(at, at), 0.0));
+      e.low = e.value - 1.96 * sigma;
+      e.high = e.value + 1.96 * sigma;
+    }
+    result.push_back(e);
+  }
+  return result;
+}
+
+std::string kind_of(std::size_t effect) {
+  return std::string(effect_registry()[effect].kind);
+}
+
 Search::Search(const Plant& plant, const std::vector<Measurement>& runs, const FitData& train,
                const FitData& held)
     : given_(plant), plant_(plant), train_(train), held_(held), range_(range_of(runs, plant)) {
@@ -159,6 +184,51 @@ void Search::judge(Hypothesis& h, const Noise& noise) const {
   const FitPoint plain{plant_, held_starts_, noise};
   const FitPoint point = moved_to(plain, h.train.point.plant);
   h.held = follow(held_, point, 6);
+}
+
+const PlainSimulation& Search::simulate(Hypothesis& h) const {
+  if (h.simulation) return *h.simulation;
+  Hypothesis plain = h;
+  judge(plain, sensors_only(h.train.point.noise));
+  const FitResult& simulated = held_.segments.empty() ? plain.train : plain.held;
+  h.simulation.emplace(PlainSimulation{gap_of(plain), {}});
+  for (std::size_t s = 0; s < simulated.segment_chi_square.size(); ++s)
+    h.simulation->segment_gap.push_back(
+        std::sqrt(simulated.segment_chi_square[s] / std::max(simulated.segment_samples[s], 1e-9)));
+  return *h.simulation;
+}
+
+double Search::gap_of(const Hypothesis& h) const {
+  return held_.segments.empty() ? whitened_rms(h.train) : whitened_rms(h.held);
+}
+
+bool Search::is_plausible(const Hypothesis& h, std::size_t effect) const {
+  for (const FreeParameter& p : h.free) {
+    if (p.effect != effect) continue;
+    const double value = h.train.point.plant.find(effect)->values[p.index];
+    if (p.index == 0 && value == effect_registry()[effect].parameters[0].neutral) return false;
+    if (kind_of(effect).starts_with("angle_offset") && std::abs(value) < 1.5 * range_.theta_resolution_rad)
+      return false;
+  }
+  return true;
+}
+
+double Search::certainty(const Hypothesis& h, std::size_t effect) const {
+  std::vector<Eigen::Index> own;
+  for (std::size_t j = 0; j < h.free.size(); ++j)
+    if (h.free[j].effect == effect) own.push_back(static_cast<Eigen::Index>(j));
+  if (own.empty() || h.free[static_cast<std::size_t>(own.front())].index != 0) return 0.0;
+  const PlantEffect* given = given_.find(effect);
+  const double nothing =
+      given != nullptr ? given->values[0] : effect_registry()[effect].parameters[0].neutral;
+  if (!std::isfinite(nothing)) return infinity;
+  const Eigen::MatrixXd covariance = h.train.covariance(own, own);
+  const Eigen::VectorXd scale = covariance.diagonal().cwiseMax(1e-300).cwiseSqrt();
+  const Eigen::MatrixXd correlation =
+      scale.cwiseInverse().asDiagonal() * covariance * scale.cwiseInverse().asDiagonal();
+  const double held = correlation.completeOrthogonalDecomposition().pseudoInverse()(0, 0);
+  return std::abs(h.train.point.plant.find(effect)->values[0] - nothing) / scale[0] *
+         std::sqrt(std::max(held, 1.0));
 }
 
 void Search::weigh(Hypothesis& h) const {

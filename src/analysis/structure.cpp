@@ -4,12 +4,23 @@
 #include <array>
 #include <cmath>
 #include <numeric>
+#include <sstream>
 
 #include "upright/analysis/residual.hpp"
 
 namespace upright {
 
 namespace {
+
+/// What is left goes with something when it does so by this many standard errors: of the dozen dependences
+/// that are tried, chance makes one in two hundred times.
+constexpr double least_dependence = 3.5;
+/// Kurtosis of the pulses of a disturbance that does not come in bursts. A Gaussian's is 3.
+constexpr double heaviest_tails = 5.5;
+/// What is left may push this many times as hard over a tenth of a second and more as white noise that
+/// accounts for single samples. A disturbance of 10 Hz makes it 1.8 here at most (measured on the matrix),
+/// forces that go with the motion more.
+constexpr double slowest = 2.5;
 
 constexpr std::array feature_names = {"its mean",
                                       "velocity",
@@ -346,6 +357,48 @@ ResidualStructure examine_residuals(const FitData& data, const FitPoint& point) 
     result.in_pendulum = probes[i].torque;
   }
   return result;
+}
+
+void judge_structure(ResidualStructure& s) {
+  std::ostringstream text;
+  text.precision(3);
+  if (s.noise_ratio < 1.15) {
+    text << "what is left is the sensors' own noise";
+  } else if (s.dispersion > 1.6) {
+    s.structured = true;
+    text << "what is left comes in bursts: some stretches are " << s.dispersion
+         << " times as far off as most";
+  } else if (s.tails.kurtosis > heaviest_tails && s.tails.certainty > least_dependence) {
+    s.structured = true;
+    text << "what is left comes in bursts: short pulses of force have a kurtosis of " << s.tails.kurtosis
+         << ", chance gives 3 (largest blocks " << s.dispersion << " times the median, dependence "
+         << s.certainty << " standard errors)";
+  } else if (std::max(s.slow_force, s.slow_torque) > slowest) {
+    s.structured = true;
+    const bool torque = s.slow_torque > s.slow_force;
+    text << "what is left is too slow for noise: over a tenth of a second the "
+         << (torque ? "torque on the pendulum" : "force on the cart") << " is "
+         << (torque ? s.slow_torque : s.slow_force)
+         << " times as large as noise that accounts for single samples makes it";
+  } else if (s.excess > most_excess) {
+    s.structured = true;
+    text << "a plain simulation is " << s.excess
+         << " times as far off as noise like what is left makes it at most"
+         << " (dependence " << s.certainty << " standard errors)";
+  } else if (s.certainty > least_dependence) {
+    s.structured = true;
+    text << "what is left goes with " << s.goes_with << " in the " << (s.in_pendulum ? "pendulum" : "cart")
+         << " equation (" << s.certainty << " standard errors)";
+  } else {
+    text << "what is left is a disturbance that is the same all along and goes with nothing that was "
+            "measured "
+            "(largest blocks "
+         << s.dispersion << " times the median, kurtosis of pulses " << s.tails.kurtosis << ", dependence "
+         << s.certainty << " standard errors, simulation " << s.excess
+         << " times as far off as such noise makes it at most, slow pushes "
+         << std::max(s.slow_force, s.slow_torque) << " times)";
+  }
+  s.sentence = text.str();
 }
 
 Noise as_slow_as_left(Noise noise, const ResidualStructure& structure) {

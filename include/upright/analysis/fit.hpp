@@ -82,6 +82,13 @@ inline Noise calmed(Noise noise) {
   return noise;
 }
 
+/// That of the sensors alone, for a plain simulation.
+inline Noise sensors_only(Noise noise) {
+  noise.force = noise.torque = 0.0;
+  noise.sensors = 1.0;
+  return noise;
+}
+
 /// What a fit works on.
 struct FitData {
   const std::vector<Measurement>* runs = nullptr;

@@ -4,8 +4,11 @@
 #include <map>
 #include <optional>
 #include <set>
+#include <string>
+#include <vector>
 
 #include "upright/analysis/candidates.hpp"
+#include "upright/analysis/diagnosis.hpp"
 #include "upright/analysis/fit.hpp"
 
 namespace upright {
@@ -38,6 +41,16 @@ struct Improvement {
 };
 
 Improvement compare(const Hypothesis& simpler, const Hypothesis& richer);
+
+/// Two explanations whose evidence differs by less than this, or by less than its own scatter, are not told
+/// apart.
+inline constexpr double confusable_evidence = 16.0;
+
+/// What a hypothesis says about one effect, as numbers with intervals.
+std::vector<ParameterEstimate> estimates_of(std::size_t effect, const Hypothesis& h);
+
+/// The name of an effect in plant files.
+std::string kind_of(std::size_t effect);
 
 class Search {
  public:
@@ -85,6 +98,16 @@ class Search {
   Hypothesis told(const Hypothesis& h) const;
   /// Follows held-out data with this noise.
   void judge(Hypothesis& hypothesis, const Noise& noise) const;
+  /// A plain simulation of held-out data, at its first call (of training data where none is held out).
+  const PlainSimulation& simulate(Hypothesis& h) const;
+  /// How far off what was judged is, in units of its noise.
+  double gap_of(const Hypothesis& h) const;
+  /// A hypothesis in which the new effect does nothing, or is of a size that makes it another effect, has
+  /// lost.
+  bool is_plausible(const Hypothesis& h, std::size_t effect) const;
+  /// How many standard errors the size of an effect is from nothing: from what the plant file says, of a
+  /// correction. Its other parameters (a shape, a place) are held: without a size they mean nothing.
+  double certainty(const Hypothesis& h, std::size_t effect) const;
 
  private:
   /// Follows held-out data with the fitted noise, for their surprise.

@@ -41,6 +41,12 @@ Noise as_slow_as_left(Noise noise, const ResidualStructure& structure);
 /// Examines what a fit leaves at `point`.
 ResidualStructure examine_residuals(const FitData& data, const FitPoint& point);
 
+/// Whether what is left is more than noise, in a sentence, once its excess is known too.
+void judge_structure(ResidualStructure& structure);
+
+/// A plain simulation may be this many times as far off as noise like what is left makes it at most.
+inline constexpr double most_excess = 2.0;
+
 /// In which equation the residual is and what it goes with most: a ridge regression of the smoothed residual
 /// force and torque on velocity, direction, position, voltage, time, ..., judged on segments it has not seen.
 struct ResidualPlace {
