@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <sstream>
+#include <tuple>
 
 #include "upright/analysis/confusable.hpp"
 #include "upright/analysis/growth.hpp"
@@ -40,7 +41,7 @@ class Diagnostician {
     growth_.find();
     ResidualStructure left = settle();
     if (left.structured && growth_.find_pairs_of_all()) left = settle();
-    if (left.structured && growth_.find_calmly()) left = settle();
+    if (left.beyond_sensors && growth_.find_calmly()) left = settle();
     conclude(left);
     return std::move(result_);
   }
@@ -154,21 +155,22 @@ class Diagnostician {
     return std::abs(h.train.point.plant.find(p.effect)->values[p.index] - p.prior_mean) < far * p.prior_sigma;
   }
 
-  /// Corrections in the order of how much each closes.
+  /// Corrections in the order of how much each closes: of sensors first, then of the plant's numbers, which
+  /// are always a little off.
   void order_corrections(const std::vector<std::size_t>& corrections) {
     const Noise noise = final_.train.point.noise;
-    std::vector<std::pair<double, std::size_t>> opened;
+    std::vector<std::tuple<bool, double, std::size_t>> opened;
     for (const std::size_t effect : corrections) {
       std::vector<std::size_t> others = growth_.found();
       for (const std::size_t other : corrections)
         if (other != effect) others.push_back(other);
       Hypothesis h = search_.only(others, final_, &noise);
       search_.judge(h, noise);
-      opened.emplace_back(-search_.gap_of(h), effect);
+      opened.emplace_back(effect_registry()[effect].enters == Enters::parameter, -search_.gap_of(h), effect);
     }
     std::sort(opened.begin(), opened.end());
     corrections_.clear();
-    for (const auto& [gap, effect] : opened) corrections_.push_back(effect);
+    for (const auto& [number, gap, effect] : opened) corrections_.push_back(effect);
   }
 
   void conclude(const ResidualStructure& structure) {

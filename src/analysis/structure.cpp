@@ -362,7 +362,9 @@ ResidualStructure examine_residuals(const FitData& data, const FitPoint& point) 
 void judge_structure(ResidualStructure& s) {
   std::ostringstream text;
   text.precision(3);
-  if (s.noise_ratio < 1.15) {
+  constexpr double as_sensors = 1.15;
+  s.beyond_sensors = s.noise_ratio > as_sensors;
+  if (!s.beyond_sensors) {
     text << "what is left is the sensors' own noise";
   } else if (s.dispersion > 1.6) {
     s.structured = true;

@@ -31,7 +31,8 @@ struct ResidualStructure {
   /// samples: a disturbance whose colour the filter does not know is estimated where the samples show it
   /// best, and a plain simulation is moved by what is slow. At least 1.
   double slow_force = 1.0, slow_torque = 1.0;
-  bool structured = false;
+  bool beyond_sensors = false;  ///< it is more than the sensors' own noise
+  bool structured = false;      ///< and more than a disturbance: something is missing
   std::string sentence;
 };
 
