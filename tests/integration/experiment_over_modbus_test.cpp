@@ -35,8 +35,8 @@ class ExperimentOverModbus : public ::testing::TestWithParam<Link> {
   }
 
   Said experiment(const std::string& file, const std::string& rig, const std::string& out) {
-    Process client({UPRIGHT_BINARY, "experiment", file, "--rig", folder_ / rig, "--rate", GetParam().rate_hz,
-                    "--out", folder_ / out});
+    Process client({"sh", "-c", "exec \"$0\" \"$@\" 2>&1", UPRIGHT_BINARY, "experiment", file, "--rig",
+                    folder_ / rig, "--rate", GetParam().rate_hz, "--out", folder_ / out});
     Said said;
     said.out = client.rest();
     said.exit_code = client.wait();
@@ -78,6 +78,7 @@ TEST_P(ExperimentOverModbus, ASignCheckNoticesAWrongSign) {
                   "pendulum: {counts_per_revolution: 4096, sign: -1");
   const Said check = experiment(config + "experiments/sign-check.yaml", "wrong.yaml", "signs");
   EXPECT_EQ(check.exit_code, 3) << check.out;
+  EXPECT_NE(check.out.find("turn calibration.pendulum.sign"), std::string::npos) << check.out;
   EXPECT_FALSE(std::filesystem::exists(folder_ / "wrong.yaml.signs"));
 }
 
