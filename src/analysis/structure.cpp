@@ -15,8 +15,8 @@ namespace {
 /// What is left goes with something when it does so by this many standard errors: of the dozen dependences
 /// that are tried, chance makes one in two hundred times.
 constexpr double least_dependence = 3.5;
-/// Or two signs together, each of which chance makes alone: where nothing was missing in the end, of 317 cases
-/// of the matrix 7 were as uneven and 12 went with something as much, none did both. Backlash does.
+/// Or two signs together, each of which chance makes alone: where nothing was missing in the end, of 317
+/// cases of the matrix 7 were as uneven and 12 went with something as much, none did both. Backlash does.
 constexpr double uneven = 1.3;
 constexpr double suspected_dependence = 2.5;
 /// Kurtosis of the pulses of a disturbance that does not come in bursts. A Gaussian's is 3.
