@@ -110,7 +110,10 @@ bool Growth::is_believed(const Improvement& improvement, std::size_t effect) {
   // Held-out data that do not excite the effect say nothing: odds of less than 2 to 1 against it.
   constexpr double indifferent = 1.4;
   if (evidence < least_evidence || !(improvement.held > -indifferent)) return false;
-  return improvement.t_value > least_t || evidence > overwhelming_evidence;
+  // What a few moments hold has a small t: then the held-out runs must hold as much again.
+  constexpr double least_t_borne_out = 2.0;
+  return improvement.t_value > least_t || evidence > overwhelming_evidence ||
+         (improvement.t_value > least_t_borne_out && improvement.held > least_evidence);
 }
 
 bool Growth::is_overwhelming(const Improvement& improvement, std::size_t effect) {
