@@ -41,7 +41,7 @@ class Diagnostician {
     growth_.find();
     ResidualStructure left = settle();
     if (left.structured && growth_.find_pairs_of_all()) left = settle();
-    if (left.beyond_sensors && growth_.find_calmly()) left = settle();
+    if (left.beyond_sensors && growth_.find_thoroughly()) left = settle();
     conclude(left);
     return std::move(result_);
   }

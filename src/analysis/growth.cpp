@@ -58,8 +58,14 @@ bool Growth::find_pairs_of_all() {
   return true;
 }
 
-bool Growth::find_calmly() {
-  if (!grow(most_rounds, 2 * most_rounds, true)) return false;
+bool Growth::find_thoroughly() {
+  const std::vector<std::size_t> before = found_;
+  if (search_.sieve_share() < 1.0) {
+    search_.sieve_all();
+    grow(most_rounds, 2 * most_rounds, false);
+  }
+  grow(2 * most_rounds, 3 * most_rounds, true);
+  if (found_ == before) return false;
   prune();
   return true;
 }
@@ -209,12 +215,10 @@ void Growth::record_step() {
   record_.steps.push_back(std::move(step));
 }
 
-bool Growth::grow(int first_round, int last_round, bool calmly) {
-  const std::vector<std::size_t> before = found_;
+void Growth::grow(int first_round, int last_round, bool calmly) {
   for (int round = first_round; round < last_round && add_best(round, calmly); ++round) {
   }
   end_doubt();
-  return found_ != before;
 }
 
 bool Growth::add_best(int round, bool calmly) {
@@ -260,7 +264,8 @@ std::vector<Growth::Believed> Growth::believe(int round, const std::vector<Scree
   constexpr double of_best = 0.05;  // what a whole fit does not make up for
   for (std::size_t place = 0; place < std::min(most_finalists, ranking.size()); ++place) {
     const auto& [effect, start, gain] = *ranking[place];
-    if (gain < std::max(0.4 * least_evidence, of_best * ranking[0]->gain)) break;
+    const double least_gain = 0.4 * least_evidence * search_.sieve_share();
+    if (gain < std::max(least_gain, of_best * ranking[0]->gain)) break;
     tell(done + 0.12 + 0.08 * static_cast<double>(place) / most_finalists, "fitting " + kind_of(effect));
     Hypothesis h = start;
     search_.refine(current_, h);

@@ -124,13 +124,22 @@ Search::Search(const Plant& plant, const std::vector<Measurement>& runs, const F
   // Runs differ, segments of a run are alike: take them in turn.
   constexpr std::size_t least_segments = 6, most_stride = 3;
   const std::size_t stride = std::clamp<std::size_t>(train_.segments.size() / least_segments, 1, most_stride);
-  sieve_.runs = &runs;
+  sieve_every(stride);
+  train_starts_ = guess_starts(runs, train.segments, plant_);
+  held_starts_ = guess_starts(runs, held.segments, plant_);
+}
+
+void Search::sieve_every(std::size_t stride) {
+  sieve_ = {train_.runs, {}};
+  sieve_places_.clear();
   for (std::size_t s = 0; s < train_.segments.size(); s += stride) {
     sieve_.segments.push_back(train_.segments[s]);
     sieve_places_.push_back(s);
   }
-  train_starts_ = guess_starts(runs, train.segments, plant_);
-  held_starts_ = guess_starts(runs, held.segments, plant_);
+}
+
+void Search::sieve_all() {
+  sieve_every(1);
 }
 
 std::vector<FreeParameter> Search::free_of(const std::set<std::size_t>& added) const {

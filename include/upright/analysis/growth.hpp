@@ -25,9 +25,9 @@ class Growth {
   void find();
   /// What is left is more than noise: pairs of all that resembled the best effect. Whether the model changed.
   bool find_pairs_of_all();
-  /// What is left is more than the sensors' noise: as the data show with little noise beyond it. Whether the
-  /// model changed.
-  bool find_calmly();
+  /// What is left is more than the sensors' noise: as all of the training data show, and as they show with
+  /// little noise beyond it. Whether the model changed.
+  bool find_thoroughly();
 
   const Hypothesis& given() const { return given_; }
   const Hypothesis& current() const { return current_; }
@@ -92,8 +92,8 @@ class Growth {
   void record_step();
 
   /// Adds effects one at a time, the best first, for as long as the data ask for one. `calmly`: as they show
-  /// with little noise, for much noise can account for the whole of an effect. Whether one was added.
-  bool grow(int first_round, int last_round, bool calmly);
+  /// with little noise, for much noise can account for the whole of an effect.
+  void grow(int first_round, int last_round, bool calmly);
   /// One round: whether an effect was added.
   bool add_best(int round, bool calmly);
   /// All promising candidates. `done`: how far the work is.

@@ -61,6 +61,13 @@ class Search {
   const FitData& train_data() const { return train_; }
   const FitData& held_data() const { return held_; }
 
+  /// All of the training data are looked at from now on, not a part of them first.
+  void sieve_all();
+  /// How much of the training data is looked at first.
+  double sieve_share() const {
+    return static_cast<double>(sieve_.segments.size()) / static_cast<double>(train_.segments.size());
+  }
+
   /// Base corrections and the plant's own effects within what is believed of them.
   Hypothesis baseline();
   /// How far the objective falls on a part of the training data when each of these is added, as its
@@ -110,6 +117,7 @@ class Search {
   double certainty(const Hypothesis& h, std::size_t effect) const;
 
  private:
+  void sieve_every(std::size_t stride);
   /// Follows held-out data with the fitted noise, for their surprise.
   void weigh(Hypothesis& h) const;
   double surprise_of(const Hypothesis& h) const;
