@@ -60,11 +60,11 @@ bool Growth::find_pairs_of_all() {
 
 bool Growth::find_thoroughly() {
   const std::vector<std::size_t> before = found_;
+  grow(most_rounds, 2 * most_rounds, true);
   if (search_.sieve_share() < 1.0) {
     search_.sieve_all();
-    grow(most_rounds, 2 * most_rounds, false);
+    grow(2 * most_rounds, 3 * most_rounds, false);
   }
-  grow(2 * most_rounds, 3 * most_rounds, true);
   if (found_ == before) return false;
   prune();
   return true;

@@ -25,8 +25,8 @@ class Growth {
   void find();
   /// What is left is more than noise: pairs of all that resembled the best effect. Whether the model changed.
   bool find_pairs_of_all();
-  /// What is left is more than the sensors' noise: as all of the training data show, and as they show with
-  /// little noise beyond it. Whether the model changed.
+  /// What is left is more than the sensors' noise: as the data show with little noise beyond it, and as all
+  /// of the training data show. Whether the model changed.
   bool find_thoroughly();
 
   const Hypothesis& given() const { return given_; }
