@@ -53,14 +53,10 @@ class Diagnostician {
     return data;
   }
 
-  void tell(double done, const std::string& what) {
-    if (options_.progress) options_.progress(done, what);
-  }
-
   /// Settles the corrections, and looks at what is left.
   ResidualStructure settle() {
     settle_corrections();
-    tell(0.92, "measuring the gap");
+    options_.tell(0.92, "measuring the gap");
     ResidualStructure left = examine();
     if (!left.structured) compare_held_out(left);
     return left;
@@ -128,13 +124,13 @@ class Diagnostician {
   void fit_last(std::vector<std::size_t>& corrections) {
     const Hypothesis* from = &growth_.current();
     for (;;) {
-      tell(0.88, "fitting what is left");
+      options_.tell(0.88, "fitting what is left");
       std::vector<std::size_t> all = growth_.found();
       all.insert(all.end(), corrections.begin(), corrections.end());
       final_ = search_.only(all, *from, nullptr, true);
       search_.judge(final_, final_.train.point.noise);
       from = &final_;
-      tell(0.9, "fitting all runs");
+      options_.tell(0.9, "fitting all runs");
       known_ = search_.on_all(final_);
       const auto includes_nothing = [&](std::size_t effect) {
         return search_.certainty(known_, effect) < 2.0;
@@ -174,7 +170,7 @@ class Diagnostician {
   }
 
   void conclude(const ResidualStructure& structure) {
-    tell(0.93, "measuring the gap");
+    options_.tell(0.93, "measuring the gap");
     if (runs_.size() == 1) result_.notes.push_back("one run only: a third of its segments is held out");
     result_.held_out_runs = data_.held_out_runs;
     result_.noise = known_.train.point.noise;
@@ -252,8 +248,8 @@ class Diagnostician {
   }
 
   /// What is left of the training runs must account for the held-out runs too, with the parameters anywhere
-  /// that the training runs leave open. What is left need not be white: all runs together may be further off
-  /// than white noise makes them, and held-out ones by as much again.
+  /// that the training runs leave open. What is left need not be such noise: all runs together may be further
+  /// off than such noise makes them, and held-out ones by as much again.
   void compare_held_out(ResidualStructure& structure) {
     if (data_.held.segments.empty()) return;
     Hypothesis told = search_.told(final_);
@@ -333,7 +329,7 @@ class Diagnostician {
   /// Other effects that do as well in the place of one that was found: from sensitivities, or fitted where an
   /// effect does not act in proportion to its size.
   void find_confusable() {
-    tell(0.94, "what else could it be");
+    options_.tell(0.94, "what else could it be");
     std::vector<std::pair<std::size_t, Plant>> rivals;
     for (const Rival& rival : linear_rivals(search_, final_, all_found())) {
       declare(rival.instead_of, rival.effect);
@@ -344,7 +340,7 @@ class Diagnostician {
       std::optional<Hypothesis> without;
       for (const std::size_t other : growth_.near(effect)) {
         if (is_listed(other) || is_declared(effect, other)) continue;
-        tell(0.95, "is it " + kind_of(other) + " instead of " + kind_of(effect));
+        options_.tell(0.95, "is it " + kind_of(other) + " instead of " + kind_of(effect));
         if (!without) without = search_.without(growth_.current(), effect);
         if (!std::isfinite(without->train.objective)) break;
         Hypothesis rival = search_.screened(*without, other);
@@ -393,6 +389,10 @@ class Diagnostician {
 };
 
 }  // namespace
+
+std::string kind_of(std::size_t effect) {
+  return std::string(effect_registry()[effect].kind);
+}
 
 std::string_view name_of(Verdict verdict) {
   switch (verdict) {

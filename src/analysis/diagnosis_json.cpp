@@ -8,10 +8,6 @@ namespace {
 
 using nlohmann::json;
 
-std::string kind_of(std::size_t effect) {
-  return std::string(effect_registry()[effect].kind);
-}
-
 json number(double value) {
   return std::isfinite(value) ? json(value) : json(nullptr);
 }

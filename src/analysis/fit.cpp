@@ -941,20 +941,14 @@ std::vector<Segment> cut_segments(const std::vector<Measurement>& runs, double l
 
 namespace {
 
-/// What the true value is when a sensor shows this one: sensors are linear.
-double behind_sensor(double shown, double shown_at_0, double shown_at_1) {
-  return (shown - shown_at_0) / (shown_at_1 - shown_at_0);
-}
-
 /// The state of which the sensors show these values.
 void undo_sensors(const Dynamics<double>& dynamics, PlantState<double>& state) {
-  PlantState<double> unit;
-  unit.cart_m = unit.theta_rad = 1.0;
-  const Outputs<double> at_0 = dynamics.measure(PlantState<double>{}), at_1 = dynamics.measure(unit);
-  state.cart_m = behind_sensor(state.cart_m, at_0.cart_m, at_1.cart_m);
-  state.theta_rad = behind_sensor(state.theta_rad, at_0.theta_rad, at_1.theta_rad);
-  state.cart_mps /= at_1.cart_m - at_0.cart_m;
-  state.theta_radps /= at_1.theta_rad - at_0.theta_rad;
+  const Outputs<double> at_0 = dynamics.measure(PlantState<double>{});
+  const auto [cart_gain, theta_gain] = sensor_gains(dynamics);
+  state.cart_m = (state.cart_m - at_0.cart_m) / cart_gain;
+  state.theta_rad = (state.theta_rad - at_0.theta_rad) / theta_gain;
+  state.cart_mps /= cart_gain;
+  state.theta_radps /= theta_gain;
 }
 
 }  // namespace
@@ -962,15 +956,13 @@ void undo_sensors(const Dynamics<double>& dynamics, PlantState<double>& state) {
 void follow_sensors(std::vector<PlantState<double>>& starts, const Plant& from, const Plant& to) {
   const PlantModel<double> model_from = make_model<double>(from), model_to = make_model<double>(to);
   const Dynamics<double> before(model_from), after(model_to);
+  const auto [cart_gain, theta_gain] = sensor_gains(before);
   for (PlantState<double>& state : starts) {
-    PlantState<double> unit;
-    unit.cart_m = unit.theta_rad = 1.0;
-    const Outputs<double> shown = before.measure(state), at_0 = before.measure(PlantState<double>{}),
-                          at_1 = before.measure(unit);
+    const Outputs<double> shown = before.measure(state);
     state.cart_m = shown.cart_m;
     state.theta_rad = shown.theta_rad;
-    state.cart_mps *= at_1.cart_m - at_0.cart_m;
-    state.theta_radps *= at_1.theta_rad - at_0.theta_rad;
+    state.cart_mps *= cart_gain;
+    state.theta_radps *= theta_gain;
     undo_sensors(after, state);
   }
 }

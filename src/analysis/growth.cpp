@@ -39,7 +39,7 @@ constexpr std::size_t most_resembling = 8;
 
 Growth::Growth(Search& search, const DiagnosisOptions& options, Diagnosis& record)
     : search_(search), options_(options), record_(record) {
-  tell(0.02, "comparing the model as given");
+  options_.tell(0.02, "comparing the model as given");
   given_ = search_.baseline();
   if (!std::isfinite(given_.train.objective))
     throw ConfigError("check the plant file: the model cannot be simulated with these runs");
@@ -68,10 +68,6 @@ bool Growth::find_thoroughly() {
   if (found_ == before) return false;
   prune();
   return true;
-}
-
-void Growth::tell(double done, const std::string& what) {
-  if (options_.progress) options_.progress(done, what);
 }
 
 std::vector<std::size_t> Growth::open_candidates() const {
@@ -233,15 +229,15 @@ bool Growth::add_best(int round, bool calmly) {
 }
 
 std::vector<Growth::Screened> Growth::screen(int round, bool calmly, double done) {
-  tell(done, "looking for what is missing");
+  options_.tell(done, "looking for what is missing");
   Hypothesis from = current_;
   if (calmly) from.train.point.noise = calmed(from.train.point.noise);
   const std::vector<std::size_t> candidates = promising(from, open_candidates(), round);
   const double sieved = search_.sieved(from).train.objective;
   std::vector<Screened> screened;
   for (std::size_t c = 0; c < candidates.size(); ++c) {
-    tell(done + 0.02 + 0.1 * static_cast<double>(c) / static_cast<double>(candidates.size()),
-         "trying " + kind_of(candidates[c]));
+    options_.tell(done + 0.02 + 0.1 * static_cast<double>(c) / static_cast<double>(candidates.size()),
+                  "trying " + kind_of(candidates[c]));
     Hypothesis h = search_.screened(from, candidates[c]);
     const double gain = sieved - h.train.objective - price_of(candidates[c]);
     if (round == 0) record_.candidates.push_back({candidates[c], 0.0, std::max(gain, 0.0)});
@@ -262,11 +258,12 @@ std::vector<Growth::Believed> Growth::believe(int round, const std::vector<Scree
         resembling_.emplace_back(s->effect, s->hypothesis);
   std::vector<Believed> believed, doubtful;
   constexpr double of_best = 0.05;  // what a whole fit does not make up for
+  const double least_gain = 0.4 * least_evidence * search_.sieve_share();
   for (std::size_t place = 0; place < std::min(most_finalists, ranking.size()); ++place) {
     const auto& [effect, start, gain] = *ranking[place];
-    const double least_gain = 0.4 * least_evidence * search_.sieve_share();
     if (gain < std::max(least_gain, of_best * ranking[0]->gain)) break;
-    tell(done + 0.12 + 0.08 * static_cast<double>(place) / most_finalists, "fitting " + kind_of(effect));
+    options_.tell(done + 0.12 + 0.08 * static_cast<double>(place) / most_finalists,
+                  "fitting " + kind_of(effect));
     Hypothesis h = start;
     search_.refine(current_, h);
     if (round == 0) search_.simulate(h);
@@ -311,7 +308,7 @@ std::size_t Growth::choose(std::vector<Believed>& believed) {
       1)
     for (Believed& b : believed) {
       if (b.score <= to_reach) continue;
-      tell(0.8, "fitting " + kind_of(b.effect) + " to the end");
+      options_.tell(0.8, "fitting " + kind_of(b.effect) + " to the end");
       Hypothesis further = b.hypothesis;
       search_.refine(b.hypothesis, further);
       const double gain = b.hypothesis.train.objective - further.train.objective;
@@ -349,7 +346,7 @@ bool Growth::exchange() {
     for (const std::size_t other : near_[effect])
       if (!is_found(other) && !exchanged_.contains({effect, other})) others.push_back(other);
     if (others.empty()) continue;
-    tell(0.8, "is it still " + kind_of(effect));
+    options_.tell(0.8, "is it still " + kind_of(effect));
     const Hypothesis without = search_.without(current_, effect);
     if (!std::isfinite(without.train.objective)) continue;
     const double to_beat = search_.sieved(current_).train.objective - price_of(effect);
@@ -379,15 +376,17 @@ bool Growth::exchange() {
 bool Growth::try_pairs(const std::vector<std::pair<std::size_t, Hypothesis>>& contenders) {
   std::optional<Hypothesis> best;
   std::vector<std::size_t> best_found;
+  std::optional<double> to_beat;  // on the sieve, by the best so far
   for (std::size_t a = 0; a < contenders.size(); ++a)
     for (std::size_t b = a + 1; b < contenders.size(); ++b) {
       const std::size_t first = contenders[a].first, second = contenders[b].first;
       if (found_.size() > 2 || (found_.size() == 2 && is_found(first) && is_found(second))) continue;
       if (!paired_.insert(std::minmax(first, second)).second) continue;
-      tell(0.83, "trying " + kind_of(first) + " with " + kind_of(second));
+      options_.tell(0.83, "trying " + kind_of(first) + " with " + kind_of(second));
       const Hypothesis& so_far = best ? *best : current_;
       const Hypothesis quick = search_.screened_pair(given_, contenders[a].second, contenders[b].second);
-      if (!(quick.train.objective < search_.sieved(so_far).train.objective)) continue;
+      if (!to_beat) to_beat = search_.sieved(so_far).train.objective;
+      if (!(quick.train.objective < *to_beat)) continue;
       Hypothesis h = search_.with_pair(given_, contenders[a].second, contenders[b].second);
       const Improvement improvement = compare(so_far, h);
       const double price = parameter_price * static_cast<double>(h.free.size() - current_.free.size());
@@ -398,6 +397,7 @@ bool Growth::try_pairs(const std::vector<std::pair<std::size_t, Hypothesis>>& co
       if (!simulates_as_well(h)) continue;
       best = std::move(h);
       best_found = {first, second};
+      to_beat.reset();
     }
   if (!best) return false;
   for (const std::size_t effect : best_found)
@@ -413,7 +413,7 @@ void Growth::prune() {
   while (again) {
     again = false;
     for (std::size_t i = 0; i < found_.size(); ++i) {
-      tell(0.85, "is " + kind_of(found_[i]) + " still needed");
+      options_.tell(0.85, "is " + kind_of(found_[i]) + " still needed");
       Hypothesis h = search_.without(current_, found_[i]);
       if (!std::isfinite(h.train.objective)) continue;
       const Improvement improvement = compare(h, current_);

@@ -85,8 +85,7 @@ std::array<double, 2> draw(const std::vector<LinearStep>& steps, const std::arra
 
 SimulationFloor simulation_floor(const FitData& data, const FitPoint& point) {
   FitPoint plain = point;
-  plain.noise.force = plain.noise.torque = 0.0;
-  plain.noise.sensors = 1.0;
+  plain.noise = sensors_only(plain.noise);
   const std::vector<std::vector<LinearStep>> steps = linearise(data, plain);
   constexpr std::size_t draws = 32;
   std::array<double, draws> sums{};

@@ -109,10 +109,6 @@ std::vector<ParameterEstimate> estimates_of(std::size_t effect, const Hypothesis
   return result;
 }
 
-std::string kind_of(std::size_t effect) {
-  return std::string(effect_registry()[effect].kind);
-}
-
 Search::Search(const Plant& plant, const std::vector<Measurement>& runs, const FitData& train,
                const FitData& held)
     : given_(plant), plant_(plant), train_(train), held_(held), range_(range_of(runs, plant)) {

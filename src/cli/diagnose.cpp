@@ -33,10 +33,6 @@ struct DiagnoseFlags {
   bool trials = false;
 };
 
-std::string kind_of(std::size_t effect) {
-  return std::string(effect_registry()[effect].kind);
-}
-
 /// A bar on stderr, only where a person watches.
 void show_progress(double done, const std::string& what) {
   constexpr int width = 30;

@@ -57,10 +57,6 @@ namespace fs = std::filesystem;
 constexpr double shown_evidence = 25.0;
 constexpr double shown_ratio = 1.2;
 
-std::string kind_of(std::size_t effect) {
-  return std::string(effect_registry()[effect].kind);
-}
-
 struct Flags {
   std::uint64_t seed = 1;
   std::size_t cases = 0;

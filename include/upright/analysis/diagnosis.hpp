@@ -11,6 +11,9 @@
 
 namespace upright {
 
+/// The name of an effect in plant files.
+std::string kind_of(std::size_t effect);
+
 enum class Verdict { explained, no_discrepancy, unexplained, not_excited };
 std::string_view name_of(Verdict verdict);
 
@@ -92,6 +95,9 @@ struct Diagnosis {
 struct DiagnosisOptions {
   /// Told from time to time how far the work is (0 to 1) and what it does.
   std::function<void(double, const std::string&)> progress;
+  void tell(double done, const std::string& what) const {
+    if (progress) progress(done, what);
+  }
 };
 
 /// Diagnoses. Throws ConfigError when the plant cannot be simulated or shares nothing with the runs.

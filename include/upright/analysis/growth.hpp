@@ -61,7 +61,6 @@ class Growth {
     std::vector<std::size_t> found;
   };
 
-  void tell(double done, const std::string& what);
   std::vector<std::size_t> open_candidates() const;
   /// Those that promise a share of what the best one does, some at least, and all that cannot promise. A
   /// promise is kept within a factor of a few (measured on the matrix), so that the best is among them.

@@ -49,9 +49,6 @@ inline constexpr double confusable_evidence = 16.0;
 /// What a hypothesis says about one effect, as numbers with intervals.
 std::vector<ParameterEstimate> estimates_of(std::size_t effect, const Hypothesis& h);
 
-/// The name of an effect in plant files.
-std::string kind_of(std::size_t effect);
-
 class Search {
  public:
   Search(const Plant& plant, const std::vector<Measurement>& runs, const FitData& train, const FitData& held);
