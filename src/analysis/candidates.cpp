@@ -89,6 +89,12 @@ std::vector<FreeParameter> free_parameters(std::size_t effect, const DataRange& 
   for (std::size_t i = 0; i < info.parameters.size(); ++i) {
     FreeParameter p = free_parameter(effect, i, range);
     const std::string_view name = info.parameters[i].name;
+    if (info.enters == Enters::cart && info.dry && info.parameters[i].unit == "N" &&
+        range.largest_force_n > 0.0) {
+      // Dry friction that the motor cannot overcome would hold the cart for good.
+      constexpr double beyond_motor = 2.0;
+      p.high = std::min(p.high, beyond_motor * range.largest_force_n);
+    }
     if (name == "shape") {
       p.prior_mean = 2.0;
       p.prior_sigma = 0.5;

@@ -59,6 +59,7 @@ class Diagnostician {
     options_.tell(0.92, "measuring the gap");
     ResidualStructure left = examine();
     if (!left.structured) compare_held_out(left);
+    if (!left.structured) doubt_what_cannot_be(left);
     return left;
   }
 
@@ -210,6 +211,7 @@ class Diagnostician {
     }
     std::stable_sort(result_.candidates.begin(), result_.candidates.end(),
                      [](const auto& a, const auto& b) { return a.evidence > b.evidence; });
+    note_doubtful_numbers();
     decide(structure);
     trace_residuals();
     find_confusable();
@@ -261,6 +263,47 @@ class Diagnostician {
     text << "a plain simulation of held-out runs is " << excess
          << " times as far off as noise like what is left of the others makes it at most";
     structure.sentence = text.str();
+  }
+
+  /// A scale at the end of what it may be stands for something else.
+  void doubt_what_cannot_be(ResidualStructure& structure) const {
+    constexpr double nearly = 1e-3;
+    for (const std::size_t effect : all_found()) {
+      const auto [scale, parameter] = scale_of(effect);
+      if (parameter == nullptr) continue;
+      const bool low = scale < parameter->low * (1.0 + nearly);
+      if (!low && scale < parameter->high * (1.0 - nearly)) continue;
+      structure.structured = true;
+      std::ostringstream text;
+      text.precision(3);
+      text << "it takes a " << kind_of(effect) << " of " << scale << (low ? " or less" : " or more")
+           << ", which cannot be: something else is missing";
+      structure.sentence = text.str();
+    }
+  }
+
+  /// A scale among what was fitted, and how far it may go; else none.
+  std::pair<double, const FreeParameter*> scale_of(std::size_t effect) const {
+    for (const FreeParameter& p : known_.free)
+      if (p.effect == effect && effect_registry()[effect].parameters[p.index].name == "scale")
+        return {known_.train.point.plant.find(effect)->values[p.index], &p};
+    return {1.0, nullptr};
+  }
+
+  /// Numbers of the plant file that are off by more than a data sheet is.
+  void note_doubtful_numbers() {
+    constexpr double far = 0.2;
+    for (const std::size_t effect : all_found()) {
+      const double scale = scale_of(effect).first;
+      if (effect_registry()[effect].enters != Enters::parameter || std::abs(std::log(scale)) < far) continue;
+      std::ostringstream text;
+      text.precision(3);
+      text << "check " << kind_of(effect) << " another way: " << scale
+           << " times what the plant file says is far off for such a number; what was found beside it is no "
+              "more "
+              "certain than that";
+      result_.notes.push_back(text.str());
+    }
   }
 
   std::vector<std::size_t> all_found() const {

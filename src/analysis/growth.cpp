@@ -29,6 +29,8 @@ constexpr double least_certainty = 4.0;
 /// What each parameter beyond the first must save on top: a simpler effect that does nearly as well is
 /// preferred.
 constexpr double parameter_price = 10.0;
+/// Evidence by which two do equally well: the plainer one is taken.
+constexpr double equally_good = 4.0;
 constexpr int most_rounds = 4;
 constexpr std::size_t most_finalists = 4;
 /// What gains this share of what the best does may be the same thing by another name, or half of it.
@@ -127,9 +129,16 @@ bool Growth::is_certain(Hypothesis& h, std::size_t effect) {
   if (so_far >= least_certainty) return true;
   constexpr double of_noise_not_white = 4.0;
   if (compare(current_, h).train < of_noise_not_white * std::max(so_far * so_far, 1.0)) return false;
-  Hypothesis further = h;
-  search_.refine(h, further);
-  if (further.train.objective < h.train.objective) h = std::move(further);
+  // Much noise hides what a poor fit leaves, and each gives way to the other by and by.
+  constexpr int most_turns = 6;
+  constexpr double helps = 10.0;
+  for (int turn = 0; turn < most_turns; ++turn) {
+    Hypothesis further = h;
+    search_.refine(h, further);
+    const double gain = h.train.objective - further.train.objective;
+    if (gain > 0.0) h = std::move(further);
+    if (!(gain > helps)) break;
+  }
   return search_.certainty(h, effect) >= least_certainty;
 }
 
@@ -297,7 +306,7 @@ std::vector<Growth::Believed> Growth::believe(int round, const std::vector<Scree
 }
 
 std::size_t Growth::choose(std::vector<Believed>& believed) {
-  constexpr double close = 0.05, equal = 4.0;
+  constexpr double close = 0.05;
   const auto largest = [&] {
     double score = -infinity;
     for (const Believed& b : believed) score = std::max(score, b.score);
@@ -319,7 +328,7 @@ std::size_t Growth::choose(std::vector<Believed>& believed) {
   const double best = largest();
   std::size_t chosen = believed.size();
   for (std::size_t i = 0; i < believed.size(); ++i)
-    if (believed[i].score > best - equal &&
+    if (believed[i].score > best - equally_good &&
         (chosen == believed.size() || is_plainer(believed[i].effect, believed[chosen].effect)))
       chosen = i;
   return chosen;
@@ -335,8 +344,13 @@ void Growth::take(int round, Believed& best, const std::vector<Screened>& screen
   const auto winner =
       std::find_if(screened.begin(), screened.end(), [&](const Screened& s) { return s.effect == effect; });
   for (const Screened& s : screened)
-    if (s.effect != effect && s.gain > resembles * winner->gain) near_[effect].push_back(s.effect);
+    if (s.effect != effect && (s.gain > resembles * winner->gain || is_half_of(s.effect, effect)))
+      near_[effect].push_back(s.effect);
   record_step();
+}
+
+bool Growth::is_half_of(std::size_t half, std::size_t effect) {
+  return kind_of(effect) == "friction_asymmetry" && kind_of(half) == "coulomb_friction";
 }
 
 bool Growth::exchange() {
@@ -350,14 +364,22 @@ bool Growth::exchange() {
     const Hypothesis without = search_.without(current_, effect);
     if (!std::isfinite(without.train.objective)) continue;
     const double to_beat = search_.sieved(current_).train.objective - price_of(effect);
+    const double worth = search_.sieved(without).train.objective - to_beat;
     for (const std::size_t other : others) {
-      exchanged_.insert({effect, other});
+      // The other half of the force may be found later.
+      if (!is_half_of(other, effect)) exchanged_.insert({effect, other});
       Hypothesis h = search_.screened(without, other);
+      // What was found beside the one is of the wrong size for the other: the way is longer than a few steps.
+      constexpr double may_do = 0.5;
+      if (h.train.objective + price_of(other) < to_beat + may_do * worth) search_.settle_on_sieve(h);
       if (!(h.train.objective + price_of(other) < to_beat + confusable_evidence)) continue;
       search_.refine(without, h);
       const Improvement improvement = compare(current_, h);
       const double evidence = improvement.train + price_of(effect) - price_of(other);
-      if (!(evidence > confusable_evidence) || !(improvement.held > 0.0)) continue;
+      const bool plainer = is_plainer(other, effect);
+      if (!(evidence > (plainer ? -equally_good : confusable_evidence)) ||
+          !(improvement.held > (plainer ? -equally_good : 0.0)))
+        continue;
       if (!search_.is_plausible(h, other) || search_.certainty(h, other) < least_certainty ||
           !simulates_as_well(h))
         continue;

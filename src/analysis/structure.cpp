@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numeric>
 #include <sstream>
+#include <string_view>
 
 #include "upright/analysis/residual.hpp"
 
@@ -19,6 +20,8 @@ constexpr double least_dependence = 3.5;
 /// cases of the matrix 7 were as uneven and 12 went with something as much, none did both. Backlash does.
 constexpr double uneven = 1.3;
 constexpr double suspected_dependence = 2.5;
+/// No sensor is perfect: a shift of what it shows counts when it accounts for this share of what is left.
+constexpr double least_sensor_share = 0.05;
 /// Kurtosis of the pulses of a disturbance that does not come in bursts. A Gaussian's is 3.
 constexpr double heaviest_tails = 5.5;
 /// What is left may push this many times as hard over a tenth of a second and more as white noise that
@@ -161,22 +164,44 @@ std::pair<double, std::size_t> explained_share(const Rows& rows, const std::vect
   return {total > 0.0 ? 1.0 - left / total : 0.0, best};
 }
 
-/// Forces and torques that no effect of the registry has, as the residual might follow them: of unit size.
+/// What no effect of the registry has, as the residual might follow it, of unit size: a force or torque, or a
+/// shift of what a sensor shows, as when its drive gives way or has play.
+enum class ActsOn { cart, pendulum, position, angle };
 struct Probe {
   const char* name;
-  bool torque;
+  ActsOn on;
+  const char* looks_like = "";
 };
-constexpr std::array probes = {Probe{"time", false},
-                               Probe{"time and direction of motion", false},
-                               Probe{"time and velocity", false},
-                               Probe{"time and voltage", false},
-                               Probe{"the time after a reversal of motion", false},
-                               Probe{"the time after a reversal of motion", false},
-                               Probe{"the time after a reversal of voltage", false},
-                               Probe{"time", true},
-                               Probe{"time and direction of the pendulum", true},
-                               Probe{"time and the pendulum's rate", true},
-                               Probe{"the time after a reversal of the pendulum", true}};
+constexpr std::array probes = {
+    Probe{"time", ActsOn::cart},
+    Probe{"time and direction of motion", ActsOn::cart},
+    Probe{"time and velocity", ActsOn::cart},
+    Probe{"time and voltage", ActsOn::cart},
+    Probe{"the time after a reversal of motion", ActsOn::cart},
+    Probe{"the time after a reversal of motion", ActsOn::cart},
+    Probe{"the time after a reversal of voltage", ActsOn::cart},
+    Probe{"time", ActsOn::pendulum},
+    Probe{"time and direction of the pendulum", ActsOn::pendulum},
+    Probe{"time and the pendulum's rate", ActsOn::pendulum},
+    Probe{"the time after a reversal of the pendulum", ActsOn::pendulum},
+    Probe{"voltage", ActsOn::position, ", as if the drive gave way between the encoder and the cart"},
+    Probe{"direction of motion", ActsOn::position, ", as if the encoder had play"},
+    Probe{"direction of the pendulum", ActsOn::angle, ", as if the encoder had play"}};
+constexpr bool is_sensor(ActsOn on) {
+  return on == ActsOn::position || on == ActsOn::angle;
+}
+constexpr std::string_view place_of(ActsOn on) {
+  switch (on) {
+    case ActsOn::cart:
+      return "in the cart equation";
+    case ActsOn::pendulum:
+      return "in the pendulum equation";
+    case ActsOn::position:
+      return "in the measured position";
+    default:
+      return "in the measured angle";
+  }
+}
 using ProbeValues = std::array<double, probes.size()>;
 
 /// Follows one run of samples and says what each probe is at the last one.
@@ -200,7 +225,10 @@ class ProbeState {
             t,
             t * turn,
             t * theta_radps,
-            pendulum_.fading(0.1)};
+            pendulum_.fading(0.1),
+            voltage_v,
+            direction,
+            turn};
   }
 
  private:
@@ -226,18 +254,19 @@ struct Response {
   std::array<double, states> error{};
 
   /// Carries the error over a sample period in which the force or torque was `size`.
-  void advance(const LinearStep& step, bool torque, double size) {
-    const double* by = torque ? step.by_torque : step.by_force;
+  void advance(const LinearStep& step, ActsOn on, double size) {
+    const double* by = on == ActsOn::pendulum ? step.by_torque : step.by_force;
+    const double impulse = is_sensor(on) ? 0.0 : step.period_s * size;
     std::array<double, states> next{};
     for (int i = 0; i < states; ++i) {
-      next[i] = (step.transition[i][2] * by[0] + step.transition[i][3] * by[1]) * step.period_s * size;
+      next[i] = (step.transition[i][2] * by[0] + step.transition[i][3] * by[1]) * impulse;
       for (int j = 0; j < states; ++j) next[i] += step.transition[i][j] * error[j];
     }
     error = next;
   }
-  /// What it shows in one channel, which the filter then corrects.
-  double show(const LinearStep& step, int channel) {
-    const double shown = step.gain[channel] * error[channel];
+  /// What it shows in one channel, which the filter then corrects; the sensor itself may be off by `shift`.
+  double show(const LinearStep& step, int channel, double shift = 0.0) {
+    const double shown = step.gain[channel] * error[channel] + shift;
     for (int i = 0; i < states; ++i) error[i] -= step.update[channel][i] * shown;
     return shown;
   }
@@ -254,6 +283,7 @@ struct Score {
 
 /// What whitened innovations say, a block at a time.
 struct Blocks {
+  double power = 0.0;                                   ///< sum of their squares
   std::vector<double> rms;                              ///< of whitened innovations
   std::array<std::vector<Score>, probes.size()> probe;  ///< each probe in each block
   std::array<std::vector<double>, 2> pulses;            ///< a short force and torque, in standard errors
@@ -275,8 +305,8 @@ void examine_segment(const Measurement& run, const Segment& segment, const Plant
   for (std::size_t k = 0; k < steps.size(); ++k) {
     const LinearStep& step = steps[k];
     if (k > 0) {
-      for (std::size_t i = 0; i < probes.size(); ++i) responses[i].advance(step, probes[i].torque, acting[i]);
-      for (int i = 0; i < 2; ++i) pulses[i].advance(step, i == 1, 1.0);
+      for (std::size_t i = 0; i < probes.size(); ++i) responses[i].advance(step, probes[i].on, acting[i]);
+      for (int i = 0; i < 2; ++i) pulses[i].advance(step, i == 1 ? ActsOn::pendulum : ActsOn::cart, 1.0);
     }
     double update[states] = {};
     for (int channel = 0; channel < 2; ++channel) {
@@ -285,8 +315,10 @@ void examine_segment(const Measurement& run, const Segment& segment, const Plant
       for (int i = 0; i < states; ++i) update[i] += step.update[channel][i] * e;
       sum += step.weight[channel] * e * e / step.variance[channel];
       count += step.weight[channel];
+      const ActsOn sensor = channel == 0 ? ActsOn::position : ActsOn::angle;
       for (std::size_t i = 0; i < probes.size(); ++i)
-        scores[i].add(responses[i].show(step, channel), e, step.variance[channel] / step.weight[channel]);
+        scores[i].add(responses[i].show(step, channel, probes[i].on == sensor ? acting[i] : 0.0), e,
+                      step.variance[channel] / step.weight[channel]);
       for (int i = 0; i < 2; ++i)
         pulse_scores[i].add(pulses[i].show(step, channel), e, step.variance[channel] / step.weight[channel]);
     }
@@ -295,6 +327,7 @@ void examine_segment(const Measurement& run, const Segment& segment, const Plant
     if ((k + 1) % length != 0) continue;
     constexpr double enough = 10.0;
     if (count > enough) blocks.rms.push_back(std::sqrt(sum / count));
+    blocks.power += sum;
     for (std::size_t i = 0; i < probes.size(); ++i) blocks.probe[i].push_back(scores[i]);
     for (int i = 0; i < 2; ++i)
       if (pulse_scores[i].information > 0.0)
@@ -328,6 +361,16 @@ double certainty_of(const std::vector<Score>& scores) {
   return spread > 0.0 ? std::abs(sum) / std::sqrt(std::max(spread, information)) : 0.0;
 }
 
+/// Share of the innovations' power that a probe accounts for.
+double share_of(const std::vector<Score>& scores, double power) {
+  double sum = 0.0, information = 0.0;
+  for (const Score& s : scores) {
+    sum += s.score;
+    information += s.information;
+  }
+  return information > 0.0 && power > 0.0 ? sum * sum / (information * power) : 0.0;
+}
+
 }  // namespace
 
 ResidualPlace locate_residual(const FitData& data, const FitPoint& point) {
@@ -356,9 +399,10 @@ ResidualStructure examine_residuals(const FitData& data, const FitPoint& point) 
   for (std::size_t i = 0; i < probes.size(); ++i) {
     const double certainty = certainty_of(blocks.probe[i]);
     if (certainty <= result.certainty) continue;
+    if (is_sensor(probes[i].on) && share_of(blocks.probe[i], blocks.power) < least_sensor_share) continue;
     result.certainty = certainty;
-    result.goes_with = probes[i].name;
-    result.in_pendulum = probes[i].torque;
+    result.goes_with =
+        std::string(probes[i].name) + " " + std::string(place_of(probes[i].on)) + probes[i].looks_like;
   }
   return result;
 }
@@ -393,13 +437,12 @@ void judge_structure(ResidualStructure& s) {
          << " (dependence " << s.certainty << " standard errors)";
   } else if (s.certainty > least_dependence) {
     s.structured = true;
-    text << "what is left goes with " << s.goes_with << " in the " << (s.in_pendulum ? "pendulum" : "cart")
-         << " equation (" << s.certainty << " standard errors)";
+    text << "what is left goes with " << s.goes_with << " (" << s.certainty << " standard errors)";
   } else if (s.dispersion > uneven && s.certainty > suspected_dependence) {
     s.structured = true;
     text << "what is left is uneven (some stretches are " << s.dispersion
-         << " times as far off as most) and may go with " << s.goes_with << " in the "
-         << (s.in_pendulum ? "pendulum" : "cart") << " equation (" << s.certainty << " standard errors)";
+         << " times as far off as most) and may go with " << s.goes_with << " (" << s.certainty
+         << " standard errors)";
   } else {
     text << "what is left is a disturbance that is the same all along and goes with nothing that was "
             "measured "

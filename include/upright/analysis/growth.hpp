@@ -105,8 +105,11 @@ class Growth {
   std::size_t choose(std::vector<Believed>& believed);
   void take(int round, Believed& best, const std::vector<Screened>& screened);
   /// What was the best name while another effect was still missing need not be the best beside it: each but
-  /// the last is exchanged for what had resembled it, where that does better now. Whether one was.
+  /// the last is exchanged for what had resembled it, where that does better now, or as well and is plainer.
+  /// Whether one was.
   bool exchange();
+  /// Dry friction in one direction only is Coulomb friction with a constant force as large.
+  static bool is_half_of(std::size_t half, std::size_t effect);
   /// Two effects can hide each other, so that a third, which resembles both, is found instead. Every pair of
   /// these is tried in the place of what was found of them, once. Whether one is better.
   bool try_pairs(const std::vector<std::pair<std::size_t, Hypothesis>>& contenders);

@@ -6,8 +6,8 @@
 // - tails: short pulses of force or torque, fitted block by block, have no heavier tails than a Gaussian;
 // - colour: over a tenth of a second and more force and torque are not much larger than as white noise;
 // - dependence: forces that no effect of the registry has (that drift with time, friction that changes with
-// time,
-//   what fades after a reversal) do not show.
+//   time, what fades after a reversal) do not show, nor do shifts of what the sensors show that go with the
+//   voltage or the direction (a drive that gives way or has play between the encoder and what it measures).
 #pragma once
 
 #include <string>
@@ -25,8 +25,7 @@ struct ResidualStructure {
   double dispersion = 1.0;   ///< 95th percentile of block rms over its median
   Tails tails;               ///< of the pulses
   double certainty = 0.0;    ///< of the dependence that shows most [standard errors]
-  std::string goes_with;     ///< that dependence
-  bool in_pendulum = false;  ///< it is a torque, not a force
+  std::string goes_with;     ///< what with, and where: in which equation or sensor
   /// How much larger slow force and torque are, a few hertz and below, than white noise that accounts for the
   /// samples: a disturbance whose colour the filter does not know is estimated where the samples show it
   /// best, and a plain simulation is moved by what is slow. At least 1.
