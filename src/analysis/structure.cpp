@@ -414,6 +414,9 @@ void judge_structure(ResidualStructure& s) {
   s.beyond_sensors = s.noise_ratio > as_sensors;
   if (!s.beyond_sensors) {
     text << "what is left is the sensors' own noise";
+  } else if (s.certainty > least_dependence) {
+    s.structured = true;
+    text << "what is left goes with " << s.goes_with << " (" << s.certainty << " standard errors)";
   } else if (s.dispersion > 1.6) {
     s.structured = true;
     text << "what is left comes in bursts: some stretches are " << s.dispersion
@@ -435,9 +438,6 @@ void judge_structure(ResidualStructure& s) {
     text << "a plain simulation is " << s.excess
          << " times as far off as noise like what is left makes it at most"
          << " (dependence " << s.certainty << " standard errors)";
-  } else if (s.certainty > least_dependence) {
-    s.structured = true;
-    text << "what is left goes with " << s.goes_with << " (" << s.certainty << " standard errors)";
   } else if (s.dispersion > uneven && s.certainty > suspected_dependence) {
     s.structured = true;
     text << "what is left is uneven (some stretches are " << s.dispersion

@@ -150,6 +150,25 @@ TEST(Diagnosis, SaysUnexplainedOfBacklash) {
   EXPECT_EQ(diagnose(believed_plant(), hanging_runs(rig, 16)).verdict, Verdict::unexplained);
 }
 
+TEST(Diagnosis, SaysWhatAYieldingDriveLooksLike) {
+  std::mt19937_64 random(18);
+  const blind::Rig rig{.plant = true_plant(random),
+                       .unknown = blind::Unknown::yielding_drive,
+                       .compliance_m_per_n = 5e-5,
+                       .disturbance_n = 0.05};
+  std::vector<Measurement> runs;
+  for (unsigned r = 0; r < 3; ++r) {
+    blind::Plan plan;
+    plan.rate_hz = 250.0;
+    plan.experiment = blind::Experiment::square;
+    plan.seed = 1800 + r;
+    runs.push_back(measure(rig, plan, std::string("run").append(std::to_string(r))));
+  }
+  const Diagnosis d = diagnose(believed_plant(), runs);
+  EXPECT_EQ(d.verdict, Verdict::unexplained);
+  EXPECT_NE(d.residual.find("voltage in the measured position"), std::string::npos) << d.residual;
+}
+
 /// A case of the matrix: experiments, rate, number and length of runs, falls and gaps follow from the seed.
 struct BlindCase {
   std::vector<std::string> hidden;
