@@ -1018,7 +1018,7 @@ FitResult follow_through_noise(const FitData& segment, FitPoint point, const Fit
 
 FitResult follow_segment(const FitData& segment, const FitPoint& point, const FitOptions& options) {
   FitResult found = fit(segment, point, {}, options);
-  constexpr double suspicious = 2.0;  // so far off, in noise standard deviations, that it may be elsewhere
+  constexpr double suspicious = 1.3;  // so far off, in noise standard deviations, that it may be elsewhere
   if (whitened_rms(found) < suspicious) return found;
   FitResult other = follow_through_noise(segment, point, options);
   return other.objective < found.objective ? other : found;

@@ -62,12 +62,14 @@ bool Growth::find_pairs_of_all() {
 
 bool Growth::find_thoroughly() {
   const std::vector<std::size_t> before = found_;
+  const double objective = current_.train.objective;
   grow(most_rounds, 2 * most_rounds, true);
   if (search_.sieve_share() < 1.0) {
     search_.sieve_all();
     grow(2 * most_rounds, 3 * most_rounds, false);
   }
-  if (found_ == before) return false;
+  // On the way a better place may have been found for the noise alone.
+  if (found_ == before) return current_.train.objective < objective - equally_good;
   prune();
   return true;
 }
@@ -115,7 +117,7 @@ bool Growth::is_believed(const Improvement& improvement, std::size_t effect) {
   constexpr double indifferent = 1.4;
   if (evidence < least_evidence || !(improvement.held > -indifferent)) return false;
   // What a few moments hold has a small t: then the held-out runs must hold as much again.
-  constexpr double least_t_borne_out = 2.0;
+  constexpr double least_t_borne_out = 1.5;
   return improvement.t_value > least_t || evidence > overwhelming_evidence ||
          (improvement.t_value > least_t_borne_out && improvement.held > least_evidence);
 }
@@ -229,7 +231,7 @@ void Growth::grow(int first_round, int last_round, bool calmly) {
 bool Growth::add_best(int round, bool calmly) {
   const double done = std::min(0.05 + 0.2 * round, 0.7);
   const std::vector<Screened> screened = screen(round, calmly, done);
-  std::vector<Believed> believed = believe(round, screened, done);
+  std::vector<Believed> believed = believe(round, screened, calmly, done);
   if (believed.empty()) return false;
   take(round, believed[choose(believed)], screened);
   while (exchange()) {
@@ -255,7 +257,8 @@ std::vector<Growth::Screened> Growth::screen(int round, bool calmly, double done
   return screened;
 }
 
-std::vector<Growth::Believed> Growth::believe(int round, const std::vector<Screened>& screened, double done) {
+std::vector<Growth::Believed> Growth::believe(int round, const std::vector<Screened>& screened, bool calmly,
+                                              double done) {
   std::vector<const Screened*> ranking;
   ranking.reserve(screened.size());
   for (const Screened& s : screened) ranking.push_back(&s);
@@ -286,7 +289,7 @@ std::vector<Growth::Believed> Growth::believe(int round, const std::vector<Scree
         doubtful.push_back({effect, h, improvement.train - price_of(effect)});
       continue;
     }
-    if (improvement.train < overwhelming_evidence) {
+    if (calmly || improvement.train < overwhelming_evidence) {
       level_noise(h);
       improvement = compare(current_, h);
       if (!is_believed(improvement, effect)) continue;

@@ -8,15 +8,16 @@ namespace upright {
 
 namespace {
 
-/// How lively a stretch is: root mean square speed of the cart, or of the pendulum where the cart does not
-/// move.
+/// How lively a stretch is: root mean square speed of the cart and of a pendulum of arm's length beside it.
 double liveliness(const Measurement& run, const Segment& stretch) {
-  const std::vector<double>& position = run.has_cart() && !run.cart_locked ? run.cart_m : run.theta_rad;
+  constexpr double arm_m = 0.3;
   const auto stride = std::max<std::size_t>(1, static_cast<std::size_t>(0.02 / run.median_period_s()));
   double sum = 0.0, count = 0.0;
   for (std::size_t k = stretch.first + stride; k <= stretch.last; k += stride) {
-    const double speed = (position[k] - position[k - stride]) / (run.time_s[k] - run.time_s[k - stride]);
-    sum += speed * speed;
+    const double dt = run.time_s[k] - run.time_s[k - stride];
+    const double cart = run.has_cart() ? (run.cart_m[k] - run.cart_m[k - stride]) / dt : 0.0;
+    const double tip = run.has_theta() ? arm_m * (run.theta_rad[k] - run.theta_rad[k - stride]) / dt : 0.0;
+    sum += cart * cart + tip * tip;
     count += 1.0;
   }
   return std::sqrt(sum / std::max(count, 1.0));

@@ -326,7 +326,8 @@ void examine_segment(const Measurement& run, const Segment& segment, const Plant
                       run.voltage_v[segment.first + k]);
     if ((k + 1) % length != 0) continue;
     constexpr double enough = 10.0;
-    if (count > enough) blocks.rms.push_back(std::sqrt(sum / count));
+    constexpr double at_rest = 0.1;  // within a step of its encoder a cart shows no noise
+    if (count > enough && sum > at_rest * at_rest * count) blocks.rms.push_back(std::sqrt(sum / count));
     blocks.power += sum;
     for (std::size_t i = 0; i < probes.size(); ++i) blocks.probe[i].push_back(scores[i]);
     for (int i = 0; i < 2; ++i)

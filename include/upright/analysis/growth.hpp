@@ -99,7 +99,7 @@ class Growth {
   std::vector<Screened> screen(int round, bool calmly, double done);
   /// The best of them fitted in full: those that the data believe, or, where there are none, those that only
   /// held-out runs speak against.
-  std::vector<Believed> believe(int round, const std::vector<Screened>& screened, double done);
+  std::vector<Believed> believe(int round, const std::vector<Screened>& screened, bool calmly, double done);
   /// The one with the largest score. Close ones are fitted to the end first, for a fit that stopped a little
   /// early is no reason; scores that are equal then leave it to the plainer effect.
   std::size_t choose(std::vector<Believed>& believed);
