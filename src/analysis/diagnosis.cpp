@@ -29,11 +29,12 @@ constexpr double least_correction_z = 4.0;
 
 class Diagnostician {
  public:
-  Diagnostician(const Plant& plant, const std::vector<Measurement>& runs, const DiagnosisOptions& options)
+  Diagnostician(const Plant& plant, const std::vector<Measurement>& runs, const DiagnosisOptions& options,
+                HeldOut which)
       : plant_(plant),
         runs_(runs),
         options_(options),
-        data_(checked(split(runs))),
+        data_(checked(split(runs, which))),
         search_(plant_, runs_, data_.train, data_.held),
         growth_(search_, options, result_) {}
 
@@ -45,6 +46,9 @@ class Diagnostician {
     conclude(left);
     return std::move(result_);
   }
+  /// Whether held-out runs spoke to the end against what the others show beyond doubt: they excite what is
+  /// missing still, and the others do not.
+  bool contradicted() const { return growth_.contradicted(); }
 
  private:
   static DataSplit checked(DataSplit data) {
@@ -462,7 +466,15 @@ Diagnosis diagnose(const Plant& plant, const std::vector<Measurement>& runs,
   if (!shared)
     throw ConfigError(
         "add the pendulum to the plant file: the runs hold theta_rad only, and the model is a cart alone");
-  return Diagnostician(plant, runs, options).run();
+  Diagnostician diagnostician(plant, runs, options, HeldOut::middle);
+  Diagnosis diagnosis = diagnostician.run();
+  if (diagnosis.verdict != Verdict::unexplained || !diagnostician.contradicted()) return diagnosis;
+  options.tell(0.02, "looking again, with other runs held out");
+  Diagnosis other = Diagnostician(plant, runs, options, HeldOut::other).run();
+  if (other.verdict != Verdict::explained) return diagnosis;
+  other.notes.emplace_back(
+      "the runs held out at first show what no other does: others were held out instead");
+  return other;
 }
 
 }  // namespace upright

@@ -168,6 +168,7 @@ void Growth::end_doubt() {
     current_ = std::move(grown);
   } else {
     found_ = std::move(standing_->found);
+    contradicted_ = true;
     record_step();
   }
   standing_.reset();

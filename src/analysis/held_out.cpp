@@ -23,10 +23,11 @@ double liveliness(const Measurement& run, const Segment& stretch) {
   return std::sqrt(sum / std::max(count, 1.0));
 }
 
-/// Which stretches to hold out, a third of them: the middle one of each three in the order of how lively they
-/// are, so that the fit need not answer for motions beyond those it saw, in whatever order they come.
+/// Which stretches to hold out, a third of them: by default the middle one of each three in the order of how
+/// lively they are, so that the fit need not answer for motions beyond those it saw, in whatever order they
+/// come.
 std::vector<std::size_t> choose_held_out(const std::vector<Measurement>& runs,
-                                         const std::vector<Segment>& stretches) {
+                                         const std::vector<Segment>& stretches, HeldOut which) {
   std::vector<double> lively;
   lively.reserve(stretches.size());
   for (const Segment& stretch : stretches) lively.push_back(liveliness(runs[stretch.run], stretch));
@@ -35,15 +36,16 @@ std::vector<std::size_t> choose_held_out(const std::vector<Measurement>& runs,
   std::stable_sort(order.begin(), order.end(),
                    [&](std::size_t a, std::size_t b) { return lively[a] < lively[b]; });
   std::vector<std::size_t> held;
-  if (order.size() == 2) held = {order[0]};
-  for (std::size_t i = 1; i < order.size() && order.size() > 2; i += 3) held.push_back(order[i]);
+  const bool middle = which == HeldOut::middle;
+  if (order.size() == 2) held = {order[middle ? 0 : 1]};
+  for (std::size_t i = middle ? 1 : 0; i < order.size() && order.size() > 2; i += 3) held.push_back(order[i]);
   std::sort(held.begin(), held.end());
   return held;
 }
 
 }  // namespace
 
-DataSplit split(const std::vector<Measurement>& runs) {
+DataSplit split(const std::vector<Measurement>& runs, HeldOut which) {
   const std::vector<Segment> segments = cut_segments(runs);
   DataSplit result;
   result.train.runs = result.held.runs = &runs;
@@ -51,7 +53,7 @@ DataSplit split(const std::vector<Measurement>& runs) {
   whole.reserve(runs.size());
   for (std::size_t r = 0; r < runs.size(); ++r) whole.push_back({r, 0, runs[r].size() - 1});
   const bool one_run = runs.size() == 1;
-  const std::vector<std::size_t> chosen = choose_held_out(runs, one_run ? segments : whole);
+  const std::vector<std::size_t> chosen = choose_held_out(runs, one_run ? segments : whole, which);
   std::vector<Segment>&train = result.train.segments, &held = result.held.segments;
   for (std::size_t s = 0; s < segments.size(); ++s) {
     const bool out = std::binary_search(chosen.begin(), chosen.end(), one_run ? s : segments[s].run);

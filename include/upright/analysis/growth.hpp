@@ -33,6 +33,9 @@ class Growth {
   const Hypothesis& current() const { return current_; }
   /// In the order in which they were found.
   const std::vector<std::size_t>& found() const { return found_; }
+  /// Whether something was dropped in the end that training runs show beyond doubt, for held-out runs spoke
+  /// against it.
+  bool contradicted() const { return contradicted_; }
   /// What gained a fair share of what this one did, when it was added.
   const std::vector<std::size_t>& near(std::size_t effect) { return near_[effect]; }
   /// Where model and data disagreed before this one was added.
@@ -123,6 +126,7 @@ class Growth {
   Hypothesis given_, current_;
   std::vector<std::size_t> found_;
   std::optional<Standing> standing_;
+  bool contradicted_ = false;
   std::set<std::pair<std::size_t, std::size_t>> exchanged_;  ///< tried already
   std::map<std::size_t, std::vector<std::size_t>> near_;
   std::map<std::size_t, std::string> where_;

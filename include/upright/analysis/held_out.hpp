@@ -13,7 +13,11 @@ struct DataSplit {
   std::vector<std::size_t> held_out_runs;  ///< none of a single run, a third of whose segments is held out
 };
 
-/// Holds out a third, alike in liveliness to the rest.
-DataSplit split(const std::vector<Measurement>& runs);
+/// Which of each three in the order of how lively they are is held out: the middle one, alike to the rest, or
+/// another, where the fit needs what only that middle one shows. (Of two the calmer one, or the other.)
+enum class HeldOut { middle, other };
+
+/// Holds out a third.
+DataSplit split(const std::vector<Measurement>& runs, HeldOut which = HeldOut::middle);
 
 }  // namespace upright
