@@ -445,6 +445,12 @@ void Growth::prune() {
       const Improvement improvement = compare(h, current_);
       if (improvement.train - price_of(found_[i]) > least_evidence && improvement.t_value > 0.7 * least_t)
         continue;
+      if (is_believed(improvement, found_[i])) continue;
+      // What does without it by becoming what cannot be does not do without it.
+      const bool bent = std::any_of(found_.begin(), found_.end(), [&](std::size_t other) {
+        return other != found_[i] && search_.is_plausible(current_, other) && !search_.is_plausible(h, other);
+      });
+      if (bent) continue;
       current_ = std::move(h);
       found_.erase(found_.begin() + static_cast<std::ptrdiff_t>(i));
       record_step();

@@ -215,7 +215,16 @@ bool Search::is_plausible(const Hypothesis& h, std::size_t effect) const {
     if (kind_of(effect).starts_with("angle_offset") && std::abs(value) < 1.5 * range_.theta_resolution_rad)
       return false;
   }
-  return true;
+  return kind_of(effect) != "bristle_friction" || bristles_are_short(h);
+}
+
+bool Search::bristles_are_short(const Hypothesis& h) const {
+  const Plant& plant = h.train.point.plant;
+  const Dynamics<double> dynamics(make_model<double>(plant));
+  const double breakaway_n = dynamics.cart_dry_level(range_.cart_mean_m, 0.0, 1.0);
+  const double stiffness_n_per_m = plant.find(effect_number("bristle_friction"))->values[0];
+  constexpr double share_of_travel = 0.1;
+  return breakaway_n < stiffness_n_per_m * share_of_travel * (range_.cart_high_m - range_.cart_low_m);
 }
 
 double Search::certainty(const Hypothesis& h, std::size_t effect) const {

@@ -118,6 +118,8 @@ class Search {
   /// Follows held-out data with the fitted noise, for their surprise.
   void weigh(Hypothesis& h) const;
   double surprise_of(const Hypothesis& h) const;
+  /// Bristles that bend over a good part of the track before they slide are a spring by another name.
+  bool bristles_are_short(const Hypothesis& h) const;
   /// A hypothesis's point on the sieve alone.
   FitPoint sieve_point(const Hypothesis& base) const;
   std::vector<FreeParameter> free_of(const std::set<std::size_t>& added) const;
