@@ -303,9 +303,7 @@ class Diagnostician {
       std::ostringstream text;
       text.precision(3);
       text << "check " << kind_of(effect) << " another way: " << scale
-           << " times what the plant file says is far off for such a number; what was found beside it is no "
-              "more "
-              "certain than that";
+           << " times what the plant file says is far off; what was found beside it is no more certain";
       result_.notes.push_back(text.str());
     }
   }
