@@ -443,9 +443,9 @@ void Growth::prune() {
       Hypothesis h = search_.without(current_, found_[i]);
       if (!std::isfinite(h.train.objective)) continue;
       const Improvement improvement = compare(h, current_);
-      if (improvement.train - price_of(found_[i]) > least_evidence && improvement.t_value > 0.7 * least_t)
-        continue;
-      if (is_believed(improvement, found_[i])) continue;
+      const bool still_shown =
+          improvement.train - price_of(found_[i]) > least_evidence && improvement.t_value > 0.7 * least_t;
+      if (still_shown || is_believed(improvement, found_[i])) continue;
       // What does without it by becoming what cannot be does not do without it.
       const bool bent = std::any_of(found_.begin(), found_.end(), [&](std::size_t other) {
         return other != found_[i] && search_.is_plausible(current_, other) && !search_.is_plausible(h, other);

@@ -350,26 +350,28 @@ double robust_deviation(std::vector<double> values) {
   return *middle / median_of_gaussian;
 }
 
+Score sum_of(const std::vector<Score>& scores) {
+  Score sum;
+  for (const Score& s : scores) {
+    sum.score += s.score;
+    sum.information += s.information;
+  }
+  return sum;
+}
+
 /// How certainly the residual goes with a probe, by the scatter of its scores over blocks: honest where the
 /// innovations are not white.
 double certainty_of(const std::vector<Score>& scores) {
-  double sum = 0.0, spread = 0.0, information = 0.0;
-  for (const Score& s : scores) {
-    sum += s.score;
-    spread += s.score * s.score;
-    information += s.information;
-  }
-  return spread > 0.0 ? std::abs(sum) / std::sqrt(std::max(spread, information)) : 0.0;
+  const Score sum = sum_of(scores);
+  double spread = 0.0;
+  for (const Score& s : scores) spread += s.score * s.score;
+  return spread > 0.0 ? std::abs(sum.score) / std::sqrt(std::max(spread, sum.information)) : 0.0;
 }
 
 /// Share of the innovations' power that a probe accounts for.
 double share_of(const std::vector<Score>& scores, double power) {
-  double sum = 0.0, information = 0.0;
-  for (const Score& s : scores) {
-    sum += s.score;
-    information += s.information;
-  }
-  return information > 0.0 && power > 0.0 ? sum * sum / (information * power) : 0.0;
+  const Score sum = sum_of(scores);
+  return sum.information > 0.0 && power > 0.0 ? sum.score * sum.score / (sum.information * power) : 0.0;
 }
 
 }  // namespace

@@ -18,6 +18,6 @@ struct DataSplit {
 enum class HeldOut { middle, other };
 
 /// Holds out a third.
-DataSplit split(const std::vector<Measurement>& runs, HeldOut which = HeldOut::middle);
+DataSplit split(const std::vector<Measurement>& runs, HeldOut which);
 
 }  // namespace upright
