@@ -194,8 +194,9 @@ std::vector<std::size_t> candidate_effects(const Plant& plant, const DataRange& 
     const bool angle = info.kind.starts_with("angle_");
     if ((info.enters == Enters::pendulum || angle) && !plant.pendulum) continue;
     if ((info.enters == Enters::pendulum || angle) && !range.theta_measured) continue;
+    const bool of_motor = info.enters == Enters::actuator || info.kind == "drive_compliance";
     if ((info.enters == Enters::cart || info.kind == "cart_scale") && !range.cart_moves) continue;
-    if (info.enters == Enters::actuator && (!range.cart_moves || range.largest_voltage_v == 0.0)) continue;
+    if (of_motor && (!range.cart_moves || range.largest_voltage_v == 0.0)) continue;
     Plant with = plant;
     std::vector<double> typical;
     for (const ParameterInfo& parameter : info.parameters) typical.push_back(parameter.typical);
@@ -270,6 +271,7 @@ std::vector<std::vector<double>> search_starts(std::size_t effect, const DataRan
   if (is_named(effect, "bristle_friction")) return {{120.0, 20.0}, {2000.0, 20.0}};
   if (is_named(effect, "input_delay")) return {{0.5 * range.shortest_period_s}, {0.01}};
   if (is_named(effect, "motor_lag")) return {{std::max(0.001, 0.5 * range.shortest_period_s)}, {0.01}};
+  if (info.enters == Enters::sensor) return {{info.parameters[0].neutral}};
   std::vector<double> start;
   for (const ParameterInfo& parameter : info.parameters)
     start.push_back(std::isfinite(parameter.neutral)

@@ -95,6 +95,11 @@ Plant without_dead_zone(Plant plant, LinearPlant& linear) {
   return plant;
 }
 
+void note_stiff_drive(const Plant& plant, LinearPlant& linear) {
+  if (plant.find("drive_compliance") != nullptr)
+    linear.notes.emplace_back("drive_compliance: the drive is taken as stiff");
+}
+
 void refuse_not_finite(const LinearPlant& linear) {
   if (linear.a.allFinite() && linear.b.allFinite()) return;
   throw ConfigError("correct the plant's parameters: the linearisation is not finite, " +
@@ -165,6 +170,7 @@ LinearPlant linearize(const Plant& plant, double smoothing) {
   linear.actuator_slope = dynamics.actuate(Dual(0.0, 0)).v(0);
   linear.input_delay_s = dynamics.input_delay_s().a;
   read_sensors(dynamics, linear);
+  note_stiff_drive(plant, linear);
   refuse_not_finite(linear);
   return linear;
 }

@@ -43,6 +43,7 @@ std::vector<Subject> subjects() {
   add("track", exponential, E{"cogging_force", {0.3, 0.01, 0.2}}, E{"cable_spring", {2.0, 0.01}});
   add("pivot", exponential, E{"pivot_coulomb_friction", {0.003}}, E{"pivot_viscous_friction", {0.001}});
   add("sensors", exponential, E{"angle_scale", {1.02}}, E{"cart_scale", {0.98}}, E{"angle_offset", {0.002}});
+  add("drive", exponential, E{"drive_compliance", {2e-4}}, E{"motor_lag", {0.004}});
   add("base", dynamic, E{"cart_mass", {1.1}}, E{"pendulum_mass", {0.9}}, E{"pendulum_length", {1.05}},
       E{"back_emf", {0.95}});
   add("stiff_bristles", exponential, E{"bristle_friction", {1e5, 70.0}});

@@ -147,6 +147,15 @@ const std::map<std::string, std::function<void()>>& answers() {
          plant.set("angle_scale", {2.0});
          EXPECT_DOUBLE_EQ(shown(Physics(make_model<double>(plant))).theta_rad, 0.41);
        }},
+      {"drive_compliance",
+       [] {
+         PlantState<double> s;
+         s.cart_m = 0.1;
+         s.cart_mps = 0.5;
+         s.motor_v = 4.0;
+         const double force = 4.0 * 1.7189 - 0.5 * 7.682;
+         EXPECT_DOUBLE_EQ(with("drive_compliance", {1e-3}).measure(s).cart_m, 0.1 + 1e-3 * force);
+       }},
       {"cart_scale", [] { EXPECT_DOUBLE_EQ(shown(with("cart_scale", {1.02})).cart_m, 0.102); }},
       {"angle_scale", [] { EXPECT_DOUBLE_EQ(shown(with("angle_scale", {0.98})).theta_rad, 0.196); }},
       {"cart_mass", [] { EXPECT_DOUBLE_EQ(with("cart_mass", {1.1}).base().cart_mass_kg, 1.1 * 0.815); }},
@@ -203,7 +212,7 @@ INSTANTIATE_TEST_SUITE_P(All, Effect, testing::Range(std::size_t{0}, effect_coun
 });
 
 TEST(Registry, IsWhole) {
-  EXPECT_EQ(effect_count, 27u);
+  EXPECT_EQ(effect_count, 28u);
   std::set<std::string_view> kinds;
   std::size_t offset = 0;
   for (std::size_t i = 0; i < effect_count; ++i) {

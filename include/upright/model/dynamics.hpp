@@ -111,7 +111,7 @@ class Dynamics {
 
   /// What the sensors show of a state (before quantisation).
   Outputs<S> measure(const PlantState<S>& state) const {
-    Outputs<S> outputs{state.cart_m, state.theta_rad};
+    Outputs<S> outputs{state.cart_m + drive_yields_m(state), state.theta_rad};
     for (int stage = 1; stage <= 2; ++stage)
       for_each_effect([&]<std::size_t I>() {
         using E = EffectAt<I>;
@@ -143,9 +143,14 @@ class Dynamics {
     return level;
   }
 
+  /// Of the motor, with its back-EMF [N].
+  S motor_force(const PlantState<S>& state, const S& motor_v) const {
+    return base_.force_per_volt_n * motor_v - base_.back_emf_n_per_mps * state.cart_mps;
+  }
+
   /// Motor and every smooth force on the cart; dry friction and bristles are not in it.
   S cart_smooth_force(const PlantState<S>& state, const S& motor_v) const {
-    S force = base_.force_per_volt_n * motor_v - base_.back_emf_n_per_mps * state.cart_mps;
+    S force = motor_force(state, motor_v);
     for_each_effect([&]<std::size_t I>() {
       using E = EffectAt<I>;
       if constexpr (requires { E::cart_force(p<I>(), state.cart_m, state.cart_mps); })
@@ -289,6 +294,17 @@ class Dynamics {
   }
 
  private:
+  S drive_yields_m(const PlantState<S>& state) const {
+    S yields(0.0);
+    for_each_effect([&]<std::size_t I>() {
+      using E = EffectAt<I>;
+      if constexpr (requires { E::drive_yields_m(p<I>(), state.motor_v); })
+        if (present_.template has<I>())
+          yields = yields + E::drive_yields_m(p<I>(), motor_force(state, state.motor_v));
+    });
+    return yields;
+  }
+
   /// A level that vanishes somewhere along the track lets the bristles slip freely, not divide by zero.
   static constexpr double smallest_level_n = 1e-6;
 

@@ -4,15 +4,20 @@
 //
 // An effect is a struct with `parameters` and `info`, and any of these static templates on the scalar S,
 // where p points at its own parameters in their declared order:
-//   S cart_force(p, x, v)                       force on the cart [N]
-//   S cart_dry_level(p, x, speed, direction)    its share of the dry level [N] in direction +1 or -1, speed =
-//   |v| S pivot_torque(p, omega)                    torque on the pendulum about the pivot [N m] S
-//   pivot_dry_level(p)                        dry level of the pivot [N m] S actuate(p, volts) one stage of
-//   the static actuator chain [V], by `actuator_stage` S input_delay_s(p), S motor_time_constant_s(p) S
-//   bristle_stiffness(p), S bristle_damping(p) void measure(p, Outputs<S>&)                one stage of the
-//   sensors, by `sensor_stage` void correct(p, BaseParameters<S>&)         the true base parameters from the
-//   model's double rate_radps(p, v, mass)               fastest rate it brings [1/s], by which engines choose
-//   their steps
+//   S cart_force(p, x, v)                           force on the cart [N]
+//   S cart_dry_level(p, x, speed, direction)        its share of the dry level [N] in direction +1 or -1,
+//                                                   speed = |v|
+//   S pivot_torque(p, omega)                        torque on the pendulum about the pivot [N m]
+//   S pivot_dry_level(p)                            dry level of the pivot [N m]
+//   S actuate(p, volts)                             one stage of the static actuator chain [V], by
+//                                                   `actuator_stage`
+//   S input_delay_s(p), S motor_time_constant_s(p)
+//   S bristle_stiffness(p), S bristle_damping(p)
+//   S drive_yields_m(p, force)                      how far the motor is ahead of the cart [m]
+//   void measure(p, Outputs<S>&)                    one stage of the sensors, by `sensor_stage`
+//   void correct(p, BaseParameters<S>&)             the true base parameters from the model's
+//   double rate_radps(p, v, mass)                   fastest rate it brings [1/s], by which engines choose
+//                                                   their steps
 // and the flags `kink_at_cart_rest`, `kink_at_pivot_rest` where its force is not smooth through zero
 // velocity.
 #pragma once

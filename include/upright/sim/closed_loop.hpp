@@ -19,7 +19,7 @@ using Measured = std::array<double, 4>;
 /// Volts per unit of `Measured`, in the order of the gain file.
 using FeedbackGains = std::array<double, 4>;
 
-/// What the sensors of a plant make of its state; linear, worked out once.
+/// What the sensors of a plant make of its state, with a stiff drive; linear, worked out once.
 class MeasuredState {
  public:
   explicit MeasuredState(const Dynamics<double>& dynamics) {

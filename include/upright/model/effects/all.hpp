@@ -13,6 +13,7 @@
 #include "upright/model/effects/cogging_force.hpp"
 #include "upright/model/effects/constant_force.hpp"
 #include "upright/model/effects/coulomb_friction.hpp"
+#include "upright/model/effects/drive_compliance.hpp"
 #include "upright/model/effects/friction_asymmetry.hpp"
 #include "upright/model/effects/input_delay.hpp"
 #include "upright/model/effects/motor_lag.hpp"
@@ -55,6 +56,7 @@ using AllEffects =
                effects::PivotViscousFriction,
                effects::PivotCoulombFriction,
                effects::PivotQuadraticDrag,
+               effects::DriveCompliance,
                effects::AngleOffset,
                effects::CartScale,
                effects::AngleScale,
