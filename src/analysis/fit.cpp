@@ -51,7 +51,7 @@ void start_segment(Simulator<S>& simulator, const Measurement& run, const Segmen
   double history = delay;
   if (dynamics.has_motor_lag()) history += 12.0 * value_of(dynamics.motor_time_constant_s());
   std::size_t k = segment.first;
-  while (k > 0 && run.time_s[k] > start - history) --k;
+  while (k > 0 && run.time_s[k] >= start - history) --k;
   if (dynamics.has_motor_lag()) {
     // The lag is linear: follow it exactly over the part of the record that it still remembers.
     S lagged = dynamics.actuate(S(k == 0 ? 0.0 : run.voltage_v[k]));
@@ -73,7 +73,7 @@ void start_segment(Simulator<S>& simulator, const Measurement& run, const Segmen
   }
   double acting_v = k == 0 ? 0.0 : run.voltage_v[k];
   std::size_t next = k;
-  while (next < segment.first && run.time_s[next] + delay <= start) acting_v = run.voltage_v[next++];
+  while (next < segment.first && run.time_s[next] + delay < start) acting_v = run.voltage_v[next++];
   simulator.start(state, start, acting_v);
   for (; next < segment.first; ++next) simulator.command(run.time_s[next], run.voltage_v[next]);
 }
@@ -322,11 +322,20 @@ void add_square(const Eigen::Matrix<double, N, 1>& row, double weight, int colum
 
 /// What the sensors, which are linear, show of a unit of cart and pendulum.
 template <class S>
-std::array<double, 2> sensor_gains(const Dynamics<S>& dynamics) {
+std::array<S, 2> sensor_gains(const Dynamics<S>& dynamics) {
   PlantState<S> unit;
   unit.cart_m = unit.theta_rad = S(1.0);
   const Outputs<S> at_0 = dynamics.measure(PlantState<S>{}), at_1 = dynamics.measure(unit);
-  return {value_of(at_1.cart_m) - value_of(at_0.cart_m), value_of(at_1.theta_rad) - value_of(at_0.theta_rad)};
+  return {at_1.cart_m - at_0.cart_m, at_1.theta_rad - at_0.theta_rad};
+}
+
+/// What the cart's sensor shows of a unit of its speed: through back-EMF a drive that gives way is set back.
+/// Too little to count in a filter's gain, but derivatives are of all that is shown.
+template <class S>
+double shown_of_cart_speed_s(const Dynamics<S>& dynamics) {
+  PlantState<S> unit;
+  unit.cart_mps = S(1.0);
+  return value_of(dynamics.measure(unit).cart_m) - value_of(dynamics.measure(PlantState<S>{}).cart_m);
 }
 
 /// Follows a segment with dual numbers, a sample at a time; chains the derivatives and whitens them on the
@@ -363,12 +372,27 @@ void linearise_segment(const Measurement& run, const Segment& segment, const Eng
   const double coupling = pendulum ? pendulum->mass_kg * pendulum->length_to_com_m : 0.0;
   const double inertia = pendulum ? pendulum->inertia_about_pivot_kgm2() : 1.0;
   const bool bristles = dynamics.has_bristle_state();
-  const std::array<double, 2> sensors = sensor_gains(dynamics);
+  const std::array<Jet, 2> sensors = sensor_gains(dynamics);
+  // A correction is in the sensors' units: to a state it is worth as much less as they show more of it.
+  std::array<Eigen::Matrix<double, N, 1>, 2> worth_less;
+  for (std::size_t channel = 0; channel < 2; ++channel)
+    worth_less[channel] = sensors[channel].v / sensors[channel].a;
+  const double shown_of_speed_s = shown_of_cart_speed_s(dynamics);
 
   // As in the dual numbers: initial state first, then parameters, then nothing.
   using Row = Eigen::Matrix<double, N, 1>;
   std::array<Row, states> sensitivity, former;
   for (int i = 0; i < states; ++i) sensitivity[static_cast<std::size_t>(i)] = Row::Unit(i);
+  {
+    // Parameters of the sensors change what is meant by what they show at the start, not what they show.
+    const PlantState<Jet> from{Jet(start.cart_m), Jet(start.theta_rad), Jet(start.cart_mps),
+                               Jet(start.theta_radps)};
+    const Outputs<Jet> shown = dynamics.measure(from);
+    sensitivity[0] -= shown.cart_m.v / sensors[0].a;
+    sensitivity[1] -= shown.theta_rad.v / sensors[1].a;
+    sensitivity[2] -= start.cart_mps * worth_less[0];
+    sensitivity[3] -= start.theta_radps * worth_less[1];
+  }
   Eigen::Matrix<double, N, N> information = Eigen::Matrix<double, N, N>::Zero();
   Row score = Row::Zero();
   Whitener whitener(run, point.plant, point.noise);
@@ -406,7 +430,7 @@ void linearise_segment(const Measurement& run, const Segment& segment, const Eng
     const Outputs<Jet> outputs = simulator.engine().outputs();
     const double simulated[2] = {value_of(outputs.cart_m), value_of(outputs.theta_rad)};
     for (int channel = 0; channel < 2; ++channel) {
-      step.gain[channel] = sensors[channel];
+      step.gain[channel] = value_of(sensors[static_cast<std::size_t>(channel)]);
       step.weight[channel] = weight_of(run, channel, k);
       step.residual[channel] =
           whitener.present(channel) ? measured(run, channel, k) - simulated[channel] : 0.0;
@@ -453,13 +477,19 @@ void linearise_segment(const Measurement& run, const Segment& segment, const Eng
       // Of what the sensor shows, what is its own, and what comes with the state.
       Row row = channel == 0 ? outputs.cart_m.v : outputs.theta_rad.v;
       row -= step.gain[channel] * end[static_cast<std::size_t>(channel)]->v;
+      if (channel == 0) row -= shown_of_speed_s * reached.cart_mps.v;
       row.template head<states>().setZero();
       row += step.gain[channel] * sensitivity[static_cast<std::size_t>(channel)];
+      if (channel == 0) row += shown_of_speed_s * sensitivity[2];
       const double weight = step.weight[channel] / whitener.variance();
       add_square(row, weight, columns, information);
       score += (weight * e) * row;
-      for (std::size_t i = 0; i < states; ++i)
-        if (whitener.gain()[i] != 0.0) sensitivity[i] -= whitener.gain()[i] * row;
+      for (std::size_t i = 0; i < states; ++i) {
+        if (whitener.gain()[i] == 0.0) continue;
+        sensitivity[i] -= whitener.gain()[i] * row;
+        const std::size_t sensor = i % 2 == 0 ? 0 : 1;  // x, v and the bristles; theta and omega
+        sensitivity[i] -= whitener.gain()[i] * e * worth_less[sensor];
+      }
     }
     correct_state(simulator.engine(), update);
     if (!with_normal) continue;
@@ -595,7 +625,9 @@ class Fitter {
         Step next = step(damping);
         // What does not even promise to fall is not worth looking at. (A step that was cut short promises
         // less than it is good for.)
-        if (next.promised_fall < least_fall && !next.cut_short) break;
+        const auto promises = [&] { return next.promised_fall >= least_fall || next.cut_short; };
+        if (!promises() && attempt == 0) next = step(damping = hardly_damped);
+        if (!promises()) break;
         point_ = std::move(next.point);
         swap_with_former();
         next_objective = evaluate();
@@ -608,7 +640,7 @@ class Fitter {
         converged_ = true;
         break;
       }
-      damping = std::max(damping * 0.1, 1e-9);
+      damping = std::max(damping * 0.1, hardly_damped);
       const double fall = objective - next_objective;
       objective = next_objective;
       if (fall < least_fall) {
@@ -652,6 +684,9 @@ class Fitter {
   }
 
   static constexpr double least_damping = 1e-4;  ///< of a first step
+  /// Parameters that are one force are told apart by what is believed of them alone: next to nothing beside
+  /// what is known of each by itself, and damping goes by that.
+  static constexpr double hardly_damped = 1e-9;
 
   struct Step {
     FitPoint point;
@@ -697,6 +732,7 @@ class Fitter {
       return 2.0 * slope.dot(way) - way.dot(information * way);
     };
     result.promised_fall = promise(prior, to_belief, delta);
+    follow_sensors(trial.starts, point_.plant, trial.plant);
     Eigen::VectorXd way(states + np);
     way.tail(np) = delta;
     for (std::size_t s = 0; s < normals_.size(); ++s) {
@@ -863,7 +899,7 @@ class Fitter {
     const double small_sample = segments > np + 1.0 ? segments / (segments - 1.0) : 2.0;
     result.covariance = inverse * (robust_spread(h - prior, spread * small_sample) + prior) * inverse;
     if (!std::isfinite(result.objective)) return;
-    const Step further = step(least_damping);
+    const Step further = step(hardly_damped);
     if (!further.cut_short) result.promised_fall = further.promised_fall;
   }
 
@@ -943,12 +979,14 @@ namespace {
 
 /// The state of which the sensors show these values.
 void undo_sensors(const Dynamics<double>& dynamics, PlantState<double>& state) {
-  const Outputs<double> at_0 = dynamics.measure(PlantState<double>{});
   const auto [cart_gain, theta_gain] = sensor_gains(dynamics);
-  state.cart_m = (state.cart_m - at_0.cart_m) / cart_gain;
-  state.theta_rad = (state.theta_rad - at_0.theta_rad) / theta_gain;
   state.cart_mps /= cart_gain;
   state.theta_radps /= theta_gain;
+  PlantState<double> at_origin = state;
+  at_origin.cart_m = at_origin.theta_rad = 0.0;
+  const Outputs<double> shown = dynamics.measure(at_origin);
+  state.cart_m = (state.cart_m - shown.cart_m) / cart_gain;
+  state.theta_rad = (state.theta_rad - shown.theta_rad) / theta_gain;
 }
 
 }  // namespace
