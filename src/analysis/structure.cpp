@@ -28,6 +28,11 @@ constexpr double heaviest_tails = 5.5;
 /// accounts for single samples. A disturbance of 10 Hz makes it 1.8 here at most (measured on the matrix),
 /// forces that go with the motion more.
 constexpr double slowest = 2.5;
+/// Or less than this: then it is no force, but in what the sensors show, of which a force is the second
+/// derivative. Of play 0.15 to 0.55 is left here, of right answers 1 and more.
+constexpr double quickest = 0.6;
+/// With a suspected dependence.
+constexpr double rather_quick = 0.75;
 
 constexpr std::array feature_names = {"its mean",
                                       "velocity",
@@ -171,6 +176,7 @@ struct Probe {
   const char* name;
   ActsOn on;
   const char* looks_like = "";
+  const char* turned_round = looks_like;  ///< what it looks like with the other sign
 };
 constexpr std::array probes = {
     Probe{"time", ActsOn::cart},
@@ -184,7 +190,8 @@ constexpr std::array probes = {
     Probe{"time and direction of the pendulum", ActsOn::pendulum},
     Probe{"time and the pendulum's rate", ActsOn::pendulum},
     Probe{"the time after a reversal of the pendulum", ActsOn::pendulum},
-    Probe{"voltage", ActsOn::position, ", as if the drive gave way between the encoder and the cart"},
+    Probe{"voltage", ActsOn::position, ", as if the drive gave way between the encoder and the cart",
+          ", as if the drive gave way between the motor and the encoder"},
     Probe{"direction of motion", ActsOn::position, ", as if the encoder had play"},
     Probe{"direction of the pendulum", ActsOn::angle, ", as if the encoder had play"}};
 constexpr bool is_sensor(ActsOn on) {
@@ -289,9 +296,19 @@ struct Blocks {
   std::array<std::vector<double>, 2> pulses;            ///< a short force and torque, in standard errors
 };
 
-void examine_segment(const Measurement& run, const Segment& segment, const Plant& plant,
+constexpr double block_s = 0.15;
+
+/// Whether a white force or torque moves its sensor within a block. Where it does not, pulses of it are the
+/// sensor's steps by another name.
+bool shows(const Measurement& run, const LinearStep& step, const Noise& noise, int channel) {
+  constexpr double share = 0.1;
+  const double push = channel == 0 ? noise.force * step.by_force[0] : noise.torque * step.by_torque[1];
+  const double sensor = channel == 0 ? run.cart_noise_m() : run.theta_noise_rad();
+  return push * std::sqrt(block_s * block_s * block_s / 3.0) > share * sensor;
+}
+
+void examine_segment(const Measurement& run, const Segment& segment, const Plant& plant, const Noise& noise,
                      const std::vector<LinearStep>& steps, Blocks& blocks) {
-  constexpr double block_s = 0.15;
   const bool present[2] = {run.has_cart(), run.has_theta() && plant.pendulum.has_value()};
   const auto length =
       static_cast<std::size_t>(std::max(20.0, block_s / std::max(run.median_period_s(), 1e-9)));
@@ -331,7 +348,7 @@ void examine_segment(const Measurement& run, const Segment& segment, const Plant
     blocks.power += sum;
     for (std::size_t i = 0; i < probes.size(); ++i) blocks.probe[i].push_back(scores[i]);
     for (int i = 0; i < 2; ++i)
-      if (pulse_scores[i].information > 0.0)
+      if (pulse_scores[i].information > 0.0 && shows(run, step, noise, i))
         blocks.pulses[i].push_back(pulse_scores[i].score / std::sqrt(pulse_scores[i].information));
     sum = count = 0.0;
     scores.fill({});
@@ -359,19 +376,40 @@ Score sum_of(const std::vector<Score>& scores) {
   return sum;
 }
 
-/// How certainly the residual goes with a probe, by the scatter of its scores over blocks: honest where the
-/// innovations are not white.
+/// How certainly the residual goes with a probe, by the scatter of its scores over blocks about what it
+/// accounts for: honest where the innovations are not white. (A block that holds much of what there is to see
+/// scatters less about what it says itself: MacKinnon and White's HC3. And where few blocks hold most of what
+/// there is to see, the scatter is not well known: Wallace's normal deviate of Student's t.)
 double certainty_of(const std::vector<Score>& scores) {
   const Score sum = sum_of(scores);
-  double spread = 0.0;
-  for (const Score& s : scores) spread += s.score * s.score;
-  return spread > 0.0 ? std::abs(sum.score) / std::sqrt(std::max(spread, sum.information)) : 0.0;
+  if (!(sum.information > 0.0)) return 0.0;
+  double spread = 0.0, concentration = 0.0;
+  for (const Score& s : scores) {
+    const double share = s.information / sum.information;
+    const double off = (s.score - sum.score * share) / std::max(1.0 - share, 1e-6);
+    spread += off * off;
+    concentration += share * share;
+  }
+  const double t = std::abs(sum.score) / std::sqrt(std::max(spread, sum.information));
+  const double freedom = std::max(1.0 / concentration - 1.0, 1.0);
+  return std::sqrt(freedom * std::log1p(t * t / freedom)) * (8.0 * freedom + 1.0) / (8.0 * freedom + 3.0);
 }
 
 /// Share of the innovations' power that a probe accounts for.
 double share_of(const std::vector<Score>& scores, double power) {
   const Score sum = sum_of(scores);
   return sum.information > 0.0 && power > 0.0 ? sum.score * sum.score / (sum.information * power) : 0.0;
+}
+
+/// How large pulses are at most, in standard errors: their root mean square, or what most of them are with
+/// half as much again for what chance makes of so few. 1 of too few to say.
+double largest_size(const std::vector<double>& pulses) {
+  constexpr std::size_t least_count = 30;
+  if (pulses.size() < least_count) return 1.0;
+  double sum = 0.0;
+  for (const double p : pulses) sum += p * p;
+  constexpr double by_chance = 1.5;
+  return std::min(std::sqrt(sum / static_cast<double>(pulses.size())), by_chance * robust_deviation(pulses));
 }
 
 }  // namespace
@@ -388,7 +426,8 @@ ResidualStructure examine_residuals(const FitData& data, const FitPoint& point) 
   const std::vector<std::vector<LinearStep>> steps = linearise(data, point);
   Blocks blocks;
   for (std::size_t s = 0; s < steps.size(); ++s)
-    examine_segment((*data.runs)[data.segments[s].run], data.segments[s], point.plant, steps[s], blocks);
+    examine_segment((*data.runs)[data.segments[s].run], data.segments[s], point.plant, point.noise, steps[s],
+                    blocks);
   ResidualStructure result;
   if (blocks.rms.size() >= 20) {
     std::sort(blocks.rms.begin(), blocks.rms.end());
@@ -396,16 +435,22 @@ ResidualStructure examine_residuals(const FitData& data, const FitPoint& point) 
         blocks.rms[blocks.rms.size() * 95 / 100] / std::max(blocks.rms[blocks.rms.size() / 2], 1e-12);
   }
   const Tails force = tails_of(blocks.pulses[0]), torque = tails_of(blocks.pulses[1]);
-  result.tails = force.certainty > torque.certainty ? force : torque;
+  result.tails = torque.certainty > force.certainty || blocks.pulses[0].empty() ? torque : force;
   result.slow_force = std::max(1.0, robust_deviation(blocks.pulses[0]));
   result.slow_torque = std::max(1.0, robust_deviation(blocks.pulses[1]));
+  result.quick = std::min(largest_size(blocks.pulses[0]), largest_size(blocks.pulses[1]));
+  // Of all that are certain, the one that accounts for most is what it goes with; else the most certain.
+  double largest_share = 0.0;
   for (std::size_t i = 0; i < probes.size(); ++i) {
-    const double certainty = certainty_of(blocks.probe[i]);
-    if (certainty <= result.certainty) continue;
-    if (is_sensor(probes[i].on) && share_of(blocks.probe[i], blocks.power) < least_sensor_share) continue;
+    const double certainty = certainty_of(blocks.probe[i]), share = share_of(blocks.probe[i], blocks.power);
+    if (is_sensor(probes[i].on) && share < least_sensor_share) continue;
+    const bool certain = certainty > least_dependence;
+    if (certain ? share <= largest_share : certainty <= result.certainty) continue;
+    if (certain) largest_share = share;
     result.certainty = certainty;
-    result.goes_with =
-        std::string(probes[i].name) + " " + std::string(place_of(probes[i].on)) + probes[i].looks_like;
+    const bool along = sum_of(blocks.probe[i]).score > 0.0;
+    result.goes_with = std::string(probes[i].name) + " " + std::string(place_of(probes[i].on)) +
+                       (along ? probes[i].looks_like : probes[i].turned_round);
   }
   return result;
 }
@@ -436,6 +481,11 @@ void judge_structure(ResidualStructure& s) {
          << (torque ? "torque on the pendulum" : "force on the cart") << " is "
          << (torque ? s.slow_torque : s.slow_force)
          << " times as large as noise that accounts for single samples makes it";
+  } else if (s.quick < quickest || (s.quick < rather_quick && s.certainty > suspected_dependence)) {
+    s.structured = true;
+    text << "what is left is too quick for a force: over a tenth of a second it is " << s.quick
+         << " times as large as noise that accounts for single samples makes it, so it is in what the sensors"
+            " show";
   } else if (s.excess > most_excess) {
     s.structured = true;
     text << "a plain simulation is " << s.excess
@@ -453,7 +503,7 @@ void judge_structure(ResidualStructure& s) {
          << s.dispersion << " times the median, kurtosis of pulses " << s.tails.kurtosis << ", dependence "
          << s.certainty << " standard errors, simulation " << s.excess
          << " times as far off as such noise makes it at most, slow pushes "
-         << std::max(s.slow_force, s.slow_torque) << " times)";
+         << std::max(s.slow_force, s.slow_torque) << " times, " << s.quick << " at least)";
   }
   s.sentence = text.str();
 }

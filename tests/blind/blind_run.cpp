@@ -223,8 +223,6 @@ std::string_view name_of(Unknown unknown) {
       return "warming_friction";
     case Unknown::gusts:
       return "gusts";
-    case Unknown::yielding_drive:
-      return "yielding_drive";
   }
   return "";
 }
@@ -269,7 +267,7 @@ Measurement measure(const Rig& rig, const Plan& plan, const std::string& name) {
   std::mt19937_64 random(plan.seed * 104729 + 3);
   std::normal_distribution<double> normal;
   const double period_s = 1.0 / plan.rate_hz;
-  double shown_m = 0.0, acting_v = 0.0;
+  double shown_m = 0.0;
   for (std::size_t k = 0; static_cast<double>(k) * period_s < plan.duration_s; ++k) {
     const double nominal_s = static_cast<double>(k) * period_s;
     // A loop wakes late, never early.
@@ -280,13 +278,10 @@ Measurement measure(const Rig& rig, const Plan& plan, const std::string& name) {
     double cart = y.cart_m;
     if (rig.unknown == Unknown::backlash)
       cart = shown_m = std::clamp(shown_m, cart - 0.5 * rig.backlash_m, cart + 0.5 * rig.backlash_m);
-    if (rig.unknown == Unknown::yielding_drive)
-      cart += rig.compliance_m_per_n * rig.plant.motor.force_per_volt_n * acting_v;
     const double cart_m = quantised(cart, rig.cart_step_m);
     const double theta_rad = quantised(y.theta_rad, rig.theta_step_rad);
     const double volts = driver.volts(k, nominal_s, cart_m, theta_rad);
     simulator.command(read_s, volts);
-    acting_v = volts;
     if (in_gap(plan, nominal_s)) continue;
     run.time_s.push_back(rig.actual_times ? read_s : nominal_s);
     run.voltage_v.push_back(volts);

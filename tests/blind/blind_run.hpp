@@ -15,7 +15,7 @@
 namespace upright::blind {
 
 /// What no effect of the registry describes.
-enum class Unknown { none, backlash, warming_friction, gusts, yielding_drive };
+enum class Unknown { none, backlash, warming_friction, gusts };
 
 std::string_view name_of(Unknown unknown);
 
@@ -23,14 +23,13 @@ std::string_view name_of(Unknown unknown);
 struct Rig {
   Plant plant;
   Unknown unknown = Unknown::none;
-  double backlash_m = 0.0;          ///< play between cart and encoder
-  double compliance_m_per_n = 0.0;  ///< of a yielding drive, with the encoder on the motor's side
-  double warming_force_n = 0.0;     ///< Coulomb friction above its final level when a run starts
-  double warming_time_s = 5.0;      ///< time constant with which it goes
-  double gust_force_n = 0.0;        ///< typical peak
-  double disturbance_n = 0.0;       ///< rms of a force of 10 Hz bandwidth (Ornstein-Uhlenbeck)
-  double jitter_s = 0.0;            ///< standard deviation of the time at which encoders are read
-  bool actual_times = false;        ///< the record holds the times of reading, not k / rate
+  double backlash_m = 0.0;       ///< play between cart and encoder
+  double warming_force_n = 0.0;  ///< Coulomb friction above its final level when a run starts
+  double warming_time_s = 5.0;   ///< time constant with which it goes
+  double gust_force_n = 0.0;     ///< typical peak
+  double disturbance_n = 0.0;    ///< rms of a force of 10 Hz bandwidth (Ornstein-Uhlenbeck)
+  double jitter_s = 0.0;         ///< standard deviation of the time at which encoders are read
+  bool actual_times = false;     ///< the record holds the times of reading, not k / rate
   double cart_step_m = 2.27485e-5;
   double theta_step_rad = 1.5339807878856412e-3;  ///< 4096 counts a turn
 };

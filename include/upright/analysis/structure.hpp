@@ -4,7 +4,8 @@
 // goes with the voltage whatever it is):
 // - dispersion: the whitened innovations of short blocks are as large everywhere as chance allows;
 // - tails: short pulses of force or torque, fitted block by block, have no heavier tails than a Gaussian;
-// - colour: over a tenth of a second and more force and torque are not much larger than as white noise;
+// - colour: over a tenth of a second and more force and torque are not much larger than as white noise, nor
+//   much smaller;
 // - dependence: forces that no effect of the registry has (that drift with time, friction that changes with
 //   time, what fades after a reversal) do not show, nor do shifts of what the sensors show that go with the
 //   voltage or the direction (a drive that gives way or has play between the encoder and what it measures).
@@ -30,6 +31,7 @@ struct ResidualStructure {
   /// samples: a disturbance whose colour the filter does not know is estimated where the samples show it
   /// best, and a plain simulation is moved by what is slow. At least 1.
   double slow_force = 1.0, slow_torque = 1.0;
+  double quick = 1.0;           ///< the smaller of both, where they are smaller than such noise
   bool beyond_sensors = false;  ///< it is more than the sensors' own noise
   bool structured = false;      ///< and more than a disturbance: something is missing
   std::string sentence;

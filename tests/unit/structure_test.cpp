@@ -1,0 +1,46 @@
+// What is left of runs of a rig that the model is not, in words.
+#include "upright/analysis/structure.hpp"
+
+#include <gtest/gtest.h>
+
+#include "blind_case.hpp"
+
+namespace upright {
+namespace {
+
+Plant cart() {
+  Plant plant;
+  plant.cart_mass_kg = 1.0;
+  plant.motor = {1.7, 7.7};
+  plant.set("viscous_friction", {3.0});
+  return plant;
+}
+
+std::string what_is_left_of(const blind::Rig& rig) {
+  std::vector<Measurement> runs;
+  for (unsigned seed = 1; seed <= 2; ++seed) {
+    blind::Plan plan;
+    plan.experiment = blind::Experiment::square;
+    plan.rate_hz = 250.0;
+    plan.seed = seed;
+    runs.push_back(measure(rig, plan, "run"));
+  }
+  const FitData data{&runs, cut_segments(runs)};
+  const FitPoint start{cart(), guess_starts(runs, data.segments, cart()), {.force = 0.1}};
+  return examine_residuals(data, fit(data, start, {}).point).goes_with;
+}
+
+std::string with_compliance(double compliance_m_per_n) {
+  blind::Rig rig{.plant = cart(), .disturbance_n = 0.05};
+  rig.plant.set("drive_compliance", {compliance_m_per_n});
+  return what_is_left_of(rig);
+}
+
+TEST(Structure, TellsOnWhichSideOfTheEncoderADriveGivesWay) {
+  const std::string near = with_compliance(5e-5), far = with_compliance(-5e-5);
+  EXPECT_NE(near.find("between the encoder and the cart"), std::string::npos) << near;
+  EXPECT_NE(far.find("between the motor and the encoder"), std::string::npos) << far;
+}
+
+}  // namespace
+}  // namespace upright
