@@ -41,14 +41,16 @@ class Diagnostician {
   Diagnosis run() {
     growth_.find();
     ResidualStructure left = settle();
+    if (left.structured && growth_.begin_anew()) left = settle();
     if (left.structured && growth_.find_pairs_of_all()) left = settle();
     if (left.beyond_sensors && growth_.find_thoroughly()) left = settle();
+    held_out_alone_ = left.structured && !examine(data_.train, final_.train.point).structured;
     conclude(left);
     return std::move(result_);
   }
-  /// Whether held-out runs spoke to the end against what the others show beyond doubt: they excite what is
-  /// missing still, and the others do not.
-  bool contradicted() const { return growth_.contradicted(); }
+  /// Whether held-out runs excite what is missing still, and the others do not: they alone show it, or spoke
+  /// to the end against what the others show beyond doubt.
+  bool lacks_what_was_held_out() const { return held_out_alone_ || growth_.contradicted(); }
 
  private:
   static DataSplit checked(DataSplit data) {
@@ -61,7 +63,10 @@ class Diagnostician {
   ResidualStructure settle() {
     settle_corrections();
     options_.tell(0.92, "measuring the gap");
-    ResidualStructure left = examine();
+    FitData all{&runs_, data_.train.segments};
+    all.segments.insert(all.segments.end(), data_.held.segments.begin(), data_.held.segments.end());
+    // At what all runs say, so that what few training runs left uncertain is not taken for something missing.
+    ResidualStructure left = examine(all, known_.train.point);
     if (!left.structured) compare_held_out(left);
     if (!left.structured) doubt_what_cannot_be(left);
     return left;
@@ -237,18 +242,15 @@ class Diagnostician {
     result_.residual_before = smooth_residuals(data_.held, as_given.held.point);
   }
 
-  ResidualStructure examine() {
-    FitData all{&runs_, data_.train.segments};
-    all.segments.insert(all.segments.end(), data_.held.segments.begin(), data_.held.segments.end());
-    // At what all runs say, so that what few training runs left uncertain is not taken for something missing.
-    ResidualStructure structure = examine_residuals(all, known_.train.point);
-    FitPoint point = known_.train.point;
-    point.noise = sensors_only(known_.train.point.noise);
-    const FitResult plain = follow(all, point);
+  static ResidualStructure examine(const FitData& data, const FitPoint& fitted) {
+    ResidualStructure structure = examine_residuals(data, fitted);
+    FitPoint point = fitted;
+    point.noise = sensors_only(fitted.noise);
+    const FitResult plain = follow(data, point);
     structure.noise_ratio = whitened_rms(plain);
     point = plain.point;
-    point.noise = as_slow_as_left(known_.train.point.noise, structure);
-    structure.excess = structure.noise_ratio / simulation_floor(all, point).highest;
+    point.noise = as_slow_as_left(fitted.noise, structure);
+    structure.excess = structure.noise_ratio / simulation_floor(data, point).highest;
     judge_structure(structure);
     return structure;
   }
@@ -431,6 +433,7 @@ class Diagnostician {
   Hypothesis final_;  ///< fitted to the training runs, judged on the others
   Hypothesis known_;  ///< the same effects fitted to all runs: what the model says in the end
   std::vector<std::size_t> corrections_;
+  bool held_out_alone_ = false;
 };
 
 }  // namespace
@@ -466,7 +469,7 @@ Diagnosis diagnose(const Plant& plant, const std::vector<Measurement>& runs,
         "add the pendulum to the plant file: the runs hold theta_rad only, and the model is a cart alone");
   Diagnostician diagnostician(plant, runs, options, HeldOut::middle);
   Diagnosis diagnosis = diagnostician.run();
-  if (diagnosis.verdict != Verdict::unexplained || !diagnostician.contradicted()) return diagnosis;
+  if (diagnosis.verdict != Verdict::unexplained || !diagnostician.lacks_what_was_held_out()) return diagnosis;
   options.tell(0.02, "looking again, with other runs held out");
   Diagnosis other = Diagnostician(plant, runs, options, HeldOut::other).run();
   if (other.verdict != Verdict::explained) return diagnosis;

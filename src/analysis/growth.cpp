@@ -54,6 +54,14 @@ void Growth::find() {
   prune();
 }
 
+bool Growth::begin_anew() {
+  options_.tell(0.83, "beginning anew");
+  Hypothesis h = search_.begun_anew(current_);
+  if (!(h.train.objective < current_.train.objective - equally_good)) return false;
+  current_ = std::move(h);
+  return true;
+}
+
 bool Growth::find_pairs_of_all() {
   if (!try_pairs(resembling_)) return false;
   prune();
@@ -111,15 +119,26 @@ double Growth::price_of(std::size_t effect) {
   return parameter_price * static_cast<double>(effect_registry()[effect].parameters.size() - 1);
 }
 
-bool Growth::is_believed(const Improvement& improvement, std::size_t effect) {
+bool Growth::is_believed(Hypothesis& h, const Improvement& improvement, std::size_t effect) {
   const double evidence = improvement.train - price_of(effect);
+  // What a few moments hold has a small t: then the held-out runs must speak for it too, or leave nothing
+  // but the sensors' noise, whose evidence needs no other witness.
+  constexpr double least_t_borne_out = 1.5, as_sensors = 1.05;
+  if (is_borne_out(improvement, effect) && improvement.t_value > least_t_borne_out) return true;
   // Held-out data that do not excite the effect say nothing: odds of less than 2 to 1 against it.
   constexpr double indifferent = 1.4;
   if (evidence < least_evidence || !(improvement.held > -indifferent)) return false;
-  // What a few moments hold has a small t: then the held-out runs must hold as much again.
-  constexpr double least_t_borne_out = 1.5;
-  return improvement.t_value > least_t || evidence > overwhelming_evidence ||
-         (improvement.t_value > least_t_borne_out && improvement.held > least_evidence);
+  if (improvement.t_value > least_t || evidence > overwhelming_evidence) return true;
+  // Numbers of the plant that need not be so far off are no matter of noise.
+  if (improvement.belief - price_of(effect) > least_evidence) return true;
+  return improvement.t_value > least_t_borne_out && improvement.held > equally_good &&
+         search_.simulate(h).gap < as_sensors;
+}
+
+bool Growth::is_borne_out(const Improvement& improvement, std::size_t effect) {
+  const double evidence = improvement.train - price_of(effect);
+  constexpr double least_share = 8.0, least_together = 40.0;
+  return std::min(evidence, improvement.held) > least_share && evidence + improvement.held > least_together;
 }
 
 bool Growth::is_overwhelming(const Improvement& improvement, std::size_t effect) {
@@ -129,8 +148,11 @@ bool Growth::is_overwhelming(const Improvement& improvement, std::size_t effect)
 bool Growth::is_certain(Hypothesis& h, std::size_t effect) {
   const double so_far = search_.certainty(h, effect);
   if (so_far >= least_certainty) return true;
+  const Improvement improvement = compare(current_, h);
+  if (is_borne_out(improvement, effect) && search_.certainty(search_.on_all(h), effect) >= least_certainty)
+    return true;
   constexpr double of_noise_not_white = 4.0;
-  if (compare(current_, h).train < of_noise_not_white * std::max(so_far * so_far, 1.0)) return false;
+  if (improvement.train < of_noise_not_white * std::max(so_far * so_far, 1.0)) return false;
   // Much noise hides what a poor fit leaves, and each gives way to the other by and by.
   constexpr int most_turns = 6;
   constexpr double helps = 10.0;
@@ -235,7 +257,7 @@ bool Growth::add_best(int round, bool calmly) {
   std::vector<Believed> believed = believe(round, screened, calmly, done);
   if (believed.empty()) return false;
   take(round, believed[choose(believed)], screened);
-  while (exchange()) {
+  while (exchange() || simplify()) {
   }
   return true;
 }
@@ -283,9 +305,9 @@ std::vector<Growth::Believed> Growth::believe(int round, const std::vector<Scree
     if (round == 0) finalists_.emplace_back(effect, h);
     Improvement improvement = compare(current_, h);
     record_trial(round, effect, h, improvement);
-    if (!search_.is_plausible(h, effect)) continue;
+    if (!search_.is_plausible(h, effect) || bends_another(h, effect)) continue;
     const bool overwhelming = is_overwhelming(improvement, effect);
-    if (!is_believed(improvement, effect)) {
+    if (!is_believed(h, improvement, effect)) {
       if (overwhelming && is_certain(h, effect))
         doubtful.push_back({effect, h, improvement.train - price_of(effect)});
       continue;
@@ -293,7 +315,7 @@ std::vector<Growth::Believed> Growth::believe(int round, const std::vector<Scree
     if (calmly || improvement.train < overwhelming_evidence) {
       level_noise(h);
       improvement = compare(current_, h);
-      if (!is_believed(improvement, effect)) continue;
+      if (!is_believed(h, improvement, effect)) continue;
     }
     const bool correction = current_.train.point.plant.find(effect) != nullptr;
     if (!correction && !is_certain(h, effect)) continue;
@@ -399,6 +421,54 @@ bool Growth::exchange() {
   return false;
 }
 
+std::vector<Growth::Simpler> Growth::simpler_forms() const {
+  const std::size_t one_way = effect_number("friction_asymmetry"), spring = effect_number("cable_spring");
+  const std::size_t level = effect_number("coulomb_friction"), force = effect_number("constant_force");
+  const Plant& plant = current_.train.point.plant;
+  std::vector<Simpler> forms;
+  if (plant.find(force) != nullptr) return forms;
+  if (is_found(one_way) && plant.find(level) == nullptr) {
+    const double size = plant.find(one_way)->values[0];
+    forms.push_back({one_way, {{level, {0.5 * std::abs(size)}}, {force, {-0.5 * size}}}});
+  }
+  if (is_found(spring)) {
+    const auto [stiffness, center_m, unused] = plant.find(spring)->values;
+    const DataRange& range = search_.range();
+    const double off_m = center_m - range.cart_mean_m;
+    if (std::abs(off_m) > range.cart_high_m - range.cart_low_m)
+      forms.push_back({spring, {{force, {stiffness * off_m}}}});
+  }
+  return forms;
+}
+
+bool Growth::simplify() {
+  for (const Simpler& form : simpler_forms()) {
+    if (!simplified_.insert({form.effect, found_.size()}).second) continue;
+    options_.tell(0.8, "is it simpler than " + kind_of(form.effect));
+    Hypothesis h = search_.exchanged(current_, form.effect, form.others);
+    const Improvement improvement = compare(current_, h);
+    const auto parameters = [](const Hypothesis& of) { return static_cast<double>(of.free.size()); };
+    const double price = parameter_price * (parameters(h) - parameters(current_));
+    if (!(improvement.train > price) || !(improvement.held > -equally_good)) continue;
+    if (std::any_of(form.others.begin(), form.others.end(), [&](const PlantEffect& other) {
+          return !search_.is_plausible(h, other.number) ||
+                 search_.certainty(h, other.number) < least_certainty;
+        }))
+      continue;
+    if (!simulates_as_well(h)) continue;
+    current_ = std::move(h);
+    auto place = found_.erase(std::find(found_.begin(), found_.end(), form.effect));
+    for (const PlantEffect& other : form.others) {
+      where_[other.number] = where_.at(form.effect);
+      near_[other.number] = near_[form.effect];
+      place = std::next(found_.insert(place, other.number));
+    }
+    record_step();
+    return true;
+  }
+  return false;
+}
+
 bool Growth::try_pairs(const std::vector<std::pair<std::size_t, Hypothesis>>& contenders) {
   std::optional<Hypothesis> best;
   std::vector<std::size_t> best_found;
@@ -445,7 +515,7 @@ void Growth::prune() {
       const Improvement improvement = compare(h, current_);
       const bool still_shown =
           improvement.train - price_of(found_[i]) > least_evidence && improvement.t_value > 0.7 * least_t;
-      if (still_shown || is_believed(improvement, found_[i])) continue;
+      if (still_shown || is_believed(current_, improvement, found_[i])) continue;
       // What does without it by becoming what cannot be does not do without it.
       const bool bent = std::any_of(found_.begin(), found_.end(), [&](std::size_t other) {
         return other != found_[i] && search_.is_plausible(current_, other) && !search_.is_plausible(h, other);
@@ -458,6 +528,12 @@ void Growth::prune() {
       break;
     }
   }
+}
+
+bool Growth::bends_another(const Hypothesis& h, std::size_t effect) const {
+  return std::any_of(found_.begin(), found_.end(), [&](std::size_t other) {
+    return other != effect && search_.can_be(current_, other) && !search_.can_be(h, other);
+  });
 }
 
 bool Growth::is_found(std::size_t effect) const {

@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
+#include <numeric>
 
 #include "upright/analysis/residual.hpp"
 
@@ -76,13 +78,14 @@ double t_of(const std::vector<double>& values) {
 
 Improvement compare(const Hypothesis& simpler, const Hypothesis& richer) {
   Improvement result;
-  if (!std::isfinite(richer.train.objective)) return {-infinity, -infinity, -infinity};
+  if (!std::isfinite(richer.train.objective)) return {-infinity, -infinity, -infinity, -infinity};
   std::vector<double> falls;
   const std::size_t blocks =
       std::min(simpler.train.block_objective.size(), richer.train.block_objective.size());
   for (std::size_t b = 0; b < blocks; ++b)
     falls.push_back(simpler.train.block_objective[b] - richer.train.block_objective[b]);
   result.train = simpler.train.objective - richer.train.objective;
+  result.belief = std::accumulate(falls.begin(), falls.end(), result.train, std::minus<>());
   result.held = simpler.surprise - richer.surprise;
   result.t_value = t_of(falls);
   return result;
@@ -215,6 +218,13 @@ bool Search::is_plausible(const Hypothesis& h, std::size_t effect) const {
     if (kind_of(effect).starts_with("angle_offset") && std::abs(value) < 1.5 * range_.theta_resolution_rad)
       return false;
   }
+  return can_be(h, effect);
+}
+
+bool Search::can_be(const Hypothesis& h, std::size_t effect) const {
+  for (const FreeParameter& p : h.free)
+    if (p.effect == effect && p.index == 0 && !(h.train.point.plant.find(effect)->values[0] < p.high))
+      return false;
   return kind_of(effect) != "bristle_friction" || bristles_are_short(h);
 }
 
@@ -390,6 +400,33 @@ void Search::refine(const Hypothesis& base, Hypothesis& h) {
   refit(base, h);
   if (may_calm(base, h)) calm(h, {});
   weigh(h);
+}
+
+Hypothesis Search::begun_anew(const Hypothesis& base) {
+  FitPoint point = base.train.point;
+  point.starts = guess_starts(*train_.runs, train_.segments, point.plant);
+  Hypothesis h = fitted(base.added, point, FitOptions{}, base.free);
+  const Hypothesis followed =
+      fitted(base.added, with_starts_followed(train_, h.train.point), FitOptions{}, base.free);
+  if (followed.train.objective < h.train.objective) h = followed;
+  calm(h, {});
+  weigh(h);
+  return h;
+}
+
+Hypothesis Search::exchanged(const Hypothesis& base, std::size_t effect,
+                             const std::vector<PlantEffect>& others) {
+  std::set<std::size_t> added = base.added;
+  Plant plant = base.train.point.plant;
+  added.erase(effect);
+  plant.remove(effect);
+  for (const PlantEffect& other : others) {
+    added.insert(other.number);
+    plant.set(other.number, other.values);
+  }
+  Hypothesis h = fitted(added, moved_to(base.train.point, plant), FitOptions{}, free_of(added));
+  weigh(h);
+  return h;
 }
 
 Hypothesis Search::without(const Hypothesis& base, std::size_t effect) {

@@ -23,6 +23,9 @@ class Growth {
 
   /// From the plant file: one effect after the other, and pairs in their place.
   void find();
+  /// What is left is more than noise: the same model from initial states as the data show them. Whether that
+  /// is better.
+  bool begin_anew();
   /// What is left is more than noise: pairs of all that resembled the best effect. Whether the model changed.
   bool find_pairs_of_all();
   /// What is left is more than the sensors' noise: as the data show with little noise beyond it, and as all
@@ -71,7 +74,9 @@ class Growth {
                                      int round);
 
   static double price_of(std::size_t effect);
-  static bool is_believed(const Improvement& improvement, std::size_t effect);
+  /// Whether training and held-out runs both speak for it, and together beyond doubt.
+  static bool is_borne_out(const Improvement& improvement, std::size_t effect);
+  bool is_believed(Hypothesis& h, const Improvement& improvement, std::size_t effect);
   /// Evidence on the training runs that only something missing can hold against: held-out runs may excite
   /// what is missing still, and speak against a right effect until it is found too.
   static bool is_overwhelming(const Improvement& improvement, std::size_t effect);
@@ -113,11 +118,24 @@ class Growth {
   bool exchange();
   /// Dry friction in one direction only is Coulomb friction with a constant force as large.
   static bool is_half_of(std::size_t half, std::size_t effect);
+  /// What an effect may be in plain words, with the values at which it is nearly the same force.
+  struct Simpler {
+    std::size_t effect = 0;
+    std::vector<PlantEffect> others;
+  };
+  /// That dry friction acts in one direction only, exactly, would be chance: it is Coulomb friction and a
+  /// constant force. A spring whose middle the cart is nowhere near is a constant force.
+  std::vector<Simpler> simpler_forms() const;
+  /// Puts one of these in the place of what was found, where the data bear the change of parameters out.
+  /// Whether it did.
+  bool simplify();
   /// Two effects can hide each other, so that a third, which resembles both, is found instead. Every pair of
   /// these is tried in the place of what was found of them, once. Whether one is better.
   bool try_pairs(const std::vector<std::pair<std::size_t, Hypothesis>>& contenders);
   /// Backward deletion: what is no longer needed once others are there goes.
   void prune();
+  /// Whether another effect that was found becomes what cannot be.
+  bool bends_another(const Hypothesis& h, std::size_t effect) const;
   bool is_found(std::size_t effect) const;
 
   Search& search_;
@@ -127,7 +145,8 @@ class Growth {
   std::vector<std::size_t> found_;
   std::optional<Standing> standing_;
   bool contradicted_ = false;
-  std::set<std::pair<std::size_t, std::size_t>> exchanged_;  ///< tried already
+  std::set<std::pair<std::size_t, std::size_t>> exchanged_;   ///< tried already
+  std::set<std::pair<std::size_t, std::size_t>> simplified_;  ///< tried already, beside so many
   std::map<std::size_t, std::vector<std::size_t>> near_;
   std::map<std::size_t, std::string> where_;
   std::vector<std::pair<std::size_t, Hypothesis>> finalists_;

@@ -36,6 +36,7 @@ struct Hypothesis {
 /// of a quarter of a second.
 struct Improvement {
   double train = 0.0;    ///< fall of the objective on training data
+  double belief = 0.0;   ///< of that, what is believed of the parameters: they need not go so far from it
   double held = 0.0;     ///< of the surprise of held-out data
   double t_value = 0.0;  ///< of the mean fall per quarter of a second of training data
 };
@@ -86,6 +87,11 @@ class Search {
   void refit(const Hypothesis& base, Hypothesis& hypothesis);
   /// The same hypothesis without one effect.
   Hypothesis without(const Hypothesis& base, std::size_t effect);
+  /// The same hypothesis from initial states that are guessed from the data once more: those that suited a
+  /// poor model keep a good one from its place.
+  Hypothesis begun_anew(const Hypothesis& base);
+  /// The same hypothesis with others, at these values to begin with, in the place of one effect.
+  Hypothesis exchanged(const Hypothesis& base, std::size_t effect, const std::vector<PlantEffect>& others);
   /// These effects free with nothing believed of them beforehand. Everything else as in the plant file, or
   /// `settled`: within what is believed of it. Not judged.
   Hypothesis only(const std::vector<std::size_t>& effects, const Hypothesis& from, const Noise* fixed_noise,
@@ -109,6 +115,8 @@ class Search {
   /// A hypothesis in which the new effect does nothing, or is of a size that makes it another effect, has
   /// lost.
   bool is_plausible(const Hypothesis& h, std::size_t effect) const;
+  /// The second half of that: no size at the end of its range, no bristles that are a spring.
+  bool can_be(const Hypothesis& h, std::size_t effect) const;
   /// How many standard errors the size of an effect is from nothing: from what the plant file says, of a
   /// correction. Its other parameters (a shape, a place) are held: without a size they mean nothing.
   double certainty(const Hypothesis& h, std::size_t effect) const;
