@@ -425,13 +425,17 @@ std::vector<Growth::Simpler> Growth::simpler_forms() const {
   const std::size_t one_way = effect_number("friction_asymmetry"), spring = effect_number("cable_spring");
   const std::size_t level = effect_number("coulomb_friction"), force = effect_number("constant_force");
   const Plant& plant = current_.train.point.plant;
+  const auto is_new = [&](std::size_t effect) {
+    const std::vector<std::size_t>& known = search_.nuisances();
+    return is_found(effect) && std::find(known.begin(), known.end(), effect) == known.end();
+  };
   std::vector<Simpler> forms;
   if (plant.find(force) != nullptr) return forms;
-  if (is_found(one_way) && plant.find(level) == nullptr) {
+  if (is_new(one_way) && plant.find(level) == nullptr) {
     const double size = plant.find(one_way)->values[0];
     forms.push_back({one_way, {{level, {0.5 * std::abs(size)}}, {force, {-0.5 * size}}}});
   }
-  if (is_found(spring)) {
+  if (is_new(spring)) {
     const auto [stiffness, center_m, unused] = plant.find(spring)->values;
     const DataRange& range = search_.range();
     const double off_m = center_m - range.cart_mean_m;

@@ -145,6 +145,28 @@ TEST(Diagnosis, SaysNoDiscrepancyOfAPlantThatIsRight) {
   EXPECT_TRUE(d.effects.empty());
 }
 
+TEST(Diagnosis, KeepsASpringThatThePlantFileHasHoweverFarItsMiddle) {
+  std::mt19937_64 random(19);
+  blind::Rig rig{.plant = true_plant(random)};
+  Plant believed = believed_plant();
+  believed.set("cable_spring", {0.2, -2.0});
+  rig.plant.set("cable_spring", {0.8, -2.0});
+  const Diagnosis d = diagnose(believed, hanging_runs(rig, 19));
+  EXPECT_EQ(d.verdict, Verdict::explained) << d.residual;
+  ASSERT_FALSE(d.steps.empty());
+  EXPECT_EQ(effect_registry()[d.steps.front().effects.front().effect].kind, "cable_spring");
+  ASSERT_NE(d.model.find("cable_spring"), nullptr);
+  EXPECT_NEAR(d.model.find("cable_spring")->values[0] * (d.model.find("cable_spring")->values[1]), -1.6, 0.1);
+}
+
+TEST(Diagnosis, NamesASpringWhoseMiddleIsNowhereNearAConstantForce) {
+  const Diagnosis d = diagnose_hidden({{"cable_spring", {0.05, -8.0}}}, 20);
+  EXPECT_EQ(d.verdict, Verdict::explained) << d.residual;
+  ASSERT_FALSE(d.effects.empty());
+  EXPECT_EQ(effect_registry()[d.effects.front().effect].kind, "constant_force");
+  EXPECT_NEAR(d.effects.front().parameters[0].value, -0.4, 0.02);
+}
+
 TEST(Diagnosis, SaysUnexplainedOfBacklash) {
   std::mt19937_64 random(16);
   const blind::Rig rig{.plant = true_plant(random), .unknown = blind::Unknown::backlash, .backlash_m = 2e-3};

@@ -118,7 +118,8 @@ class Growth {
   bool exchange();
   /// Dry friction in one direction only is Coulomb friction with a constant force as large.
   static bool is_half_of(std::size_t half, std::size_t effect);
-  /// What an effect may be in plain words, with the values at which it is nearly the same force.
+  /// What an effect that the plant file lacks may be in plain words, with the values at which it is nearly
+  /// the same force.
   struct Simpler {
     std::size_t effect = 0;
     std::vector<PlantEffect> others;
