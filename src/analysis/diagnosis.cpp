@@ -44,13 +44,14 @@ class Diagnostician {
     if (left.structured && growth_.begin_anew()) left = settle();
     if (left.structured && growth_.find_pairs_of_all()) left = settle();
     if (left.beyond_sensors && growth_.find_thoroughly()) left = settle();
-    held_out_alone_ = left.structured && !examine(data_.train, final_.train.point).structured;
     conclude(left);
     return std::move(result_);
   }
-  /// Whether held-out runs excite what is missing still, and the others do not: they alone show it, or spoke
-  /// to the end against what the others show beyond doubt.
-  bool lacks_what_was_held_out() const { return held_out_alone_ || growth_.contradicted(); }
+  /// Of what is unexplained: whether held-out runs excite what is missing still, and the others do not. They
+  /// alone show it, or spoke to the end against what the others show beyond doubt.
+  bool lacks_what_was_held_out() const {
+    return growth_.contradicted() || !examine(data_.train, final_.train.point).structured;
+  }
 
  private:
   static DataSplit checked(DataSplit data) {
@@ -433,7 +434,6 @@ class Diagnostician {
   Hypothesis final_;  ///< fitted to the training runs, judged on the others
   Hypothesis known_;  ///< the same effects fitted to all runs: what the model says in the end
   std::vector<std::size_t> corrections_;
-  bool held_out_alone_ = false;
 };
 
 }  // namespace

@@ -305,7 +305,7 @@ std::vector<Growth::Believed> Growth::believe(int round, const std::vector<Scree
     if (round == 0) finalists_.emplace_back(effect, h);
     Improvement improvement = compare(current_, h);
     record_trial(round, effect, h, improvement);
-    if (!search_.is_plausible(h, effect) || bends_another(h, effect)) continue;
+    if (!search_.is_plausible(h, effect) || bends_another(h, effect, &Search::can_be)) continue;
     const bool overwhelming = is_overwhelming(improvement, effect);
     if (!is_believed(h, improvement, effect)) {
       if (overwhelming && is_certain(h, effect))
@@ -521,10 +521,7 @@ void Growth::prune() {
           improvement.train - price_of(found_[i]) > least_evidence && improvement.t_value > 0.7 * least_t;
       if (still_shown || is_believed(current_, improvement, found_[i])) continue;
       // What does without it by becoming what cannot be does not do without it.
-      const bool bent = std::any_of(found_.begin(), found_.end(), [&](std::size_t other) {
-        return other != found_[i] && search_.is_plausible(current_, other) && !search_.is_plausible(h, other);
-      });
-      if (bent) continue;
+      if (bends_another(h, found_[i], &Search::is_plausible)) continue;
       current_ = std::move(h);
       found_.erase(found_.begin() + static_cast<std::ptrdiff_t>(i));
       record_step();
@@ -534,9 +531,9 @@ void Growth::prune() {
   }
 }
 
-bool Growth::bends_another(const Hypothesis& h, std::size_t effect) const {
+bool Growth::bends_another(const Hypothesis& h, std::size_t effect, Holds holds) const {
   return std::any_of(found_.begin(), found_.end(), [&](std::size_t other) {
-    return other != effect && search_.can_be(current_, other) && !search_.can_be(h, other);
+    return other != effect && (search_.*holds)(current_, other) && !(search_.*holds)(h, other);
   });
 }
 

@@ -135,8 +135,10 @@ class Growth {
   bool try_pairs(const std::vector<std::pair<std::size_t, Hypothesis>>& contenders);
   /// Backward deletion: what is no longer needed once others are there goes.
   void prune();
-  /// Whether another effect that was found becomes what cannot be.
-  bool bends_another(const Hypothesis& h, std::size_t effect) const;
+  /// What the search says of one effect of a hypothesis.
+  using Holds = bool (Search::*)(const Hypothesis&, std::size_t) const;
+  /// Whether it holds of another effect that was found now, and no longer with `h`.
+  bool bends_another(const Hypothesis& h, std::size_t effect, Holds holds) const;
   bool is_found(std::size_t effect) const;
 
   Search& search_;
