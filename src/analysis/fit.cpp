@@ -621,26 +621,32 @@ class Fitter {
       const FitPoint former = point_;
       double next_objective = infinity;
       const double least_fall = options_.tolerance * sample_count() * 0.1 + 0.02;
+      double rejected = infinity;
       for (int attempt = 0; attempt < 4; ++attempt) {
         Step next = step(damping);
-        // What does not even promise to fall is not worth looking at. (A step that was cut short promises
-        // less than it is good for.)
-        const auto promises = [&] { return next.promised_fall >= least_fall || next.cut_short; };
-        if (!promises() && attempt == 0) next = step(damping = hardly_damped);
-        if (!promises()) break;
-        point_ = std::move(next.point);
-        swap_with_former();
-        next_objective = evaluate();
-        if (next_objective < objective) break;
-        point_ = former;
-        swap_with_former();
+        if (next.promised_fall < least_fall && attempt == 0) next = step(damping = hardly_damped);
+        const bool promises = next.promised_fall >= least_fall;
+        if (!promises && !next.cut_short) break;
+        // A step that hardly differs from one that was rejected is not worth looking at, nor is one that does
+        // not even promise to fall.
+        constexpr double alike = 0.9;
+        if (promises && next.promised_fall < alike * rejected) {
+          point_ = std::move(next.point);
+          swap_with_former();
+          next_objective = evaluate();
+          if (next_objective < objective) break;
+          point_ = former;
+          swap_with_former();
+          rejected = next.promised_fall;
+        }
         damping = std::max(damping, least_damping) * 30.0;
       }
       if (!(next_objective < objective)) {
         converged_ = true;
         break;
       }
-      damping = std::max(damping * 0.1, hardly_damped);
+      // Where a step had to be damped, the next one has to be too.
+      if (!std::isfinite(rejected)) damping = std::max(damping * 0.1, hardly_damped);
       const double fall = objective - next_objective;
       objective = next_objective;
       if (fall < least_fall) {
