@@ -43,7 +43,7 @@ class Diagnostician {
     ResidualStructure left = settle();
     if (left.structured && growth_.begin_anew()) left = settle();
     if (left.structured && growth_.find_pairs_of_all()) left = settle();
-    if (left.beyond_sensors && growth_.find_thoroughly()) left = settle();
+    if (may_be_hidden(left) && growth_.find_thoroughly(left.structured)) left = settle();
     conclude(left);
     return std::move(result_);
   }
@@ -58,6 +58,12 @@ class Diagnostician {
     if (data.train.segments.empty())
       throw ConfigError("record longer runs: no stretch of the data is long enough to simulate");
     return data;
+  }
+
+  /// Whether much noise may hide what is left. Where something was found and more is certainly missing, it
+  /// does not.
+  bool may_be_hidden(const ResidualStructure& left) const {
+    return left.beyond_sensors && (!left.structured || growth_.found().empty());
   }
 
   /// Settles the corrections, and looks at what is left.
@@ -454,6 +460,24 @@ std::string_view name_of(Verdict verdict) {
       return "not_excited";
   }
   return "";
+}
+
+std::optional<NextBest> next_best(const Diagnosis& diagnosis, const FoundEffect& effect) {
+  constexpr double near = 1.0 / 3.0;
+  NextBest best;
+  for (const Trial& trial : diagnosis.trials)
+    if (trial.taken && trial.effect == effect.effect) best.taken = &trial;
+  if (best.taken == nullptr) return std::nullopt;
+  for (const Trial& trial : diagnosis.trials) {
+    const std::vector<std::size_t>& same = effect.confusable_with;
+    if (trial.round != best.taken->round || trial.effect == effect.effect ||
+        !(trial.evidence > near * best.taken->evidence) ||
+        std::find(same.begin(), same.end(), trial.effect) != same.end())
+      continue;
+    if (best.other == nullptr || trial.evidence > best.other->evidence) best.other = &trial;
+  }
+  if (best.other == nullptr) return std::nullopt;
+  return best;
 }
 
 Diagnosis diagnose(const Plant& plant, const std::vector<Measurement>& runs,

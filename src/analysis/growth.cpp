@@ -68,11 +68,12 @@ bool Growth::find_pairs_of_all() {
   return true;
 }
 
-bool Growth::find_thoroughly() {
+bool Growth::find_thoroughly(bool certainly_missing) {
   const std::vector<std::size_t> before = found_;
   const double objective = current_.train.objective;
   grow(most_rounds, 2 * most_rounds, true);
-  if (search_.sieve_share() < 1.0) {
+  // What certainly is missing shows on a part of the data too.
+  if (!certainly_missing && search_.sieve_share() < 1.0) {
     search_.sieve_all();
     grow(2 * most_rounds, 3 * most_rounds, false);
   }
@@ -352,9 +353,13 @@ std::size_t Growth::choose(std::vector<Believed>& believed) {
       b.score += gain;
     }
   const double best = largest();
+  const auto on_all = [&](const Believed& b) { return b.score + compare(current_, b.hypothesis).held; };
+  double best_on_all = -infinity;
+  for (const Believed& b : believed)
+    if (b.score > best - equally_good) best_on_all = std::max(best_on_all, on_all(b));
   std::size_t chosen = believed.size();
   for (std::size_t i = 0; i < believed.size(); ++i)
-    if (believed[i].score > best - equally_good &&
+    if (believed[i].score > best - equally_good && !(on_all(believed[i]) < best_on_all - equally_good) &&
         (chosen == believed.size() || is_plainer(believed[i].effect, believed[chosen].effect)))
       chosen = i;
   return chosen;
@@ -402,10 +407,10 @@ bool Growth::exchange() {
       search_.refine(without, h);
       const Improvement improvement = compare(current_, h);
       const double evidence = improvement.train + price_of(effect) - price_of(other);
-      const bool plainer = is_plainer(other, effect);
-      if (!(evidence > (plainer ? -equally_good : confusable_evidence)) ||
-          !(improvement.held > (plainer ? -equally_good : 0.0)))
-        continue;
+      const bool as_good =
+          std::min({evidence, improvement.held, evidence + improvement.held}) > -equally_good;
+      const bool better = evidence > confusable_evidence && improvement.held > 0.0;
+      if (!better && !(as_good && is_plainer(other, effect))) continue;
       if (!search_.is_plausible(h, other) || search_.certainty(h, other) < least_certainty ||
           !simulates_as_well(h))
         continue;
@@ -489,7 +494,8 @@ bool Growth::try_pairs(const std::vector<std::pair<std::size_t, Hypothesis>>& co
       if (!(quick.train.objective < *to_beat)) continue;
       Hypothesis h = search_.with_pair(given_, contenders[a].second, contenders[b].second);
       const Improvement improvement = compare(so_far, h);
-      const double price = parameter_price * static_cast<double>(h.free.size() - current_.free.size());
+      const double price =
+          parameter_price * (static_cast<double>(h.free.size()) - static_cast<double>(so_far.free.size()));
       if (improvement.train - price < least_evidence || improvement.held < 0.0) continue;
       if (!search_.is_plausible(h, first) || !search_.is_plausible(h, second)) continue;
       if (search_.certainty(h, first) < least_certainty || search_.certainty(h, second) < least_certainty)

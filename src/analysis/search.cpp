@@ -247,6 +247,7 @@ double Search::certainty(const Hypothesis& h, std::size_t effect) const {
       given != nullptr ? given->values[0] : effect_registry()[effect].parameters[0].neutral;
   if (!std::isfinite(nothing)) return infinity;
   const Eigen::MatrixXd covariance = h.train.covariance(own, own);
+  if (!(covariance(0, 0) > 0.0)) return infinity;  // not estimated: held at the end of its range
   const Eigen::VectorXd scale = covariance.diagonal().cwiseMax(1e-300).cwiseSqrt();
   const Eigen::MatrixXd correlation =
       scale.cwiseInverse().asDiagonal() * covariance * scale.cwiseInverse().asDiagonal();

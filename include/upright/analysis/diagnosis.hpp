@@ -92,6 +92,17 @@ struct Diagnosis {
   std::vector<ResidualTrace> residual_before, residual_after;
 };
 
+/// Of the round that added an effect: how it did there, and how the best of the others did that it is told
+/// apart from.
+struct NextBest {
+  const Trial* taken = nullptr;
+  const Trial* other = nullptr;
+};
+
+/// None where no other came anywhere near, or the effect was added otherwise (in a pair, by an exchange, or
+/// as a correction). Points into the diagnosis.
+std::optional<NextBest> next_best(const Diagnosis& diagnosis, const FoundEffect& effect);
+
 struct DiagnosisOptions {
   /// Told from time to time how far the work is (0 to 1) and what it does.
   std::function<void(double, const std::string&)> progress;

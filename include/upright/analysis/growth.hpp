@@ -28,9 +28,9 @@ class Growth {
   bool begin_anew();
   /// What is left is more than noise: pairs of all that resembled the best effect. Whether the model changed.
   bool find_pairs_of_all();
-  /// What is left is more than the sensors' noise: as the data show with little noise beyond it, and as all
-  /// of the training data show. Whether the model changed.
-  bool find_thoroughly();
+  /// What is left is more than the sensors' noise: as the data show with little noise beyond it, and, unless
+  /// something is `certainly_missing`, as all of the training data show. Whether the model changed.
+  bool find_thoroughly(bool certainly_missing);
 
   const Hypothesis& given() const { return given_; }
   const Hypothesis& current() const { return current_; }
@@ -109,7 +109,8 @@ class Growth {
   /// held-out runs speak against.
   std::vector<Believed> believe(int round, const std::vector<Screened>& screened, bool calmly, double done);
   /// The one with the largest score. Close ones are fitted to the end first, for a fit that stopped a little
-  /// early is no reason; scores that are equal then leave it to the plainer effect.
+  /// early is no reason. Scores that are equal then leave it to the held-out runs, and where those say the
+  /// same, to the plainer effect.
   std::size_t choose(std::vector<Believed>& believed);
   void take(int round, Believed& best, const std::vector<Screened>& screened);
   /// What was the best name while another effect was still missing need not be the best beside it: each but
