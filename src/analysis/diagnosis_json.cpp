@@ -46,7 +46,15 @@ json step_json(const Step& step) {
   return effects;
 }
 
-json effect_json(const FoundEffect& effect) {
+json next_best_json(const std::optional<NextBest>& best) {
+  if (!best) return nullptr;
+  return {{"kind", kind_of(best->other->effect)},
+          {"evidence", number(best->other->evidence)},
+          {"of", number(best->taken->evidence)},
+          {"parameters", parameters_json(best->other->parameters)}};
+}
+
+json effect_json(const Diagnosis& diagnosis, const FoundEffect& effect) {
   json confusable = json::array();
   for (const std::size_t other : effect.confusable_with) confusable.push_back(kind_of(other));
   return {{"kind", kind_of(effect.effect)},
@@ -55,6 +63,7 @@ json effect_json(const FoundEffect& effect) {
           {"gap_after", number(effect.gap_after)},
           {"parameters", parameters_json(effect.parameters)},
           {"confusable_with", confusable},
+          {"next_best", next_best_json(next_best(diagnosis, effect))},
           {"where", effect.where}};
 }
 
@@ -62,7 +71,7 @@ json effect_json(const FoundEffect& effect) {
 
 json diagnosis_json(const Diagnosis& diagnosis) {
   json effects = json::array();
-  for (const FoundEffect& effect : diagnosis.effects) effects.push_back(effect_json(effect));
+  for (const FoundEffect& effect : diagnosis.effects) effects.push_back(effect_json(diagnosis, effect));
   json candidates = json::array();
   for (const CandidateScore& candidate : diagnosis.candidates)
     candidates.push_back({{"kind", kind_of(candidate.effect)},

@@ -72,6 +72,15 @@ void print_steps(const Diagnosis& d) {
   }
 }
 
+void print_next_best(const std::optional<NextBest>& best) {
+  if (!best) return;
+  std::printf("      next best: %s, with %.4g of the evidence of %.4g:", kind_of(best->other->effect).c_str(),
+              best->other->evidence, best->taken->evidence);
+  for (const ParameterEstimate& p : best->other->parameters)
+    std::printf(" %s %.4g %s", p.name.c_str(), p.value, p.unit.c_str());
+  std::printf("\n");
+}
+
 void print(const Diagnosis& d, const std::string& out) {
   switch (d.verdict) {
     case Verdict::explained:
@@ -94,11 +103,13 @@ void print(const Diagnosis& d, const std::string& out) {
                 effect.gap_after);
     for (const ParameterEstimate& p : effect.parameters) std::printf("      %s\n", in_words(p).c_str());
     if (!effect.where.empty()) std::printf("      %s\n", effect.where.c_str());
-    if (effect.confusable_with.empty()) continue;
-    std::string names;
-    for (const std::size_t other : effect.confusable_with)
-      names += (names.empty() ? "" : ", ") + kind_of(other);
-    std::printf("      these data cannot tell it from: %s\n", names.c_str());
+    if (!effect.confusable_with.empty()) {
+      std::string names;
+      for (const std::size_t other : effect.confusable_with)
+        names += (names.empty() ? "" : ", ") + kind_of(other);
+      std::printf("      these data cannot tell it from: %s\n", names.c_str());
+    }
+    print_next_best(next_best(d, effect));
   }
   print_steps(d);
   std::printf("Remaining: %s.\n", d.residual.c_str());

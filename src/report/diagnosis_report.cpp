@@ -279,13 +279,25 @@ void add_residuals(HtmlPage& page, const std::filesystem::path& file) {
 }
 
 void add_candidates(HtmlPage& page, const json& d) {
-  page.section("Candidates of the first round");
-  HtmlTable table{
-      {"effect", "evidence", "gap with it"}, {}, "Evidence: fall of minus twice the log likelihood."};
+  page.section("The ranking of candidates");
+  HtmlTable table{{"effect", "evidence", "gap with it"},
+                  {},
+                  "Each alone in the model as given. Evidence: fall of minus twice the log likelihood."};
   for (const json& candidate : d.at("candidates"))
     table.rows.push_back({candidate.at("kind"), number_text(number(candidate.at("evidence"))),
                           number_text(number(candidate.at("gap_after")))});
   page.table(table);
+  HtmlTable fits{
+      {"round", "effect", "evidence", "held out", "t", "standard errors", "taken"},
+      {},
+      "Every whole fit of the search: evidence on training and on held-out runs, t of its mean per "
+      "quarter of a second, and how many standard errors the effect is from nothing."};
+  for (const json& trial : d.at("trials"))
+    fits.rows.push_back({std::to_string(trial.at("round").get<int>()), trial.at("kind"),
+                         number_text(number(trial.at("evidence"))), number_text(number(trial.at("held_out"))),
+                         number_text(number(trial.at("t"))), number_text(number(trial.at("standard_errors"))),
+                         trial.at("taken").get<bool>() ? "taken" : ""});
+  if (!fits.rows.empty()) page.table(fits);
 }
 
 }  // namespace
