@@ -32,9 +32,10 @@ AAU_PENDULUM_PLANT = """plant:
   pendulum: {mass_kg: 0.2235, length_to_com_m: 0.3169, inertia_about_pivot_kgm2: 0.0225}
   gravity_mps2: 9.82
   motor: {force_per_volt_n: 3.336, back_emf_n_per_mps: 0.0}
-  effects:
-    - {kind: pivot_viscous_friction, coefficient_nms_per_rad: 5.0e-4}
+  effects: []
 """
+AAU_PENDULUM_VISCOUS_PLANT = AAU_PENDULUM_PLANT.replace(
+    "effects: []", "effects: [{kind: pivot_viscous_friction, coefficient_nms_per_rad: 5.0e-4}]")
 # m a^2 + I of the authors' EstimatedParameters.
 UW_PLANT = """plant:
   cart_mass_kg: 1.0
@@ -70,6 +71,11 @@ def aau_cart(data, names):
     return [dataset(data / "aau" / f"{name}.csv", AAU_CART_COLUMNS, header="false") for name in names]
 
 
+def aau_decay(data):
+    return [dataset(data / "aau" / "test1pend1.csv", {"time_s": 1, "theta_rad": 2}, header="false",
+                    cart_locked="true", from_s=10)]
+
+
 def sources(data):
     """Name: plant file, dataset files, and what the authors or the ladder of SOURCE.md say."""
     return {
@@ -89,11 +95,10 @@ def sources(data):
             AAU_CART_PLANT, aau_cart(data, ["0m10", "0m11", "0m30", "0m50"]),
             "authors: Coulomb friction depends on place and direction, 2.05 to 3.2 N one way, 1.9 to 5.6 N the other"),
         "aau-pendulum": (
-            AAU_PENDULUM_PLANT,
-            [dataset(data / "aau" / "test1pend1.csv", {"time_s": 1, "theta_rad": 2}, header="false",
-                     cart_locked="true", from_s=10)],
-            "10 to 71 s: viscous 145 mrad, with Coulomb 11.4, Coulomb and quadratic 2.2 (viscous then about 0);"
-            " author: Coulomb 4.1e-3 N m, viscous 0.5e-3 N m s"),
+            AAU_PENDULUM_PLANT, aau_decay(data),
+            "10 to 71 s: viscous 145 mrad, with Coulomb 11.4, Coulomb and quadratic 2.2 (viscous then about 0)"),
+        "aau-pendulum-viscous": (
+            AAU_PENDULUM_VISCOUS_PLANT, aau_decay(data), "author: Coulomb 4.1e-3 N m, viscous 0.5e-3 N m s"),
         "uw": (
             UW_PLANT,
             [dataset(data / "uw" / "single_pendulum_free_swing.csv", {"time_s": "t_s", "theta_rad": "theta_rad"},

@@ -1,0 +1,60 @@
+// Which name came next to the one that was taken.
+#include <gtest/gtest.h>
+
+#include "upright/analysis/diagnosis.hpp"
+#include "upright/model/registry.hpp"
+
+namespace upright {
+namespace {
+
+Trial trial_of(std::size_t round, const char* kind, double evidence, bool taken = false) {
+  Trial trial;
+  trial.round = round;
+  trial.effect = effect_number(kind);
+  trial.evidence = evidence;
+  trial.taken = taken;
+  return trial;
+}
+
+/// Coulomb friction first, then an asymmetry, which a constant force comes near.
+class NextBestName : public testing::Test {
+ protected:
+  NextBestName() {
+    diagnosis_.trials = {trial_of(0, "coulomb_friction", 9000.0, true), trial_of(0, "voltage_offset", 2900.0),
+                         trial_of(1, "viscous_asymmetry", 900.0, true), trial_of(1, "constant_force", 700.0),
+                         trial_of(1, "cable_spring", 690.0)};
+  }
+
+  std::optional<NextBest> of(const char* kind, const std::vector<std::size_t>& confusable_with = {}) const {
+    FoundEffect found;
+    found.effect = effect_number(kind);
+    found.confusable_with = confusable_with;
+    return next_best(diagnosis_, found);
+  }
+
+  Diagnosis diagnosis_;
+};
+
+TEST_F(NextBestName, IsTheBestOfTheSameRound) {
+  const std::optional<NextBest> best = of("viscous_asymmetry");
+  ASSERT_TRUE(best);
+  EXPECT_EQ(kind_of(best->other->effect), "constant_force");
+  EXPECT_EQ(kind_of(best->taken->effect), "viscous_asymmetry");
+}
+
+TEST_F(NextBestName, IsNotOneThatComesNowhereNear) {
+  EXPECT_FALSE(of("coulomb_friction"));
+}
+
+TEST_F(NextBestName, IsNotOneThatIsNotToldApart) {
+  const std::optional<NextBest> best = of("viscous_asymmetry", {effect_number("constant_force")});
+  ASSERT_TRUE(best);
+  EXPECT_EQ(kind_of(best->other->effect), "cable_spring");
+}
+
+TEST_F(NextBestName, IsNoneOfWhatWasNotTriedAlone) {
+  EXPECT_FALSE(of("cart_mass"));
+}
+
+}  // namespace
+}  // namespace upright
