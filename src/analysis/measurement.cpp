@@ -17,6 +17,12 @@ namespace upright {
 
 namespace {
 
+/// A run that says nothing.
+class NothingMoves : public ConfigError {
+ public:
+  using ConfigError::ConfigError;
+};
+
 namespace fs = std::filesystem;
 
 /// Where a quantity comes from in a foreign CSV: a column by name or by number, scaled and shifted.
@@ -238,7 +244,7 @@ Measurement load(const Mapping& mapping, const std::string& name) {
   }
   const bool still =
       (m.cart_m.empty() || is_constant(m.cart_m)) && (m.theta_rad.empty() || is_constant(m.theta_rad));
-  if (still) throw ConfigError("record a run in which something moves: " + file + " holds constant data");
+  if (still) throw NothingMoves("record a run in which something moves: " + file + " holds constant data");
   m.cart_resolution_m = mapping.cart_resolution_m.value_or(find_resolution(m.cart_m));
   m.theta_resolution_rad = mapping.theta_resolution_rad.value_or(find_resolution(m.theta_rad));
   if (m.cart_resolution_m > 0.0) m.cart_weight = dwell_weights(m.cart_m);
@@ -379,6 +385,25 @@ Measurement read_measurement(const fs::path& path) {
   const std::string extension = path.extension().string();
   if (extension == ".yaml" || extension == ".yml") return load(read_mapping(path), path.stem().string());
   return load(plain_mapping(path), path.stem().string());
+}
+
+std::vector<Measurement> read_measurements(const std::vector<fs::path>& paths) {
+  std::vector<Measurement> runs;
+  std::vector<std::string> notes;
+  std::optional<NothingMoves> still;
+  for (const fs::path& path : paths) {
+    try {
+      runs.push_back(read_measurement(path));
+    } catch (const NothingMoves& problem) {
+      notes.push_back(path.string() +
+                      " is left out: nothing moves in it; see that the cart did not stick and " +
+                      "that the encoders are connected");
+      still = problem;
+    }
+  }
+  if (runs.empty() && still) throw NothingMoves(*still);
+  if (!runs.empty()) runs.front().notes.insert(runs.front().notes.end(), notes.begin(), notes.end());
+  return runs;
 }
 
 }  // namespace upright

@@ -228,8 +228,7 @@ void write_results(const Diagnosis& d, const Plant& given, const std::vector<Mea
 
 void run_diagnose(const DiagnoseFlags& flags) {
   const Plant plant = read_plant_file(flags.model);
-  std::vector<Measurement> runs;
-  for (const std::string& data : flags.data) runs.push_back(read_measurement(data));
+  const std::vector<Measurement> runs = read_measurements({flags.data.begin(), flags.data.end()});
   if (!flags.out.empty() && fs::exists(fs::path(flags.out) / "diagnosis.json"))
     throw ConfigError("choose another folder with --out: " + flags.out + " holds a diagnosis already");
   DiagnosisOptions options;

@@ -115,7 +115,7 @@ Request request_of(const Flags& flags, std::size_t number, std::string& label) {
 /// Writes runs as files and reads them back, as the command does.
 std::vector<Measurement> through_files(const std::vector<Measurement>& runs, const fs::path& folder) {
   fs::create_directories(folder);
-  std::vector<Measurement> read;
+  std::vector<fs::path> written;
   for (const Measurement& run : runs) {
     const fs::path file = folder / (run.name + ".csv");
     std::ofstream out(file);
@@ -129,7 +129,7 @@ std::vector<Measurement> through_files(const std::vector<Measurement>& runs, con
     }
     out.close();
     if (!run.cart_locked) {
-      read.push_back(read_measurement(file));
+      written.push_back(file);
       continue;
     }
     const fs::path dataset = folder / (run.name + ".yaml");
@@ -137,9 +137,9 @@ std::vector<Measurement> through_files(const std::vector<Measurement>& runs, con
         << "dataset:\n  file: " << run.name
         << ".csv\n  columns: {time_s: time_s, theta_rad: theta_rad, voltage_v: voltage_v}\n"
            "  cart_locked: true\n";
-    read.push_back(read_measurement(dataset));
+    written.push_back(dataset);
   }
-  return read;
+  return read_measurements(written);
 }
 
 /// How much larger a base parameter of `start` is than the believed one, as the effect that corrects it says

@@ -87,6 +87,19 @@ TEST_F(MeasurementFile, RefusesWhatCannotBeUsedAndSaysWhere) {
   EXPECT_NE(refusal(file("f.csv", rows("time_s,cart_m,none"))).find("voltage_v"), std::string::npos);
 }
 
+TEST_F(MeasurementFile, LeavesOutWhatDoesNotMoveBesideWhatDoes) {
+  std::string still = "time_s,cart_m,voltage_v\n";
+  for (int k = 0; k < 40; ++k) still += std::to_string(0.01 * k) + ",0.5,1\n";
+  const auto a = file("still.csv", still), b = file("b.csv", rows("time_s,cart_m,voltage_v"));
+  const std::vector<Measurement> runs = read_measurements({a, b});
+  ASSERT_EQ(runs.size(), 1u);
+  EXPECT_EQ(runs[0].name, "b");
+  ASSERT_EQ(runs[0].notes.size(), 1u);
+  EXPECT_NE(runs[0].notes[0].find("still.csv is left out"), std::string::npos);
+  EXPECT_THROW(read_measurements({a, a}), ConfigError);
+  EXPECT_THROW(read_measurements({b, file("short.csv", "time_s,cart_m,voltage_v\n0,0,0\n")}), ConfigError);
+}
+
 TEST(Resolution, IsFoundWhereThereAreStepsAndNowhereElse) {
   std::mt19937_64 random(1);
   std::normal_distribution<double> noise(0.0, 1.0);

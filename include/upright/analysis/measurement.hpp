@@ -37,6 +37,10 @@ struct Measurement {
 /// used: no common columns, one sample, constant data, values that are not finite, time that does not grow.
 Measurement read_measurement(const std::filesystem::path& path);
 
+/// Reads all items of `--data`. A run in which nothing moves says nothing of the model, and may be an encoder
+/// that is not connected: beside runs that move it is left out, which is noted.
+std::vector<Measurement> read_measurements(const std::vector<std::filesystem::path>& paths);
+
 /// The step of quantised values: the largest number of which all differences are multiples; 0 when there is
 /// none.
 double find_resolution(const std::vector<double>& values);
