@@ -43,7 +43,7 @@ class Diagnostician {
     ResidualStructure left = settle();
     if (left.structured && growth_.begin_anew()) left = settle();
     if (left.structured && growth_.find_pairs_of_all()) left = settle();
-    if (may_be_hidden(left) && growth_.find_thoroughly(left.structured)) left = settle();
+    if (left.beyond_sensors && growth_.find_thoroughly(left.structured)) left = settle();
     conclude(left);
     return std::move(result_);
   }
@@ -58,12 +58,6 @@ class Diagnostician {
     if (data.train.segments.empty())
       throw ConfigError("record longer runs: no stretch of the data is long enough to simulate");
     return data;
-  }
-
-  /// Whether much noise may hide what is left. Where something was found and more is certainly missing, it
-  /// does not.
-  bool may_be_hidden(const ResidualStructure& left) const {
-    return left.beyond_sensors && (!left.structured || growth_.found().empty());
   }
 
   /// Settles the corrections, and looks at what is left.
@@ -188,6 +182,8 @@ class Diagnostician {
 
   void conclude(const ResidualStructure& structure) {
     options_.tell(0.93, "measuring the gap");
+    for (const Measurement& run : runs_)
+      result_.notes.insert(result_.notes.end(), run.notes.begin(), run.notes.end());
     if (runs_.size() == 1) result_.notes.push_back("one run only: a third of its segments is held out");
     result_.held_out_runs = data_.held_out_runs;
     result_.noise = known_.train.point.noise;
