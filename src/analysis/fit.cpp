@@ -964,9 +964,11 @@ std::vector<Segment> cut_segments(const std::vector<Measurement>& runs, double l
             upright_rate * std::max(0.0, std::cos(run.theta_rad[k])) * (run.time_s[k] - run.time_s[k - 1]);
       if (gap) {
         close(k - 1);
-        // What was commanded in the gap is not known, and may still act for a while.
-        constexpr double forgotten_s = 0.1;
-        const double resume_s = run.time_s[k] + forgotten_s;
+        // What was commanded in the gap is not known, and may still act for a while: through a delay, and,
+        // the more of it there was, through a lag.
+        constexpr double at_least_s = 0.1, at_most_s = 0.5;
+        const double gap_s = run.time_s[k] - run.time_s[k - 1];
+        const double resume_s = run.time_s[k] + std::min(at_least_s + 2.0 * gap_s, at_most_s);
         while (k + 1 < run.size() && run.time_s[k] < resume_s) ++k;
         first = k;
         growth = 0.0;

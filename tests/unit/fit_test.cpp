@@ -33,5 +33,27 @@ TEST(Fit, TakesSlidingWhereTheModelRestsForAForceAndNotForSensorNoise) {
   EXPECT_LT(noise.force, 1.0);
 }
 
+TEST(Fit, BeginsAfterAGapWhenTheLagOfTheMotorHasForgottenWhatWasCommandedThere) {
+  Plant plant;
+  plant.cart_mass_kg = 1.0;
+  plant.motor = {1.5, 6.6};
+  plant.set("viscous_friction", {2.8});
+  plant.set("motor_lag", {0.036});
+  const blind::Rig rig{.plant = plant};
+  for (const double gap_s : {0.05, 0.15, 0.4}) {
+    blind::Plan plan;
+    plan.experiment = blind::Experiment::multisine;
+    plan.rate_hz = 500.0;
+    plan.duration_s = 4.0;
+    plan.amplitude_v = 4.0;
+    plan.gaps_s = {{0.7, gap_s}, {1.9, gap_s}, {2.9, gap_s}};
+    const std::vector<Measurement> runs = {measure(rig, plan, "run")};
+    const FitData data{&runs, cut_segments(runs)};
+    ASSERT_EQ(data.segments.size(), 4u);
+    const FitResult followed = follow(data, {plant, guess_starts(runs, data.segments, plant), {}});
+    EXPECT_LT(whitened_rms(followed), 1.1) << gap_s;
+  }
+}
+
 }  // namespace
 }  // namespace upright
