@@ -122,18 +122,24 @@ double Growth::price_of(std::size_t effect) {
 
 bool Growth::is_believed(Hypothesis& h, const Improvement& improvement, std::size_t effect) {
   const double evidence = improvement.train - price_of(effect);
-  // What a few moments hold has a small t: then the held-out runs must speak for it too, or leave nothing
-  // but the sensors' noise, whose evidence needs no other witness.
-  constexpr double least_t_borne_out = 1.5, as_sensors = 1.05;
-  if (is_borne_out(improvement, effect) && improvement.t_value > least_t_borne_out) return true;
+  const double t = witnessed_t(improvement);
+  if (is_borne_out(improvement, effect) && t > least_t) return true;
   // Held-out data that do not excite the effect say nothing: odds of less than 2 to 1 against it.
   constexpr double indifferent = 1.4;
   if (evidence < least_evidence || !(improvement.held > -indifferent)) return false;
-  if (improvement.t_value > least_t || evidence > overwhelming_evidence) return true;
+  if (t > least_t || evidence > overwhelming_evidence) return true;
   // Numbers of the plant that need not be so far off are no matter of noise.
   if (improvement.belief - price_of(effect) > least_evidence) return true;
-  return improvement.t_value > least_t_borne_out && improvement.held > equally_good &&
+  // Nothing but the sensors' noise is left: its evidence needs no other witness.
+  constexpr double least_t_of_sensors = 1.5, as_sensors = 1.05;
+  return improvement.t_value > least_t_of_sensors && improvement.held > equally_good &&
          search_.simulate(h).gap < as_sensors;
+}
+
+double Growth::witnessed_t(const Improvement& improvement) {
+  constexpr double chance = 1.0;
+  if (!(improvement.t_value > chance)) return improvement.t_value;
+  return std::sqrt(improvement.t_value * improvement.t_value + std::max(improvement.held, 0.0));
 }
 
 bool Growth::is_borne_out(const Improvement& improvement, std::size_t effect) {

@@ -266,7 +266,10 @@ INSTANTIATE_TEST_SUITE_P(Cases, BlindEffect,
                                          BlindCase{{"cable_spring"}, Size::typical, true, 206},
                                          BlindCase{{"viscous_asymmetry"}, Size::typical, false, 207},
                                          BlindCase{{"pendulum_length"}, Size::strong, false, 208},
-                                         BlindCase{{"quadratic_drag"}, Size::strong, true, 209}),
+                                         BlindCase{{"quadratic_drag"}, Size::strong, true, 209},
+                                         // Few moments of the training run show it, the held-out ones do.
+                                         BlindCase{
+                                             {"position_dependent_friction"}, Size::weak, true, 262000854}),
                          name_of_case);
 INSTANTIATE_TEST_SUITE_P(
     Cases, BlindPair,

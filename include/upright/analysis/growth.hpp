@@ -77,6 +77,9 @@ class Growth {
   /// Whether training and held-out runs both speak for it, and together beyond doubt.
   static bool is_borne_out(const Improvement& improvement, std::size_t effect);
   bool is_believed(Hypothesis& h, const Improvement& improvement, std::size_t effect);
+  /// What a few moments hold has a small t on the training runs. Held-out runs are a witness of their own,
+  /// whose evidence adds to its square, unless the training runs say no more than chance does.
+  static double witnessed_t(const Improvement& improvement);
   /// Evidence on the training runs that only something missing can hold against: held-out runs may excite
   /// what is missing still, and speak against a right effect until it is found too.
   static bool is_overwhelming(const Improvement& improvement, std::size_t effect);
