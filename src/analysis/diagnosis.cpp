@@ -458,21 +458,23 @@ std::string_view name_of(Verdict verdict) {
   return "";
 }
 
-std::optional<NextBest> next_best(const Diagnosis& diagnosis, const FoundEffect& effect) {
+NextBest next_best(const Diagnosis& diagnosis, const FoundEffect& effect) {
   constexpr double near = 1.0 / 3.0;
+  constexpr std::size_t most = 3;
   NextBest best;
   for (const Trial& trial : diagnosis.trials)
     if (trial.taken && trial.effect == effect.effect) best.taken = &trial;
-  if (best.taken == nullptr) return std::nullopt;
+  if (best.taken == nullptr) return best;
   for (const Trial& trial : diagnosis.trials) {
     const std::vector<std::size_t>& same = effect.confusable_with;
-    if (trial.round != best.taken->round || trial.effect == effect.effect ||
-        !(trial.evidence > near * best.taken->evidence) ||
-        std::find(same.begin(), same.end(), trial.effect) != same.end())
-      continue;
-    if (best.other == nullptr || trial.evidence > best.other->evidence) best.other = &trial;
+    const double share = trial.evidence / best.taken->evidence;
+    if (trial.round == best.taken->round && share > near && share < 1.0 &&
+        std::find(same.begin(), same.end(), trial.effect) == same.end())
+      best.others.push_back(&trial);
   }
-  if (best.other == nullptr) return std::nullopt;
+  std::stable_sort(best.others.begin(), best.others.end(),
+                   [](const Trial* a, const Trial* b) { return a->evidence > b->evidence; });
+  if (best.others.size() > most) best.others.resize(most);
   return best;
 }
 

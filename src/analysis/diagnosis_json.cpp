@@ -46,12 +46,14 @@ json step_json(const Step& step) {
   return effects;
 }
 
-json next_best_json(const std::optional<NextBest>& best) {
-  if (!best) return nullptr;
-  return {{"kind", kind_of(best->other->effect)},
-          {"evidence", number(best->other->evidence)},
-          {"of", number(best->taken->evidence)},
-          {"parameters", parameters_json(best->other->parameters)}};
+json next_best_json(const NextBest& best) {
+  json others = json::array();
+  for (const Trial* other : best.others)
+    others.push_back({{"kind", kind_of(other->effect)},
+                      {"evidence", number(other->evidence)},
+                      {"of", number(best.taken->evidence)},
+                      {"parameters", parameters_json(other->parameters)}});
+  return others;
 }
 
 json effect_json(const Diagnosis& diagnosis, const FoundEffect& effect) {

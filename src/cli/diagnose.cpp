@@ -72,13 +72,14 @@ void print_steps(const Diagnosis& d) {
   }
 }
 
-void print_next_best(const std::optional<NextBest>& best) {
-  if (!best) return;
-  std::printf("      next best: %s, with %.4g of the evidence of %.4g:", kind_of(best->other->effect).c_str(),
-              best->other->evidence, best->taken->evidence);
-  for (const ParameterEstimate& p : best->other->parameters)
-    std::printf(" %s %.4g %s", p.name.c_str(), p.value, p.unit.c_str());
-  std::printf("\n");
+void print_next_best(const NextBest& best) {
+  for (const Trial* other : best.others) {
+    std::printf("      next best: %s, with %.4g of the evidence of %.4g:", kind_of(other->effect).c_str(),
+                other->evidence, best.taken->evidence);
+    for (const ParameterEstimate& p : other->parameters)
+      std::printf(" %s %.4g %s", p.name.c_str(), p.value, p.unit.c_str());
+    std::printf("\n");
+  }
 }
 
 void print(const Diagnosis& d, const std::string& out) {

@@ -25,7 +25,7 @@ class NextBestName : public testing::Test {
                          trial_of(1, "cable_spring", 690.0)};
   }
 
-  std::optional<NextBest> of(const char* kind, const std::vector<std::size_t>& confusable_with = {}) const {
+  NextBest of(const char* kind, const std::vector<std::size_t>& confusable_with = {}) const {
     FoundEffect found;
     found.effect = effect_number(kind);
     found.confusable_with = confusable_with;
@@ -35,25 +35,31 @@ class NextBestName : public testing::Test {
   Diagnosis diagnosis_;
 };
 
-TEST_F(NextBestName, IsTheBestOfTheSameRound) {
-  const std::optional<NextBest> best = of("viscous_asymmetry");
-  ASSERT_TRUE(best);
-  EXPECT_EQ(kind_of(best->other->effect), "constant_force");
-  EXPECT_EQ(kind_of(best->taken->effect), "viscous_asymmetry");
+TEST_F(NextBestName, IsOfTheSameRoundTheBestFirst) {
+  const NextBest best = of("viscous_asymmetry");
+  EXPECT_EQ(kind_of(best.taken->effect), "viscous_asymmetry");
+  ASSERT_EQ(best.others.size(), 2u);
+  EXPECT_EQ(kind_of(best.others[0]->effect), "constant_force");
+  EXPECT_EQ(kind_of(best.others[1]->effect), "cable_spring");
 }
 
 TEST_F(NextBestName, IsNotOneThatComesNowhereNear) {
-  EXPECT_FALSE(of("coulomb_friction"));
+  EXPECT_TRUE(of("coulomb_friction").others.empty());
+}
+
+TEST_F(NextBestName, IsNotOneThatWasRefusedForAllItsEvidence) {
+  diagnosis_.trials.push_back(trial_of(1, "bristle_friction", 5000.0));
+  EXPECT_EQ(of("viscous_asymmetry").others.size(), 2u);
 }
 
 TEST_F(NextBestName, IsNotOneThatIsNotToldApart) {
-  const std::optional<NextBest> best = of("viscous_asymmetry", {effect_number("constant_force")});
-  ASSERT_TRUE(best);
-  EXPECT_EQ(kind_of(best->other->effect), "cable_spring");
+  const NextBest best = of("viscous_asymmetry", {effect_number("constant_force")});
+  ASSERT_EQ(best.others.size(), 1u);
+  EXPECT_EQ(kind_of(best.others[0]->effect), "cable_spring");
 }
 
 TEST_F(NextBestName, IsNoneOfWhatWasNotTriedAlone) {
-  EXPECT_FALSE(of("cart_mass"));
+  EXPECT_TRUE(of("cart_mass").others.empty());
 }
 
 }  // namespace

@@ -92,16 +92,15 @@ struct Diagnosis {
   std::vector<ResidualTrace> residual_before, residual_after;
 };
 
-/// Of the round that added an effect: how it did there, and how the best of the others did that it is told
-/// apart from.
+/// Of the round that added an effect: how it did there, and the others that came near and are told apart from
+/// it, the best first, three at most. Points into the diagnosis.
 struct NextBest {
   const Trial* taken = nullptr;
-  const Trial* other = nullptr;
+  std::vector<const Trial*> others;
 };
 
-/// None where no other came anywhere near, or the effect was added otherwise (in a pair, by an exchange, or
-/// as a correction). Points into the diagnosis.
-std::optional<NextBest> next_best(const Diagnosis& diagnosis, const FoundEffect& effect);
+/// Nothing of an effect that was added otherwise: in a pair, by an exchange, or as a correction.
+NextBest next_best(const Diagnosis& diagnosis, const FoundEffect& effect);
 
 struct DiagnosisOptions {
   /// Told from time to time how far the work is (0 to 1) and what it does.
