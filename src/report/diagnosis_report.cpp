@@ -292,7 +292,7 @@ void add_candidates(HtmlPage& page, const json& d) {
       {},
       "Every whole fit of the search: evidence on training and on held-out runs, t of its mean per "
       "quarter of a second, and how many standard errors the effect is from nothing."};
-  for (const json& trial : d.at("trials"))
+  for (const json& trial : d.value("trials", json::array()))
     fits.rows.push_back({std::to_string(trial.at("round").get<int>()), trial.at("kind"),
                          number_text(number(trial.at("evidence"))), number_text(number(trial.at("held_out"))),
                          number_text(number(trial.at("t"))), number_text(number(trial.at("standard_errors"))),
