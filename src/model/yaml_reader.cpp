@@ -240,6 +240,8 @@ std::shared_ptr<YamlMap::Node> YamlMap::Node::child(const YAML::Node& node,
 }
 
 YamlMap YamlMap::from_text(const std::string& text, const std::filesystem::path& file) {
+  if (text.find('\0') != std::string::npos)
+    throw ConfigError("name a text file: " + file.string() + " holds a zero byte");
   auto node = std::make_shared<Node>();
   node->file = file;
   try {

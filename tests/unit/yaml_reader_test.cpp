@@ -74,5 +74,9 @@ TEST(YamlReader, BracketsInCommentsAndTextsAreNotNesting) {
   EXPECT_EQ(map.text("a"), many);
 }
 
+TEST(YamlReader, RefusesAZeroByteWhichNoPathCanHold) {
+  EXPECT_THROW(YamlMap::from_text(std::string("plant: a\0b.yaml", 15), "bad.yaml"), ConfigError);
+}
+
 }  // namespace
 }  // namespace upright
