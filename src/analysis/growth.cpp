@@ -120,6 +120,10 @@ double Growth::price_of(std::size_t effect) {
   return parameter_price * static_cast<double>(effect_registry()[effect].parameters.size() - 1);
 }
 
+double Growth::price_of_change(const Hypothesis& from, const Hypothesis& to) {
+  return parameter_price * (static_cast<double>(to.free.size()) - static_cast<double>(from.free.size()));
+}
+
 bool Growth::is_believed(Hypothesis& h, const Improvement& improvement, std::size_t effect) {
   const double evidence = improvement.train - price_of(effect);
   const double t = witnessed_t(improvement);
@@ -462,9 +466,7 @@ bool Growth::simplify() {
     options_.tell(0.8, "is it simpler than " + kind_of(form.effect));
     Hypothesis h = search_.exchanged(current_, form.effect, form.others);
     const Improvement improvement = compare(current_, h);
-    const auto parameters = [](const Hypothesis& of) { return static_cast<double>(of.free.size()); };
-    const double price = parameter_price * (parameters(h) - parameters(current_));
-    if (!(improvement.train > price) || !(improvement.held > -equally_good)) continue;
+    if (!(improvement.train > price_of_change(current_, h)) || !(improvement.held > -equally_good)) continue;
     if (std::any_of(form.others.begin(), form.others.end(), [&](const PlantEffect& other) {
           return !search_.is_plausible(h, other.number) ||
                  search_.certainty(h, other.number) < least_certainty;
@@ -500,9 +502,7 @@ bool Growth::try_pairs(const std::vector<std::pair<std::size_t, Hypothesis>>& co
       if (!(quick.train.objective < *to_beat)) continue;
       Hypothesis h = search_.with_pair(given_, contenders[a].second, contenders[b].second);
       const Improvement improvement = compare(so_far, h);
-      const double price =
-          parameter_price * (static_cast<double>(h.free.size()) - static_cast<double>(so_far.free.size()));
-      if (improvement.train - price < least_evidence || improvement.held < 0.0) continue;
+      if (improvement.train - price_of_change(so_far, h) < least_evidence || improvement.held < 0.0) continue;
       if (!search_.is_plausible(h, first) || !search_.is_plausible(h, second)) continue;
       if (search_.certainty(h, first) < least_certainty || search_.certainty(h, second) < least_certainty)
         continue;

@@ -49,6 +49,12 @@ std::string in_words(const ParameterEstimate& p) {
   return text;
 }
 
+/// In a line, without intervals.
+void print_values(const std::vector<ParameterEstimate>& parameters) {
+  for (const ParameterEstimate& p : parameters)
+    std::printf(" %s %.4g %s", p.name.c_str(), p.value, p.unit.c_str());
+}
+
 /// How the search came to its answer, where it did not only add one effect after the other.
 void print_steps(const Diagnosis& d) {
   const auto lost = [&](const Step::Effect& had) {
@@ -64,8 +70,7 @@ void print_steps(const Diagnosis& d) {
     std::printf("  %zu.", i + 1);
     for (const Step::Effect& effect : d.steps[i].effects) {
       std::printf(" %s", kind_of(effect.effect).c_str());
-      for (const ParameterEstimate& p : effect.parameters)
-        std::printf(" %s %.4g %s", p.name.c_str(), p.value, p.unit.c_str());
+      print_values(effect.parameters);
       std::printf(";");
     }
     std::printf("\n");
@@ -76,8 +81,7 @@ void print_next_best(const NextBest& best) {
   for (const Trial* other : best.others) {
     std::printf("      next best: %s, with %.4g of the evidence of %.4g:", kind_of(other->effect).c_str(),
                 other->evidence, best.taken->evidence);
-    for (const ParameterEstimate& p : other->parameters)
-      std::printf(" %s %.4g %s", p.name.c_str(), p.value, p.unit.c_str());
+    print_values(other->parameters);
     std::printf("\n");
   }
 }

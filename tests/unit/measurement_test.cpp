@@ -35,6 +35,13 @@ class MeasurementFile : public testing::Test {
     return text + bad_row;
   }
 
+  /// A cart that does not move.
+  static std::string still() {
+    std::string text = "time_s,cart_m,voltage_v\n";
+    for (int k = 0; k < 40; ++k) text += std::to_string(0.01 * k) + ",0.5,1\n";
+    return text;
+  }
+
   std::string refusal(const std::filesystem::path& path) const {
     try {
       read_measurement(path);
@@ -80,17 +87,13 @@ TEST_F(MeasurementFile, RefusesWhatCannotBeUsedAndSaysWhere) {
             std::string::npos);
   EXPECT_NE(refusal(file("d.csv", rows("time_s,cart_m,voltage_v", "0.1,0.002,1\n"))).find("does not grow"),
             std::string::npos);
-  std::string still = "time_s,cart_m,voltage_v\n";
-  for (int k = 0; k < 40; ++k) still += std::to_string(0.01 * k) + ",0.5,1\n";
-  EXPECT_NE(refusal(file("e.csv", still)).find("constant"), std::string::npos);
+  EXPECT_NE(refusal(file("e.csv", still())).find("constant"), std::string::npos);
   EXPECT_NE(refusal(folder_ / "missing.csv").find("cannot read"), std::string::npos);
   EXPECT_NE(refusal(file("f.csv", rows("time_s,cart_m,none"))).find("voltage_v"), std::string::npos);
 }
 
 TEST_F(MeasurementFile, LeavesOutWhatDoesNotMoveBesideWhatDoes) {
-  std::string still = "time_s,cart_m,voltage_v\n";
-  for (int k = 0; k < 40; ++k) still += std::to_string(0.01 * k) + ",0.5,1\n";
-  const auto a = file("still.csv", still), b = file("b.csv", rows("time_s,cart_m,voltage_v"));
+  const auto a = file("still.csv", still()), b = file("b.csv", rows("time_s,cart_m,voltage_v"));
   const std::vector<Measurement> runs = read_measurements({a, b});
   ASSERT_EQ(runs.size(), 1u);
   EXPECT_EQ(runs[0].name, "b");

@@ -74,6 +74,8 @@ class Growth {
                                      int round);
 
   static double price_of(std::size_t effect);
+  /// What the parameters must save that one hypothesis has beyond the other; negative where it has fewer.
+  static double price_of_change(const Hypothesis& from, const Hypothesis& to);
   /// Whether training and held-out runs both speak for it, and together beyond doubt.
   static bool is_borne_out(const Improvement& improvement, std::size_t effect);
   bool is_believed(Hypothesis& h, const Improvement& improvement, std::size_t effect);
