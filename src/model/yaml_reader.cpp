@@ -59,8 +59,8 @@ std::optional<double> parse_number(const std::string& text) {
 }
 
 /// Walks a file's events before any node is built and refuses what yaml-cpp cannot be trusted with: nesting
-/// that would exhaust the stack, and a second document (on some broken text yaml-cpp 0.7 finds empty
-/// documents for ever).
+/// that would exhaust the stack, a second document (on some broken text yaml-cpp 0.7 finds empty documents
+/// for ever), and a zero byte, with which no name or path would be read again as it was written.
 class Gatekeeper : public YAML::EventHandler {
  public:
   explicit Gatekeeper(std::filesystem::path file) : file_(std::move(file)) {}
@@ -73,7 +73,10 @@ class Gatekeeper : public YAML::EventHandler {
   void OnAlias(const YAML::Mark& mark, YAML::anchor_t) override {
     refuse(mark, "write the values out", "aliases are not supported");
   }
-  void OnScalar(const YAML::Mark&, const std::string&, YAML::anchor_t, const std::string&) override {}
+  void OnScalar(const YAML::Mark& mark, const std::string&, YAML::anchor_t,
+                const std::string& value) override {
+    if (value.find('\0') != std::string::npos) refuse(mark, "correct the YAML", "a zero byte");
+  }
   void OnSequenceStart(const YAML::Mark& mark, const std::string&, YAML::anchor_t,
                        YAML::EmitterStyle::value) override {
     enter(mark);
@@ -102,6 +105,10 @@ class Gatekeeper : public YAML::EventHandler {
 };
 
 void refuse_what_cannot_be_built(const std::string& text, const std::filesystem::path& file) {
+  // yaml-cpp takes a zero byte that is not escaped for the end of a value.
+  if (const std::size_t at = text.find('\0'); at != std::string::npos)
+    throw ConfigError("correct the YAML: " + file.string() + ":" +
+                      std::to_string(1 + std::count(text.data(), text.data() + at, '\n')) + ": a zero byte");
   std::istringstream stream(text);
   YAML::Parser parser(stream);
   Gatekeeper gatekeeper(file);
@@ -240,8 +247,6 @@ std::shared_ptr<YamlMap::Node> YamlMap::Node::child(const YAML::Node& node,
 }
 
 YamlMap YamlMap::from_text(const std::string& text, const std::filesystem::path& file) {
-  if (text.find('\0') != std::string::npos)
-    throw ConfigError("name a text file: " + file.string() + " holds a zero byte");
   auto node = std::make_shared<Node>();
   node->file = file;
   try {

@@ -56,6 +56,8 @@ std::vector<Malformed> malformed_plants() {
                    "ELF\x02\x01\x00\x00",
                    8),
        1, "", "YAML"},
+      {"zero_byte", "plant:\n  name: a" + std::string(1, '\0') + "b\n", 2, "zero byte", "correct the YAML"},
+      {"zero_byte_escaped", "plant:\n  name: \"a\\0b\"\n", 2, "zero byte", "correct the YAML"},
       {"broken_yaml", "plant: {cart_mass_kg: [1,\n", 2, "", "correct the YAML"},
       {"tab_indent", "plant:\n\tcart_mass_kg: 1\n", 2, "", "correct the YAML"},
       {"two_documents", plant + "---\n" + plant, 13, "second", "keep one YAML document"},

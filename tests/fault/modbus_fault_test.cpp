@@ -163,6 +163,8 @@ TEST_P(ModbusFault, HasItsOutcome) {
   for (int attempt = 0; attempt < 3; ++attempt) {
     Setting setting(on.serial, on.what);
     const std::optional<Evidence> evidence = evidence_of(on.what, setting);
+    // A machine that stands still while the run begins cuts a reply in two, and the run is refused.
+    if (attempt < 2 && !evidence) continue;
     ASSERT_TRUE(evidence.has_value()) << "the run does not begin";
     if (attempt < 2 && machine_was_too_busy(*evidence, expectation)) continue;
     judge(*evidence, expectation);

@@ -76,6 +76,8 @@ TEST(YamlReader, BracketsInCommentsAndTextsAreNotNesting) {
 
 TEST(YamlReader, RefusesAZeroByteWhichNoPathCanHold) {
   EXPECT_THROW(YamlMap::from_text(std::string("plant: a\0b.yaml", 15), "bad.yaml"), ConfigError);
+  EXPECT_THROW(YamlMap::from_text("plant: \"a\\0b.yaml\"", "bad.yaml"), ConfigError);
+  EXPECT_THROW(YamlMap::from_text("\"plant\\x00\": a", "bad.yaml"), ConfigError);
 }
 
 }  // namespace
