@@ -269,7 +269,9 @@ INSTANTIATE_TEST_SUITE_P(Cases, BlindEffect,
                                          BlindCase{{"quadratic_drag"}, Size::strong, true, 209},
                                          // Few moments of the training run show it, the held-out ones do.
                                          BlindCase{
-                                             {"position_dependent_friction"}, Size::weak, true, 262000854}),
+                                             {"position_dependent_friction"}, Size::weak, true, 262000854},
+                                         // Only with another part of the run held out it is beyond doubt.
+                                         BlindCase{{"bristle_friction"}, Size::weak, true, 272000840}),
                          name_of_case);
 INSTANTIATE_TEST_SUITE_P(
     Cases, BlindPair,
