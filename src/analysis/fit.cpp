@@ -4,9 +4,11 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <numeric>
 #include <utility>
 
 #include "upright/analysis/parallel.hpp"
@@ -552,6 +554,8 @@ class Fitter {
       : data_(data), free_(free), options_(options), point_(start) {
     for (auto* steps : {&steps_, &former_steps_}) steps->resize(data.segments.size());
     for (auto* normals : {&normals_, &former_normals_}) normals->resize(data.segments.size());
+    order_.resize(data.segments.size());
+    std::iota(order_.begin(), order_.end(), std::size_t{0});
   }
 
   FitResult run() {
@@ -568,12 +572,17 @@ class Fitter {
     }
     for (int round = 0; round < options_.noise_rounds && std::isfinite(objective); ++round) {
       const double before = objective;
+      constexpr double settled = 2.0, no_matter = 0.5;
+      const Noise former = point_.noise;
       // What was estimated before is near.
-      estimate_noise(round == 0 ? std::vector<double>{10.0, 2.0, 1.2, 1.04, 1.01}
-                                : std::vector<double>{1.2, 1.04, 1.01});
+      const double gain = estimate_noise(round == 0 ? std::vector<double>{10.0, 2.0, 1.2, 1.04, 1.01}
+                                                    : std::vector<double>{1.2, 1.04, 1.01});
+      if (round > 0 && converged_ && gain < no_matter) {
+        point_.noise = former;
+        break;
+      }
       objective = evaluate();
       descend(objective);
-      constexpr double settled = 2.0;
       if (round > 0 && before - objective < settled) break;
     }
     result.converged = converged_;
@@ -584,20 +593,37 @@ class Fitter {
  private:
   const Measurement& run_of(std::size_t s) const { return (*data_.runs)[data_.segments[s].run]; }
 
-  void linearise_all() {
-    const EngineOptions engine = engine_options();
-    parallel_for(data_.segments.size(), [&](std::size_t s) {
-      with_jet_size(free_.size(), [&]<int N>() {
-        linearise_segment<N>(run_of(s), data_.segments[s], engine, point_, point_.starts[s], free_, true,
-                             steps_[s], normals_[s]);
-      });
+  void linearise(std::size_t s) {
+    with_jet_size(free_.size(), [&]<int N>() {
+      linearise_segment<N>(run_of(s), data_.segments[s], engine_options(), point_, point_.starts[s], free_,
+                           true, steps_[s], normals_[s]);
     });
   }
 
   /// Linearises at the present point; its objective.
   double evaluate() {
-    linearise_all();
+    parallel_for(order_.size(), [&](std::size_t i) { linearise(order_[i]); });
     return likelihood_of_normals() + prior_objective();
+  }
+
+  /// The same after a step. Infinity where one segment, in which the cart sticks or slides for all the others
+  /// say, is further off than the others can make up for: the rest are not looked at, and it is looked at
+  /// first from then on.
+  double evaluate_step(double promised_fall) {
+    constexpr double out_of_reach = 3.0;
+    const std::size_t none = order_.size();
+    std::atomic<std::size_t> spoiler = none;
+    parallel_for(order_.size(), [&](std::size_t i) {
+      if (spoiler != none) return;
+      const std::size_t s = order_[i];
+      linearise(s);
+      const double rise = normals_[s].likelihood.objective() - former_normals_[s].likelihood.objective();
+      if (!(rise < out_of_reach * promised_fall)) spoiler = i;
+    });
+    if (spoiler == none) return likelihood_of_normals() + prior_objective();
+    const auto place = order_.begin() + static_cast<std::ptrdiff_t>(spoiler.load());
+    std::rotate(order_.begin(), place, std::next(place));
+    return infinity;
   }
 
   double likelihood_of_normals() const {
@@ -633,7 +659,7 @@ class Fitter {
         if (promises && next.promised_fall < alike * rejected) {
           point_ = std::move(next.point);
           swap_with_former();
-          next_objective = evaluate();
+          next_objective = evaluate_step(std::max(next.promised_fall, least_fall));
           if (next_objective < objective) break;
           point_ = former;
           swap_with_former();
@@ -818,48 +844,67 @@ class Fitter {
     return sum;
   }
 
-  /// Maximum likelihood of the noise by a pattern search over decades, finer and finer.
-  void estimate_noise(const std::vector<double>& factors) {
-    Noise best = point_.noise;
-    double least = noise_objective(best);
+  /// One number of the noise, of which the likelihood's maximum is sought.
+  struct Knob {
+    double Noise::*value;
+    double smallest, largest;  ///< below the smallest it is `least`
+    double least;
+    bool used;
+    int tried_at = -1;  ///< after so many changes of the noise neither way was better
+    bool off = false;   ///< nothing, and better so: the step from there is the same whatever the factor
+
+    double moved(double now, double move) const {
+      const double to = now == 0.0 ? (move > 1.0 ? smallest * 10.0 : 0.0) : now * move;
+      return to < smallest ? least : std::min(to, largest);
+    }
+  };
+
+  /// Turns a knob one way for as long as the objective falls. How often it did.
+  int turn(Knob& knob, double move, Noise& best, double& objective) const {
+    constexpr double falls = 1e-3;
+    for (int turns = 0;; ++turns) {
+      Noise next = best;
+      const double now = best.*knob.value;
+      next.*knob.value = knob.moved(now, move);
+      if (next.*knob.value == now) return turns;
+      const double reached = noise_objective(next);
+      if (!(reached < objective - falls)) {
+        knob.off = now == 0.0;
+        return turns;
+      }
+      objective = reached;
+      best = next;
+    }
+  }
+
+  /// Maximum likelihood of the noise by a pattern search over decades, finer and finer. By how much it brings
+  /// the objective down.
+  double estimate_noise(const std::vector<double>& factors) {
     bool cart = false, pendulum = false;
     for (const Measurement& run : *data_.runs) {
       cart = cart || run.has_cart();
       pendulum = pendulum || (run.has_theta() && point_.plant.pendulum);
     }
-    struct Knob {
-      double Noise::*value;
-      double smallest, largest;
-      bool used;
-    };
-    const std::array<Knob, 4> knobs = {
-        Knob{&Noise::force, 1e-5, 10.0, cart}, Knob{&Noise::torque, 1e-7, 1.0, pendulum},
-        Knob{&Noise::jitter_s, 1e-6, 1e-2, true}, Knob{&Noise::sensors, 1.0, 1e3, true}};
+    std::array<Knob, 4> knobs = {
+        Knob{&Noise::force, 1e-5, 10.0, 0.0, cart}, Knob{&Noise::torque, 1e-7, 1.0, 0.0, pendulum},
+        Knob{&Noise::jitter_s, 1e-6, 1e-2, 0.0, true}, Knob{&Noise::sensors, 1.0, 1e3, 1.0, true}};
+    const double before = noise_objective(point_.noise);
+    double objective = before;
+    int changes = 0;
     for (const double factor : factors) {
-      bool better = true;
-      for (int sweep = 0; sweep < 3 && better; ++sweep) {
-        better = false;
-        for (const Knob& knob : knobs) {
-          if (!knob.used) continue;
-          for (const double move : {factor, 1.0 / factor}) {
-            for (;;) {
-              Noise next = best;
-              const double now = best.*knob.value;
-              const double moved = now == 0.0 ? (move > 1.0 ? knob.smallest * 10.0 : 0.0) : now * move;
-              const double least_value = knob.value == &Noise::sensors ? knob.smallest : 0.0;
-              next.*knob.value = moved < knob.smallest ? least_value : std::min(moved, knob.largest);
-              if (next.*knob.value == now) break;
-              const double objective = noise_objective(next);
-              if (!(objective < least - 1e-3)) break;
-              least = objective;
-              best = next;
-              better = true;
-            }
-          }
+      for (Knob& knob : knobs) knob.tried_at = -1;
+      int so_far = -1;
+      for (int sweep = 0; sweep < 3 && changes != so_far; ++sweep) {
+        so_far = changes;
+        for (Knob& knob : knobs) {
+          if (!knob.used || knob.off || knob.tried_at == changes) continue;
+          int turns = turn(knob, factor, point_.noise, objective);
+          if (turns == 0) turns = turn(knob, 1.0 / factor, point_.noise, objective);
+          knob.tried_at = changes += turns;
         }
       }
     }
-    point_.noise = best;
+    return before - objective;
   }
 
   /// The information without what stands at a bound: that is not estimated but held there, and lends the
@@ -915,6 +960,7 @@ class Fitter {
   FitPoint point_;
   std::vector<std::vector<LinearStep>> steps_, former_steps_;
   std::vector<Normal> normals_, former_normals_;
+  std::vector<std::size_t> order_;  ///< in which segments are looked at; no result depends on it
   bool converged_ = false;
 };
 

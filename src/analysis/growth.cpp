@@ -72,8 +72,10 @@ bool Growth::find_thoroughly(bool certainly_missing) {
   const std::vector<std::size_t> before = found_;
   const double objective = current_.train.objective;
   grow(most_rounds, 2 * most_rounds, true);
-  // What certainly is missing shows on a part of the data too.
-  if (!certainly_missing && search_.sieve_share() < 1.0) {
+  // What certainly is missing shows on a part of many data too.
+  constexpr double few = 0.5;
+  const double share = search_.sieve_share();
+  if (share < 1.0 && !(certainly_missing && share < few)) {
     search_.sieve_all();
     grow(2 * most_rounds, 3 * most_rounds, false);
   }

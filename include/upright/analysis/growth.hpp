@@ -29,7 +29,8 @@ class Growth {
   /// What is left is more than noise: pairs of all that resembled the best effect. Whether the model changed.
   bool find_pairs_of_all();
   /// What is left is more than the sensors' noise: as the data show with little noise beyond it, and, unless
-  /// something is `certainly_missing`, as all of the training data show. Whether the model changed.
+  /// something is `certainly_missing` of many data, as all of the training data show. Whether the model
+  /// changed.
   bool find_thoroughly(bool certainly_missing);
 
   const Hypothesis& given() const { return given_; }
