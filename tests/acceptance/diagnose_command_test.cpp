@@ -27,27 +27,31 @@ class Diagnose : public ::testing::Test {
   }
   void TearDown() override { fs::remove_all(folder_); }
   std::string in_folder(const std::string& name) const { return (folder_ / name).string(); }
+  /// Records the runs of the README's demonstration; the command that diagnoses them.
+  std::string diagnose_recorded() const {
+    struct Run {
+      const char *gains, *theta0_deg, *delay_s;
+    };
+    const Run runs[] = {{"viscous", "6", "0"}, {"exponential", "5", "0.018"}, {"exponential", "6", "0.021"}};
+    for (const Run& run : runs) {
+      const CommandResult result =
+          run_upright("run --rig " + source + "/config/rigs/simulated.yaml --gains " + source +
+                      "/config/gains/" + run.gains + ".yaml --fast --theta0-deg " + run.theta0_deg +
+                      " --delay " + run.delay_s + " --duration 6 --out " + in_folder("runs"));
+      EXPECT_EQ(result.exit_code, 0) << result.err;
+    }
+    std::set<std::string> recorded;
+    for (const auto& entry : fs::directory_iterator(folder_ / "runs")) recorded.insert(entry.path().string());
+    std::string command = "diagnose --model " + source + "/config/plants/viscous.yaml --data";
+    for (const std::string& run : recorded) command.append(" ").append(run);
+    return command;
+  }
   fs::path folder_;
 };
 
 TEST_F(Diagnose, NamesCoulombAndStribeckInThePapersOwnCase) {
-  struct Run {
-    const char *gains, *theta0_deg, *delay_s;
-  };
-  const Run runs[] = {{"viscous", "6", "0"}, {"exponential", "5", "0.018"}, {"exponential", "6", "0.021"}};
-  for (const Run& run : runs) {
-    const CommandResult result =
-        run_upright("run --rig " + source + "/config/rigs/simulated.yaml --gains " + source +
-                    "/config/gains/" + run.gains + ".yaml --fast --theta0-deg " + run.theta0_deg +
-                    " --delay " + run.delay_s + " --duration 6 --out " + in_folder("runs"));
-    ASSERT_EQ(result.exit_code, 0) << result.err;
-  }
-  std::string data;
-  for (const auto& entry : fs::directory_iterator(folder_ / "runs"))
-    data.append(" ").append(entry.path().string());
-  const CommandResult result =
-      run_upright("diagnose --model " + source + "/config/plants/viscous.yaml --data" + data + " --out " +
-                  in_folder("out") + " --json");
+  const std::string command = diagnose_recorded();
+  const CommandResult result = run_upright(command + " --out " + in_folder("out") + " --json");
   ASSERT_EQ(result.exit_code, 0) << result.err;
   const Json d = Json::parse(result.out);
   EXPECT_EQ(d, Json::parse(std::ifstream(folder_ / "out" / "diagnosis.json")));
@@ -65,10 +69,20 @@ TEST_F(Diagnose, NamesCoulombAndStribeckInThePapersOwnCase) {
   // The simulated traces, and the plant file's new line.
   EXPECT_NE(page.str().find("Measured and simulated"), std::string::npos);
   EXPECT_NE(page.str().find("+     - {kind: coulomb_friction"), std::string::npos);
-  EXPECT_EQ(run_upright("diagnose --model " + source + "/config/plants/viscous.yaml --data" + data +
-                        " --out " + in_folder("out"))
-                .exit_code,
-            2);
+  EXPECT_EQ(run_upright(command + " --out " + in_folder("out")).exit_code, 2) << "never written over";
+}
+
+TEST_F(Diagnose, SaysTheSameHoweverManyCoresThereAre) {
+  const std::string command = diagnose_recorded() + " --json --out ";
+  std::set<std::string> said;
+  for (const char* threads : {"1", "3"}) {
+    setenv("UPRIGHT_THREADS", threads, 1);
+    const CommandResult result = run_upright(command + in_folder(std::string("on_") + threads));
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    said.insert(result.out);
+  }
+  unsetenv("UPRIGHT_THREADS");
+  EXPECT_EQ(said.size(), 1u) << ::testing::PrintToString(said);
 }
 
 TEST_F(Diagnose, RefusesDataThatSayNothing) {
