@@ -851,7 +851,7 @@ class Fitter {
     double least;
     bool used;
     int tried_at = -1;  ///< after so many changes of the noise neither way was better
-    bool off = false;   ///< nothing, and better so: the step from there is the same whatever the factor
+    bool off = false;   ///< nothing, and better so then: the step from there is the same whatever the factor
 
     double moved(double now, double move) const {
       const double to = now == 0.0 ? (move > 1.0 ? smallest * 10.0 : 0.0) : now * move;
@@ -892,12 +892,13 @@ class Fitter {
     double objective = before;
     int changes = 0;
     for (const double factor : factors) {
-      for (Knob& knob : knobs) knob.tried_at = -1;
+      for (Knob& knob : knobs)
+        if (!knob.off) knob.tried_at = -1;
       int so_far = -1;
       for (int sweep = 0; sweep < 3 && changes != so_far; ++sweep) {
         so_far = changes;
         for (Knob& knob : knobs) {
-          if (!knob.used || knob.off || knob.tried_at == changes) continue;
+          if (!knob.used || knob.tried_at == changes) continue;
           int turns = turn(knob, factor, point_.noise, objective);
           if (turns == 0) turns = turn(knob, 1.0 / factor, point_.noise, objective);
           knob.tried_at = changes += turns;
