@@ -55,5 +55,32 @@ TEST(Fit, BeginsAfterAGapWhenTheLagOfTheMotorHasForgottenWhatWasCommandedThere) 
   }
 }
 
+TEST(Fit, FindsTheMostLikelyNoise) {
+  Plant plant;
+  plant.cart_mass_kg = 1.0;
+  plant.motor = {1.5, 6.6};
+  plant.set("viscous_friction", {2.8});
+  plant.set("coulomb_friction", {0.3});
+  for (const std::uint64_t seed : {1, 2, 3}) {
+    blind::Rig rig{.plant = plant, .disturbance_n = 0.03, .jitter_s = 3e-4};
+    blind::Plan plan;
+    plan.experiment = blind::Experiment::multisine;
+    plan.seed = seed;
+    const std::vector<Measurement> runs = {measure(rig, plan, "run")};
+    const FitData data{&runs, cut_segments(runs)};
+    const FitResult found = fit(data, {plant, guess_starts(runs, data.segments, plant), {.force = 0.1}}, {});
+    FitOptions noise_held;
+    noise_held.noise_rounds = 0;
+    for (double Noise::*number : {&Noise::force, &Noise::sensors, &Noise::jitter_s})
+      for (const double factor : {0.8, 1.25}) {
+        FitPoint beside = found.point;
+        beside.noise.*number *= factor;
+        beside.noise.sensors = std::max(beside.noise.sensors, 1.0);
+        EXPECT_GT(fit(data, beside, {}, noise_held).objective, found.objective - 1.0) << seed;
+      }
+    EXPECT_NEAR(found.point.noise.jitter_s, rig.jitter_s, 0.25 * rig.jitter_s) << seed;
+  }
+}
+
 }  // namespace
 }  // namespace upright
