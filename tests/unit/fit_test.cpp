@@ -8,11 +8,16 @@
 namespace upright {
 namespace {
 
+Plant cart_alone() {
+  Plant plant;
+  plant.cart_mass_kg = 1.0;
+  plant.motor = {1.5, 6.6};
+  plant.set("viscous_friction", {2.8});
+  return plant;
+}
+
 TEST(Fit, TakesSlidingWhereTheModelRestsForAForceAndNotForSensorNoise) {
-  Plant believed;
-  believed.cart_mass_kg = 1.0;
-  believed.motor = {1.5, 6.6};
-  believed.set("viscous_friction", {2.8});
+  Plant believed = cart_alone();
   believed.set("coulomb_friction", {0.41});
   blind::Rig rig{.plant = believed};
   rig.plant.set("constant_force", {0.55});
@@ -34,10 +39,7 @@ TEST(Fit, TakesSlidingWhereTheModelRestsForAForceAndNotForSensorNoise) {
 }
 
 TEST(Fit, BeginsAfterAGapWhenTheLagOfTheMotorHasForgottenWhatWasCommandedThere) {
-  Plant plant;
-  plant.cart_mass_kg = 1.0;
-  plant.motor = {1.5, 6.6};
-  plant.set("viscous_friction", {2.8});
+  Plant plant = cart_alone();
   plant.set("motor_lag", {0.036});
   const blind::Rig rig{.plant = plant};
   for (const double gap_s : {0.05, 0.15, 0.4}) {
@@ -56,10 +58,7 @@ TEST(Fit, BeginsAfterAGapWhenTheLagOfTheMotorHasForgottenWhatWasCommandedThere) 
 }
 
 TEST(Fit, FindsTheMostLikelyNoise) {
-  Plant plant;
-  plant.cart_mass_kg = 1.0;
-  plant.motor = {1.5, 6.6};
-  plant.set("viscous_friction", {2.8});
+  Plant plant = cart_alone();
   plant.set("coulomb_friction", {0.3});
   for (const std::uint64_t seed : {1, 2, 3}) {
     blind::Rig rig{.plant = plant, .disturbance_n = 0.03, .jitter_s = 3e-4};
