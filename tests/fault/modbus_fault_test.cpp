@@ -142,7 +142,7 @@ class Setting {
 std::optional<Evidence> evidence_of(const Case& c, Setting& setting) {
   const ProcessFiles files = setting.files(c.process.duration_s);
   const std::optional<double> done_s = run_with(c.process, files);
-  if (!done_s) return std::nullopt;
+  if (!done_s || !std::filesystem::exists(setting.runs())) return std::nullopt;
   sleep_s(watchdog_s);
   setting.server().end();
   const std::vector<TraceRow> trace = setting.server().trace();
