@@ -49,10 +49,8 @@ class Diagnostician {
   }
   /// Whether an effect was found that the plant file lacks, not only numbers of it that are off.
   bool found_what_was_lacking() const {
-    const std::vector<std::size_t>& known = search_.nuisances();
-    return std::any_of(growth_.found().begin(), growth_.found().end(), [&](std::size_t effect) {
-      return std::find(known.begin(), known.end(), effect) == known.end();
-    });
+    return std::any_of(growth_.found().begin(), growth_.found().end(),
+                       [&](std::size_t effect) { return !search_.is_nuisance(effect); });
   }
   /// Of what is unexplained: whether held-out runs excite what is missing still, and the others do not. They
   /// alone show it, or spoke to the end against what the others show beyond doubt.

@@ -860,11 +860,11 @@ class Fitter {
   };
 
   /// Turns a knob one way for as long as the objective falls. How often it did.
-  int turn(Knob& knob, double move, Noise& best, double& objective) const {
+  int turn(Knob& knob, double move, double& objective) {
     constexpr double falls = 1e-3;
     for (int turns = 0;; ++turns) {
-      Noise next = best;
-      const double now = best.*knob.value;
+      Noise next = point_.noise;
+      const double now = next.*knob.value;
       next.*knob.value = knob.moved(now, move);
       if (next.*knob.value == now) return turns;
       const double reached = noise_objective(next);
@@ -873,7 +873,7 @@ class Fitter {
         return turns;
       }
       objective = reached;
-      best = next;
+      point_.noise = next;
     }
   }
 
@@ -899,8 +899,8 @@ class Fitter {
         so_far = changes;
         for (Knob& knob : knobs) {
           if (!knob.used || knob.tried_at == changes) continue;
-          int turns = turn(knob, factor, point_.noise, objective);
-          if (turns == 0) turns = turn(knob, 1.0 / factor, point_.noise, objective);
+          int turns = turn(knob, factor, objective);
+          if (turns == 0) turns = turn(knob, 1.0 / factor, objective);
           knob.tried_at = changes += turns;
         }
       }

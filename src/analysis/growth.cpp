@@ -442,10 +442,7 @@ std::vector<Growth::Simpler> Growth::simpler_forms() const {
   const std::size_t one_way = effect_number("friction_asymmetry"), spring = effect_number("cable_spring");
   const std::size_t level = effect_number("coulomb_friction"), force = effect_number("constant_force");
   const Plant& plant = current_.train.point.plant;
-  const auto is_new = [&](std::size_t effect) {
-    const std::vector<std::size_t>& known = search_.nuisances();
-    return is_found(effect) && std::find(known.begin(), known.end(), effect) == known.end();
-  };
+  const auto is_new = [&](std::size_t effect) { return is_found(effect) && !search_.is_nuisance(effect); };
   std::vector<Simpler> forms;
   if (plant.find(force) != nullptr) return forms;
   if (is_new(one_way) && plant.find(level) == nullptr) {

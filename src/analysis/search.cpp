@@ -128,6 +128,10 @@ Search::Search(const Plant& plant, const std::vector<Measurement>& runs, const F
   held_starts_ = guess_starts(runs, held.segments, plant_);
 }
 
+bool Search::is_nuisance(std::size_t effect) const {
+  return std::find(nuisances_.begin(), nuisances_.end(), effect) != nuisances_.end();
+}
+
 void Search::sieve_every(std::size_t stride) {
   sieve_ = {train_.runs, {}};
   sieve_places_.clear();
@@ -459,7 +463,7 @@ Hypothesis Search::only(const std::vector<std::size_t>& effects, const Hypothesi
   };
   for (const std::size_t effect : effects) {
     // What stands in the plant file is believed, if less firmly, even where the data correct it.
-    const bool correction = std::find(nuisances_.begin(), nuisances_.end(), effect) != nuisances_.end();
+    const bool correction = is_nuisance(effect);
     constexpr double less_firmly = 4.0;
     std::vector<FreeParameter> parameters =
         correction ? believed_parameters(given_, effect, range_) : free_parameters(effect, range_);

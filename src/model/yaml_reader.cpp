@@ -58,6 +58,11 @@ std::optional<double> parse_number(const std::string& text) {
   return value;
 }
 
+[[noreturn]] void refuse_at(const std::filesystem::path& file, std::ptrdiff_t line, const std::string& remedy,
+                            const std::string& problem) {
+  throw ConfigError(remedy + ": " + file.string() + ":" + std::to_string(line) + ": " + problem);
+}
+
 /// Walks a file's events before any node is built and refuses what yaml-cpp cannot be trusted with: nesting
 /// that would exhaust the stack, a second document (on some broken text yaml-cpp 0.7 finds empty documents
 /// for ever), and a zero byte, with which no name or path would be read again as it was written.
@@ -95,8 +100,7 @@ class Gatekeeper : public YAML::EventHandler {
   }
   [[noreturn]] void refuse(const YAML::Mark& mark, const std::string& remedy,
                            const std::string& problem) const {
-    throw ConfigError(remedy + ": " + file_.string() + ":" + std::to_string(std::max(mark.line, 0) + 1) +
-                      ": " + problem);
+    refuse_at(file_, std::max(mark.line, 0) + 1, remedy, problem);
   }
 
   std::filesystem::path file_;
@@ -107,8 +111,7 @@ class Gatekeeper : public YAML::EventHandler {
 void refuse_what_cannot_be_built(const std::string& text, const std::filesystem::path& file) {
   // yaml-cpp takes a zero byte that is not escaped for the end of a value.
   if (const std::size_t at = text.find('\0'); at != std::string::npos)
-    throw ConfigError("correct the YAML: " + file.string() + ":" +
-                      std::to_string(1 + std::count(text.data(), text.data() + at, '\n')) + ": a zero byte");
+    refuse_at(file, 1 + std::count(text.data(), text.data() + at, '\n'), "correct the YAML", "a zero byte");
   std::istringstream stream(text);
   YAML::Parser parser(stream);
   Gatekeeper gatekeeper(file);
@@ -173,8 +176,7 @@ struct YamlMap::Node {
   [[noreturn]] void fail(const YAML::Node& at, const std::string& key, const std::string& problem,
                          const std::string& remedy) const {
     const int line = std::max(mark_of(at, key).line, 0) + 1;
-    throw ConfigError(remedy + ": " + file.string() + ":" + std::to_string(line) + ": " + full_key(key) +
-                      " " + problem);
+    refuse_at(file, line, remedy, full_key(key) + " " + problem);
   }
 
   /// The node of a key, not defined when it is missing. Never inserts.
@@ -253,8 +255,7 @@ YamlMap YamlMap::from_text(const std::string& text, const std::filesystem::path&
     refuse_what_cannot_be_built(text, file);
     node->yaml.reset(YAML::Load(text));
   } catch (const YAML::Exception& problem) {
-    throw ConfigError("correct the YAML: " + file.string() + ":" +
-                      std::to_string(std::max(problem.mark.line, 0) + 1) + ": " + shown(problem.msg));
+    refuse_at(file, std::max(problem.mark.line, 0) + 1, "correct the YAML", shown(problem.msg));
   }
   if (!node->yaml.IsMap())
     throw ConfigError("write 'key: value' lines: " + file.string() + ":1: the top level is not a map");

@@ -55,7 +55,10 @@ class Search {
   Search(const Plant& plant, const std::vector<Measurement>& runs, const FitData& train, const FitData& held);
 
   const DataRange& range() const { return range_; }
+  /// The plant file's own effects and the corrections of its numbers: in every hypothesis, within what is
+  /// believed of them.
   const std::vector<std::size_t>& nuisances() const { return nuisances_; }
+  bool is_nuisance(std::size_t effect) const;
   const FitData& train_data() const { return train_; }
   const FitData& held_data() const { return held_; }
 
