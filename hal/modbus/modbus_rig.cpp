@@ -103,12 +103,15 @@ void ModbusTransport::open() {
   must(fault, reading_it);
   const ModbusRig& modbus = *rig_.modbus;
   const auto retried = [&](auto exchange, const std::string& doing) {
+    const std::int64_t end_ns = now_ns() + static_cast<std::int64_t>(1e9 * open_patience_s);
+    int refusals = 0;
     RigFault last = RigFault::link_lost;
-    for (int attempt = 0; attempt < 5 && last != RigFault::none; ++attempt) {
+    do {
       if (!link_.connected()) link_.connect(open_patience_s);
       if (!link_.in_step()) link_.resynchronise(0.0);
       last = exchange();
-    }
+      if (last == RigFault::device_refused && ++refusals == replies_until_certain) break;
+    } while (last != RigFault::none && now_ns() < end_ns);
     must(last, doing);
   };
   if (writes_) retried([&] { return link_.write_voltage(0.0); }, "writing zero volts");

@@ -29,7 +29,7 @@ class Device {
   }
   ~Device() {
     ending_ = true;
-    hangs_up_ = true;
+    hang_up();
     ::shutdown(listener_, SHUT_RDWR);
     thread_.join();
     ::close(listener_);
@@ -49,8 +49,11 @@ class Device {
   void misread_watchdog(int times) { wrong_ = times; }
   /// So many requests for the counters are answered with an exception.
   void refuse(int times) { refusals_ = times; }
-  /// With the next request.
-  void hang_up() { hangs_up_ = true; }
+  /// With so many requests, after so many others.
+  void hang_up(int times = 1, int after = 0) {
+    answers_ = after;
+    hang_ups_ = times;
+  }
 
  private:
   static constexpr int most_registers = 40;
@@ -60,10 +63,16 @@ class Device {
       int listener = listener_;
       if (modbus_tcp_accept(context_, &listener) < 0) continue;
       std::uint8_t request[MODBUS_TCP_MAX_ADU_LENGTH];
-      for (int size = 0; (size = modbus_receive(context_, request)) >= 0 && !hangs_up_.exchange(false);)
+      for (int size = 0; (size = modbus_receive(context_, request)) >= 0 && !hangs_up();)
         answer(request, size);
       modbus_close(context_);
     }
+  }
+
+  bool hangs_up() {
+    if (hang_ups_ == 0 || answers_-- > 0) return false;
+    --hang_ups_;
+    return true;
   }
 
   void answer(const std::uint8_t* request, int size) {
@@ -84,7 +93,8 @@ class Device {
   modbus_t* context_;
   modbus_mapping_t* registers_;
   int listener_ = -1;
-  std::atomic<bool> ending_{false}, hangs_up_{false};
+  std::atomic<bool> ending_{false};
+  std::atomic<int> hang_ups_{0}, answers_{0};
   std::atomic<int> wrong_{0}, refusals_{0};
   std::thread thread_;
 };
@@ -116,6 +126,14 @@ class ModbusMisread : public testing::Test {
   Folder folder;
   std::unique_ptr<Rig> rig;
 };
+
+TEST_F(ModbusMisread, ADeviceThatHangsUpForAWhileIsOpenedAllTheSame) {
+  for (const int answered_before : {1, 2, 3, 4}) {
+    device.hang_up(10, answered_before);
+    EXPECT_NO_THROW(rig->open()) << answered_before;
+    EXPECT_EQ(fresh_reading(*rig).fault, RigFault::none);
+  }
+}
 
 TEST_F(ModbusMisread, AWrongBitIsNoRestart) {
   device.misread_watchdog(2);
