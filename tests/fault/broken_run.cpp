@@ -6,12 +6,14 @@
 #include "broken_compensator.hpp"
 #include "upright/control/gain_file.hpp"
 #include "upright/hal/rig_factory.hpp"
+#include "upright/model/error.hpp"
 #include "upright/runtime/session.hpp"
 
 namespace upright::test {
 
-BrokenRun broken_run(const std::filesystem::path& rig_file, const std::filesystem::path& gain_file,
-                     const std::filesystem::path& runs) {
+std::optional<BrokenRun> broken_run(const std::filesystem::path& rig_file,
+                                    const std::filesystem::path& gain_file,
+                                    const std::filesystem::path& runs) {
   constexpr int bad_cycle = 100;
   RunSetup setup;
   setup.command = "broken_run";
@@ -25,13 +27,18 @@ BrokenRun broken_run(const std::filesystem::path& rig_file, const std::filesyste
   MonotonicClock clock;
   const SignalFlag signal{0};
   const std::unique_ptr<Rig> rig = make_rig(setup.rig, {period_s});
-  rig->open();
+  try {
+    rig->open();
+  } catch (const DeviceError&) {
+    return std::nullopt;
+  }
   SessionOptions options;
   options.out = runs;
   std::atomic<double> began_s{0.0};
   options.compensator = std::make_unique<BrokenCompensator>(bad_cycle, began_s);
   const SessionResult result = run_session(setup, *rig, clock, signal, std::move(options));
-  return {result.directory, began_s};
+  if (began_s == 0.0) return std::nullopt;
+  return BrokenRun{result.directory, began_s};
 }
 
 }  // namespace upright::test

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 
 namespace upright::test {
 
@@ -10,7 +11,9 @@ struct BrokenRun {
   double began_s = 0.0;  ///< when the value was computed, on the monotonic clock
 };
 
-BrokenRun broken_run(const std::filesystem::path& rig_file, const std::filesystem::path& gain_file,
-                     const std::filesystem::path& runs);
+/// None: the rig does not open, or the run ends before that value.
+std::optional<BrokenRun> broken_run(const std::filesystem::path& rig_file,
+                                    const std::filesystem::path& gain_file,
+                                    const std::filesystem::path& runs);
 
 }  // namespace upright::test

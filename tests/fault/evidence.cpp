@@ -32,6 +32,12 @@ bool is_late(const Evidence& evidence, const Expectation& expectation) {
   return last_voltage_s(evidence) - evidence.fault_s >= expectation.zero_within_s + busy_machine_s;
 }
 
+bool machine_was_too_busy(const Evidence& evidence, const Expectation& expectation) {
+  const std::string reason = reason_of(evidence);
+  if (is_right(reason, expectation)) return reason != "duration" && is_late(evidence, expectation);
+  return reason == "overrun" || reason == "stale_encoder" || reason == "link_lost";
+}
+
 void judge_plant(const Evidence& evidence, const Expectation& expectation, const std::string& reason) {
   ASSERT_FALSE(evidence.plant.empty());
   double farthest_m = 0.0;
@@ -79,10 +85,10 @@ std::string reason_of(const Evidence& evidence) {
   return run.outcome ? run.outcome->text("reason") : "";
 }
 
-bool machine_was_too_busy(const Evidence& evidence, const Expectation& expectation) {
-  const std::string reason = reason_of(evidence);
-  if (is_right(reason, expectation)) return reason != "duration" && is_late(evidence, expectation);
-  return reason == "overrun" || reason == "stale_encoder" || reason == "link_lost";
+std::optional<Evidence> undisturbed(const std::function<std::optional<Evidence>()>& attempt,
+                                    const Expectation& expectation) {
+  return tried(attempt,
+               [&](const Evidence& evidence) { return !machine_was_too_busy(evidence, expectation); });
 }
 
 void judge(const Evidence& evidence, const Expectation& expectation) {

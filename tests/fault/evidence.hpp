@@ -2,6 +2,8 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -28,9 +30,28 @@ struct Evidence {
 /// The reason in run.yaml.
 std::string reason_of(const Evidence& evidence);
 
-/// True when the run ended too late, or in a way that is not expected but that a machine too busy for it
-/// brings about: worth another attempt.
-bool machine_was_too_busy(const Evidence& evidence, const Expectation& expectation);
+/// What attempts come to that give nothing: each run was over before it was put to the test.
+inline constexpr const char* never_came_about =
+    "the run does not begin, or ends before its fault comes about";
+
+/// The first result that `is_good`, on a machine that may be too busy for it, or the last of several
+/// attempts.
+template <class Attempt, class IsGood>
+auto tried(const Attempt& attempt, const IsGood& is_good) {
+  constexpr int more_attempts = 4;
+  auto result = attempt();
+  for (int i = 0; i < more_attempts && !(result && is_good(*result)); ++i) result = attempt();
+  return result;
+}
+template <class Attempt>
+auto tried(const Attempt& attempt) {
+  return tried(attempt, [](const auto&) { return true; });
+}
+
+/// What the first attempt leaves that ends neither too late nor in a way that is not expected but that a
+/// machine too busy for it brings about, or the last; none: no fault came about.
+std::optional<Evidence> undisturbed(const std::function<std::optional<Evidence>()>& attempt,
+                                    const Expectation& expectation);
 
 /// The motor was on; the run ended as expected; zero volts in time and for good; the cart stayed on the
 /// track; the log is whole and replays.

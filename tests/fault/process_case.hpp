@@ -23,7 +23,8 @@ struct Running {
   std::filesystem::path rig_file;
 };
 
-using Action = std::function<void(const Running&)>;
+/// False: it could not be done, for the run was over before.
+using Action = std::function<bool(const Running&)>;
 
 /// When a fault begins.
 enum class Begins { when_injected, when_done, when_the_shim_strikes, when_the_log_ends, at_the_start };
@@ -56,10 +57,11 @@ struct ProcessFiles {
   std::filesystem::path rig_file, runs, mark;
 };
 
-/// Runs `c` to its end. When its action was begun, 0 without one; none: the run does not begin.
+/// Runs `c` to its end. When its action was begun, 0 without one; none: the run does not begin, or ends
+/// before its fault comes about.
 std::optional<double> run_with(const ProcessCase& c, const ProcessFiles& files);
 
-/// Kills a run that balances. When, on the monotonic clock; none: the run does not begin.
+/// Kills a run that balances. When, on the monotonic clock; none: the run does not begin, or ends before.
 std::optional<double> kill_run(const ProcessFiles& files);
 
 /// When the fault began, on the monotonic clock; `injected_s` is when the rig brings it about by itself.

@@ -140,10 +140,13 @@ ProcessCase process_of(const Case& c, PlantOnWires& plant) {
     process.action = [&plant](const Running& run) {
       kill(run.controller, SIGSTOP);
       plant.suffer(Mishap::edges_burst);
-      kill(run.controller, SIGCONT);
+      return kill(run.controller, SIGCONT) == 0;
     };
   else if (c.mishap != Mishap::none)
-    process.action = [&plant, what = c.mishap](const Running&) { plant.suffer(what); };
+    process.action = [&plant, what = c.mishap](const Running&) {
+      plant.suffer(what);
+      return true;
+    };
   return process;
 }
 
@@ -168,7 +171,7 @@ TEST_P(KernelFault, HasItsOutcome) {
   const On& on = GetParam();
   Setting setting(on);
   const std::optional<Evidence> evidence = evidence_of(on.what, setting);
-  ASSERT_TRUE(evidence.has_value()) << "the run does not begin";
+  ASSERT_TRUE(evidence.has_value()) << never_came_about;
   judge(*evidence, on.what.process.expectation);
   EXPECT_TRUE(setting.wires().at_rest());
   const std::string sentence = read_run(evidence->run).outcome->text("sentence");
@@ -197,10 +200,11 @@ class KernelBroken : public testing::TestWithParam<Bench> {};
 TEST_P(KernelBroken, StopsWhenAValueIsNotANumber) {
   Setting setting({GetParam(), {}});
   const GuestRun& files = setting.files();
-  const BrokenRun run = broken_run(files.rig_file(), files.gain_file(), files.runs());
+  const std::optional<BrokenRun> run = broken_run(files.rig_file(), files.gain_file(), files.runs());
+  ASSERT_TRUE(run.has_value()) << never_came_about;
   sleep_s(watchdog_s);
   const Expectation expectation = stops({"not_finite"}, period_s);
-  judge({plant_rows(setting.plant().record()), run.began_s, run.directory, false, false}, expectation);
+  judge({plant_rows(setting.plant().record()), run->began_s, run->directory, false, false}, expectation);
   EXPECT_TRUE(setting.wires().at_rest());
   if (!HasFailure()) record("nan", GetParam(), cell_of(expectation));
 }
@@ -211,7 +215,7 @@ INSTANTIATE_TEST_SUITE_P(, KernelBroken, testing::Values(Bench::gpio, Bench::com
 TEST(KernelKilled, TheHeartStopsAndItsWatchdogTakesTheVoltageAway) {
   Setting setting({Bench::gpio, {}});
   const std::optional<double> killed_s = kill_run(setting.files().files(60.0));
-  ASSERT_TRUE(killed_s.has_value()) << "the run does not begin";
+  ASSERT_TRUE(killed_s.has_value()) << never_came_about;
   sleep_s(3 * heart_s);
   const double on_until_s = last_voltage_s(setting.plant().record());
   EXPECT_GT(on_until_s, *killed_s - period_s) << "it was still balancing";
@@ -223,7 +227,7 @@ TEST(KernelKilled, TheHeartStopsAndItsWatchdogTakesTheVoltageAway) {
 /// What the documentation says: a card has no watchdog of its own.
 TEST(KernelKilled, ACardKeepsItsVoltageUntilTheNextStart) {
   Setting setting({Bench::comedi, {}});
-  ASSERT_TRUE(kill_run(setting.files().files(60.0)).has_value()) << "the run does not begin";
+  ASSERT_TRUE(kill_run(setting.files().files(60.0)).has_value()) << never_came_about;
   EXPECT_FALSE(setting.wires().at_rest());
   sleep_s(3 * watchdog_s);
   EXPECT_FALSE(setting.wires().at_rest());
