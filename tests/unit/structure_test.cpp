@@ -42,5 +42,21 @@ TEST(Structure, TellsOnWhichSideOfTheEncoderADriveGivesWay) {
   EXPECT_NE(far.find("between the motor and the encoder"), std::string::npos) << far;
 }
 
+/// Beyond the sensors' noise, by so much that a verdict is due.
+bool is_more_than_noise(double kurtosis, double slow_force) {
+  ResidualStructure left;
+  left.noise_ratio = 10.0;
+  left.tails = {kurtosis, 2.0};
+  left.slow_force = slow_force;
+  judge_structure(left);
+  return left.structured;
+}
+
+TEST(Structure, TakesForcesThatLastAndComeInBurstsForMoreThanNoise) {
+  EXPECT_FALSE(is_more_than_noise(3.0, 1.8)) << "a steady disturbance";
+  EXPECT_FALSE(is_more_than_noise(7.0, 1.0)) << "a sensor that errs now and then";
+  EXPECT_TRUE(is_more_than_noise(6.0, 1.8));
+}
+
 }  // namespace
 }  // namespace upright
