@@ -32,6 +32,12 @@ bool is_late(const Evidence& evidence, const Expectation& expectation) {
   return last_voltage_s(evidence) - evidence.fault_s >= expectation.zero_within_s + busy_machine_s;
 }
 
+/// The reason in run.yaml.
+std::string reason_of(const Evidence& evidence) {
+  const RunRecord run = read_run(evidence.run);
+  return run.outcome ? run.outcome->text("reason") : "";
+}
+
 bool machine_was_too_busy(const Evidence& evidence, const Expectation& expectation) {
   const std::string reason = reason_of(evidence);
   if (is_right(reason, expectation)) return reason != "duration" && is_late(evidence, expectation);
@@ -80,15 +86,10 @@ std::vector<PlantRow> plant_rows(const std::vector<TraceRow>& trace) {
   return rows;
 }
 
-std::string reason_of(const Evidence& evidence) {
-  const RunRecord run = read_run(evidence.run);
-  return run.outcome ? run.outcome->text("reason") : "";
-}
-
-std::optional<Evidence> undisturbed(const std::function<std::optional<Evidence>()>& attempt,
-                                    const Expectation& expectation) {
-  return tried(attempt,
-               [&](const Evidence& evidence) { return !machine_was_too_busy(evidence, expectation); });
+double log_end_s(const std::filesystem::path& run) {
+  const RunRecord record = read_run(run);
+  return record.outcome->number("started_monotonic_s", Range{}) +
+         1e-9 * static_cast<double>(record.samples.rows.back().time_ns);
 }
 
 void judge(const Evidence& evidence, const Expectation& expectation) {
@@ -96,6 +97,13 @@ void judge(const Evidence& evidence, const Expectation& expectation) {
   EXPECT_TRUE(is_right(reason, expectation)) << "it ended with: " << reason;
   judge_plant(evidence, expectation, reason);
   judge_log(evidence, reason);
+}
+
+void judge_attempts(const std::function<std::optional<Evidence>()>& attempt, const Expectation& expectation) {
+  const std::optional<Evidence> evidence =
+      tried(attempt, [&](const Evidence& left) { return !machine_was_too_busy(left, expectation); });
+  ASSERT_TRUE(evidence.has_value()) << never_came_about;
+  judge(*evidence, expectation);
 }
 
 }  // namespace upright::test

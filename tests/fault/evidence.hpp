@@ -27,8 +27,8 @@ struct Evidence {
   bool log_may_end = false;  ///< true: the fault is in the log, whose last rows may be missing
 };
 
-/// The reason in run.yaml.
-std::string reason_of(const Evidence& evidence);
+/// When the last row of a run's log was written, on the monotonic clock.
+double log_end_s(const std::filesystem::path& run);
 
 /// What attempts come to that give nothing: each run was over before it was put to the test.
 inline constexpr const char* never_came_about =
@@ -48,13 +48,12 @@ auto tried(const Attempt& attempt) {
   return tried(attempt, [](const auto&) { return true; });
 }
 
-/// What the first attempt leaves that ends neither too late nor in a way that is not expected but that a
-/// machine too busy for it brings about, or the last; none: no fault came about.
-std::optional<Evidence> undisturbed(const std::function<std::optional<Evidence>()>& attempt,
-                                    const Expectation& expectation);
-
 /// The motor was on; the run ended as expected; zero volts in time and for good; the cart stayed on the
 /// track; the log is whole and replays.
 void judge(const Evidence& evidence, const Expectation& expectation);
+
+/// Judges what the first attempt leaves that ends neither too late nor in a way that is not expected but that
+/// a machine too busy for it brings about, or else the last.
+void judge_attempts(const std::function<std::optional<Evidence>()>& attempt, const Expectation& expectation);
 
 }  // namespace upright::test

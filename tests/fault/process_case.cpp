@@ -1,6 +1,5 @@
 #include "process_case.hpp"
 
-#include <gtest/gtest.h>
 #include <signal.h>
 #include <sys/resource.h>
 
@@ -8,7 +7,7 @@
 #include <fstream>
 #include <thread>
 
-#include "upright/runtime/run_reader.hpp"
+#include "evidence.hpp"
 
 namespace upright::test {
 
@@ -79,12 +78,6 @@ std::vector<ProcessCase> log_cases() {
        .begins = Begins::when_the_shim_strikes,
        .duration_s = long_enough_s},
   };
-}
-
-double log_end_s(const std::filesystem::path& run) {
-  const RunRecord record = read_run(run);
-  return record.outcome->number("started_monotonic_s", Range{}) +
-         1e-9 * static_cast<double>(record.samples.rows.back().time_ns);
 }
 
 }  // namespace
