@@ -19,7 +19,8 @@ class GuardedRig final : public Rig {
     jumps_ = 0;
   }
   RigFault write(double voltage_v) noexcept override { return rig_->write(voltage_v); }
-  void stop() noexcept override { rig_->stop(); }
+  StopReport stop() noexcept override { return rig_->stop(); }
+  int last_exception() const noexcept override { return rig_->last_exception(); }
   SafetyInputs safety_inputs() const noexcept override { return rig_->safety_inputs(); }
 
   RigReading read() noexcept override {

@@ -11,7 +11,8 @@ namespace {
 constexpr double most_skew_periods = 0.5;
 
 bool of_link(RigFault fault) noexcept {
-  return fault == RigFault::link_timeout || fault == RigFault::link_lost || fault == RigFault::corrupt_reply;
+  return fault == RigFault::link_timeout || fault == RigFault::link_lost ||
+         fault == RigFault::corrupt_reply || fault == RigFault::device_busy;
 }
 
 struct Part {
@@ -67,8 +68,17 @@ class JoinedRig final : public Rig {
 
   RigFault write(double voltage_v) noexcept override { return parts_.front().rig->write(voltage_v); }
 
-  void stop() noexcept override {
-    for (const Part& part : parts_) part.rig->stop();
+  /// Only the output has a voltage to take away.
+  StopReport stop() noexcept override {
+    const StopReport of_output = parts_.front().rig->stop();
+    for (std::size_t i = 1; i < parts_.size(); ++i) parts_[i].rig->stop();
+    return of_output;
+  }
+
+  int last_exception() const noexcept override {
+    for (const Part& part : parts_)
+      if (const int number = part.rig->last_exception(); number != 0) return number;
+    return 0;
   }
 
  private:

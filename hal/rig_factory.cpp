@@ -15,19 +15,30 @@ namespace upright {
 
 namespace {
 
-std::unique_ptr<Rig> make_modbus(const RigFile& rig, double period_s) {
-  if (rig.modbus->response_timeout_s >= period_s)
-    throw ConfigError("give modbus.response_timeout_s less than the period of " + exact_text(period_s) +
-                      " s, or lower sample_rate_hz in the gain file: " + rig.file.string() +
-                      ":1: modbus.response_timeout_s is " + exact_text(rig.modbus->response_timeout_s));
-  return std::make_unique<ModbusTransport>(rig, period_s);
+/// The fewest bytes that a period sends over a serial line: reading the counters and writing the voltage.
+int fewest_bytes(const RigFile& rig) {
+  const ModbusRig& modbus = *rig.modbus;
+  const RigRoles roles = roles_of(rig, Backend::modbus_rtu);
+  const int counters = static_cast<int>(roles.cart) + static_cast<int>(roles.pendulum);
+  const int voltage = 2 * modbus.voltage.registers();
+  const int asked = modbus.exchange == ModbusExchange::read_write ? 13 + voltage : 8;
+  const int answered = 5 + 2 * counters * modbus.counter.registers;
+  const int written = roles.output ? 9 + voltage + 8 : 0;
+  return asked + answered + written;
+}
+
+/// What a period's bytes take on a serial line, without any pause between them [s].
+double line_time_s(const RigFile& rig) {
+  const ModbusRig& modbus = *rig.modbus;
+  const int bits_per_byte = 1 + 8 + (modbus.parity == Parity::none ? 0 : 1) + modbus.stop_bits;
+  return static_cast<double>(fewest_bytes(rig) * bits_per_byte) / modbus.baud;
 }
 
 std::unique_ptr<Rig> make_part(const RigFile& rig, Backend backend, double period_s) {
   switch (backend) {
     case Backend::modbus_tcp:
     case Backend::modbus_rtu:
-      return make_modbus(rig, period_s);
+      return std::make_unique<ModbusTransport>(rig, period_s);
     case Backend::gpio:
       return make_gpio_encoders(rig, period_s);
     case Backend::comedi:
@@ -35,12 +46,28 @@ std::unique_ptr<Rig> make_part(const RigFile& rig, Backend backend, double perio
     case Backend::simulated:
       break;
   }
-  throw ConfigError("name a hardware backend: " + rig.file.string() + ":1: backend is simulated");
+  throw ConfigError(rig.file.string() + ":1: backend is simulated: name a hardware backend");
 }
 
 }  // namespace
 
+void require_link_fits(const RigFile& rig, double period_s) {
+  if (!rig.modbus || is_simulated(rig)) return;
+  const std::string file = rig.file.string() + ":1: ";
+  const std::string period = "the period of " + exact_text(period_s) + " s";
+  if (rig.modbus->response_timeout_s >= period_s)
+    throw ConfigError(file + "modbus.response_timeout_s is " + exact_text(rig.modbus->response_timeout_s) +
+                      ", and " + period + " is no longer: lower sample_rate_hz in the gain file, or give " +
+                      "modbus.response_timeout_s less than the period");
+  if (!rig.modbus->device.empty() && line_time_s(rig) >= period_s)
+    throw ConfigError(file + "modbus.baud is " + std::to_string(rig.modbus->baud) +
+                      ", at which the bytes of " + "one period take " + exact_text(line_time_s(rig)) +
+                      " s, and " + period +
+                      " is no longer: lower sample_rate_hz in the gain file, or raise modbus.baud");
+}
+
 std::unique_ptr<Rig> make_rig(const RigFile& rig, const RigOptions& options) {
+  require_link_fits(rig, options.period_s);
   std::vector<Backend> backends;
   for (const Backend backend : {rig.output, rig.cart_encoder, rig.pendulum_encoder})
     if (std::find(backends.begin(), backends.end(), backend) == backends.end()) backends.push_back(backend);

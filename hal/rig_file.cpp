@@ -142,6 +142,7 @@ void read_voltage(const YamlMap& map, double limit_v, ModbusRig& rig) {
     map.fail("counts_per_v", "leaves no room for the amplifier's limit",
              "give counts_per_v at most " +
                  exact_text(rig.voltage.largest_v() * rig.voltage.counts_per_v / limit_v));
+  rig.voltage_reads_back = map.flag_or("read_back", true);
   map.finish();
 }
 
@@ -359,7 +360,8 @@ std::string modbus_text(const ModbusRig& rig, const RigRoles& roles) {
     text += "  voltage: {address: " + std::to_string(rig.voltage_address) +
             ", encoding: " + word_of(rig.voltage.encoding, encodings) +
             ", word_order: " + word_of(rig.voltage.word_order, word_orders) +
-            ", counts_per_v: " + exact_text(rig.voltage.counts_per_v) + "}\n";
+            ", counts_per_v: " + exact_text(rig.voltage.counts_per_v) +
+            (rig.voltage_reads_back ? "" : ", read_back: false") + "}\n";
   if (rig.enable_address) text += "  enable_address: " + std::to_string(*rig.enable_address) + "\n";
   if (rig.watchdog)
     text += "  device_watchdog: {address: " + std::to_string(rig.watchdog->address) +
@@ -436,6 +438,8 @@ RigFile read_rig(const YamlMap& document) {
   if (serial || uses(rig, Backend::modbus_tcp)) rig.modbus = read_modbus(document.map("modbus"), serial, rig);
   if (uses(rig, Backend::comedi)) rig.comedi = read_comedi(document.map("comedi"), rig);
   if (uses(rig, Backend::gpio) || document.has("gpio")) rig.gpio = read_gpio(document.map("gpio"));
+  if (const auto watch = document.optional_map("encoder_watch"))
+    rig.encoder_watch = read_encoder_assumptions(*watch);
   check_gpio_roles(document, rig);
   document.finish();
   return rig;
@@ -459,6 +463,7 @@ std::string rig_text(const RigFile& rig) {
         *rig.modbus, roles_of(rig, rig.modbus->device.empty() ? Backend::modbus_tcp : Backend::modbus_rtu));
   if (rig.comedi) text += comedi_text(*rig.comedi);
   if (rig.gpio) text += gpio_text(*rig.gpio);
+  if (rig.encoder_watch) text += "encoder_watch: " + encoder_assumptions_text(*rig.encoder_watch) + "\n";
   return text;
 }
 

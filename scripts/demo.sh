@@ -30,14 +30,14 @@ for _ in $(seq 100); do
   kill -0 "$server" 2>/dev/null || exit 4 # it has said why
   sleep 0.1
 done
-[ -n "$port" ] || { echo "look at the machine's load: the virtual rig did not start within 10 s" >&2; exit 4; }
+[ -n "$port" ] || { echo "the virtual rig did not start within 10 s: look at the machine's load" >&2; exit 4; }
 
 sed -e "s/^  port: .*/  port: $port/" -e "s#\.\./plants/#$PWD/config/plants/#" config/rigs/modbus-tcp.yaml >"$work/rig.yaml"
 
-# A stopped run (exit code 3) has its data and its report too.
+# --unchecked: a virtual rig's signs are those of its file. A stopped run (exit code 3) has its data and its report too.
 status=0
 "$upright" run --rig "$work/rig.yaml" --gains config/gains/exponential.yaml --duration 10 --label demo \
-  >"$work/run.out" || status=$?
+  --unchecked >"$work/run.out" || status=$?
 [ "$status" -eq 0 ] || [ "$status" -eq 3 ] || exit "$status"
 
 run=$(tail -n 1 "$work/run.out")

@@ -37,9 +37,9 @@ void pack(const PlantState<double>& s, double* y) {
 
 void require(int flag, const char* what) {
   if (flag < 0)
-    throw Error(ExitCode::usage,
-                std::string("use the fast engine for this plant: the reference engine (CVODE) failed in ") +
-                    what + " with code " + std::to_string(flag));
+    throw Error(ExitCode::usage, std::string("the reference engine (CVODE) failed in ") + what +
+                                     " with code " + std::to_string(flag) +
+                                     ": use the fast engine for this plant");
 }
 
 void keep_quiet(int, const char*, const char*, char*, void*) {}

@@ -249,7 +249,7 @@ void run_with(const LoopSetup& setup, const Present& present, std::span<const Lo
 }  // namespace
 
 bool lanes_can_run(const LoopSetup& setup) {
-  if (setup.make_compensator || setup.model.cart_locked || !setup.model.has_pendulum) return false;
+  if (setup.make_parts || setup.model.cart_locked || !setup.model.has_pendulum) return false;
   const Dynamics<Lanes> physics(on_lanes(setup.model));
   if (physics.has_motor_lag() || physics.pivot_has_kink()) return false;
   if (setup.sampled && any(physics.input_delay_s() > Lanes(0.0))) return false;

@@ -61,9 +61,8 @@ template <class Engine>
 LoopResult run_sampled(const LoopSetup& setup, const LoopCase& start, const LoopObserver& observer) {
   ControlConfig control = setup.control;
   control.delay_s = start.delay_s;
-  Controller controller(
-      control, setup.amplifier_limit_v,
-      setup.make_compensator ? setup.make_compensator(control, setup.amplifier_limit_v) : nullptr);
+  Controller controller(control, setup.amplifier_limit_v,
+                        setup.make_parts ? setup.make_parts(control) : ModelParts{});
   SampledLoop<Engine> loop(setup.model, control.sample_rate_hz, options_of(setup));
   const auto law = [&](std::uint64_t tick, const Measured& measured) {
     ControlInput input;

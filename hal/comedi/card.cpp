@@ -38,8 +38,8 @@ ComediCard::ComediCard(const std::string& device, const std::string& rig_file)
     : device_(device), rig_file_(rig_file), handle_(comedi_open(device.c_str())) {
   if (handle_ == nullptr) {
     const int problem = comedi_errno();
-    throw DeviceError(remedy_for(problem) + ": " + device + " of " + rig_file + " cannot be opened (" +
-                      comedi_strerror(problem) + ")");
+    throw DeviceError(device + " of " + rig_file + " cannot be opened (" + comedi_strerror(problem) +
+                      "): " + remedy_for(problem));
   }
 }
 
@@ -73,8 +73,8 @@ void ComediCard::require_type(const ComediChannel& at, int type, const char* nam
 void ComediCard::lock(const ComediChannel& at) {
   if (comedi_lock(handle_, static_cast<unsigned int>(at.subdevice)) == 0) return;
   if (comedi_errno() != EBUSY) fail(at, "locking it");
-  throw DeviceError("end the other program first: subdevice " + std::to_string(at.subdevice) + " of " +
-                    device_ + ", comedi." + at.key + " of " + rig_file_ + ", already has a controller");
+  throw DeviceError("subdevice " + std::to_string(at.subdevice) + " of " + device_ + ", comedi." + at.key +
+                    " of " + rig_file_ + ", already has a controller: end the other program first");
 }
 
 unsigned int ComediCard::find_range(const ComediChannel& at, const ComediRange& range) const {
@@ -100,14 +100,14 @@ lsampl_t ComediCard::maxdata(const ComediChannel& at) const {
 
 void ComediCard::refuse(const ComediChannel& at, const std::string& problem,
                         const std::string& remedy) const {
-  throw ConfigError(remedy + ": " + rig_file_ + ":1: comedi." + at.key + ": " + problem + " (" + device_ +
-                    ", driver " + driver() + ")");
+  throw ConfigError(rig_file_ + ":1: comedi." + at.key + ": " + problem + " (" + device_ + ", driver " +
+                    driver() + "): " + remedy);
 }
 
 void ComediCard::fail(const ComediChannel& at, const std::string& doing) const {
-  throw DeviceError("check the card at " + device_ + ": " + comedi_problem() + " while " + doing +
-                    ", subdevice " + std::to_string(at.subdevice) + " channel " + std::to_string(at.channel) +
-                    ", comedi." + at.key + " of " + rig_file_);
+  throw DeviceError(comedi_problem() + " while " + doing + ", subdevice " + std::to_string(at.subdevice) +
+                    " channel " + std::to_string(at.channel) + ", comedi." + at.key + " of " + rig_file_ +
+                    ": check the card at " + device_);
 }
 
 }  // namespace upright

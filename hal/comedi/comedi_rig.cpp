@@ -224,11 +224,16 @@ RigFault ComediTransport::put_out(double voltage_v) noexcept {
   return written == 1 ? RigFault::none : fault_of_errno(comedi_errno());
 }
 
-void ComediTransport::stop() noexcept {
+/// What a card's driver took is on its output: reading it back would show the driver's own copy only.
+StopReport ComediTransport::stop() noexcept {
   stopped_ = true;
-  if (output_.device == nullptr) return;
-  for (int i = 0; i < attempts_to_stop; ++i)
-    if (put_out(0.0) == RigFault::none) return;
+  if (output_.device == nullptr) return at_zero_volts();
+  StopReport report;
+  for (int i = 0; i < attempts_to_stop && !report.zero_confirmed; ++i) {
+    report.fault = put_out(0.0);
+    report.zero_confirmed = report.fault == RigFault::none;
+  }
+  return report;
 }
 
 }  // namespace upright

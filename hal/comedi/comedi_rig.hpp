@@ -34,7 +34,7 @@ class ComediTransport final : public Rig {
   void open() override;
   RigReading read() noexcept override;
   RigFault write(double voltage_v) noexcept override;
-  void stop() noexcept override;
+  StopReport stop() noexcept override;
 
  private:
   /// What an open encoder's data mean.

@@ -10,9 +10,8 @@ namespace upright {
 GpioChip::GpioChip(const std::string& chip, const std::string& file)
     : file_(file), chip_(gpiod_chip_open_lookup(chip.c_str())) {
   if (!chip_)
-    throw DeviceError("check gpio.chip in " + file +
-                      " against the output of gpiodetect, and who may open it: " + chip +
-                      " cannot be opened (" + std::strerror(errno) + ")");
+    throw DeviceError(chip + " cannot be opened (" + std::strerror(errno) + "): check gpio.chip in " + file +
+                      " against the output of gpiodetect, and who may open it");
 }
 
 std::string GpioChip::path() const {
@@ -22,8 +21,8 @@ std::string GpioChip::path() const {
 gpiod_line* GpioChip::line(int number, const std::string& use) const {
   const unsigned lines = gpiod_chip_num_lines(chip_.get());
   if (static_cast<unsigned>(number) >= lines)
-    throw DeviceError("give gpio." + use + " in " + file_ + " a line below " + std::to_string(lines) + ": " +
-                      path() + " has no line " + std::to_string(number));
+    throw DeviceError(path() + " has no line " + std::to_string(number) + ": give gpio." + use + " in " +
+                      file_ + " a line below " + std::to_string(lines));
   gpiod_line* line = gpiod_chip_get_line(chip_.get(), static_cast<unsigned>(number));
   if (line == nullptr) refuse(number, use);
   return line;
@@ -33,9 +32,9 @@ void GpioChip::refuse(int number, const std::string& use) const {
   const int problem = errno;
   const std::string line =
       "line " + std::to_string(number) + " of " + path() + " (gpio." + use + " in " + file_ + ")";
-  if (problem == EBUSY) throw DeviceError("end the other program first: " + line + " is in use");
-  throw DeviceError("check that the chip can do what gpio." + use + " asks of it, a bias included: " + line +
-                    " cannot be had (" + std::strerror(problem) + ")");
+  if (problem == EBUSY) throw DeviceError(line + " is in use: end the other program first");
+  throw DeviceError(line + " cannot be had (" + std::strerror(problem) +
+                    "): check that the chip can do what gpio." + use + " asks of it, a bias included");
 }
 
 int bias_flag(LineBias bias) noexcept {

@@ -54,11 +54,10 @@ class GpioEncoder {
   void refuse_slow_loop(const std::string& file, double period_s) const {
     const double queued = share_of_queue * source_->queue_edges();
     if (config_.fastest_edges_per_s * period_s <= queued) return;
-    throw ConfigError("raise sample_rate_hz in the gain file to " +
-                      exact_text(std::ceil(config_.fastest_edges_per_s / queued)) + " or lower gpio." + use_ +
-                      ".fastest_edges_per_s: " + file +
-                      ":1: the kernel's queue of edges could overflow within a period of " +
-                      exact_text(period_s) + " s");
+    throw ConfigError(file + ":1: the kernel's queue of edges could overflow within a period of " +
+                      exact_text(period_s) + " s: raise sample_rate_hz in the gain file to " +
+                      exact_text(std::ceil(config_.fastest_edges_per_s / queued)) + ", or lower gpio." +
+                      use_ + ".fastest_edges_per_s");
   }
 
   /// Finds a moment without an edge between the levels and what was drained.
@@ -74,8 +73,8 @@ class GpioEncoder {
       clock.sleep_until(clock.now_ns() + nanoseconds_per_second / 1000);
     }
     throw DeviceError(
-        "hold the encoder still while the rig is opened, and check its wiring: the lines of gpio." + use_ +
-        " could not be read at rest");
+        "the lines of gpio." + use_ +
+        " could not be read at rest: hold the encoder still while the rig is opened, and check its wiring");
   }
 
   LineEncoder config_;
@@ -127,7 +126,7 @@ class GpioEncodersRig final : public Rig {
   }
 
   RigFault write(double) noexcept override { return RigFault::device_refused; }
-  void stop() noexcept override {}
+  StopReport stop() noexcept override { return at_zero_volts(); }
 
  private:
   template <class Do>
@@ -146,10 +145,8 @@ class GpioEncodersRig final : public Rig {
   /// Opened again it goes on counting, since its zero was taken before.
   void refuse_lost_counts() {
     if (catch_up(clock_.now_ns()) == RigFault::none) return;
-    throw DeviceError(
-        "start the program again, so that it takes a new zero: edges of an encoder were lost, or came "
-        "faster than gpio's fastest_edges_per_s in " +
-        file_);
+    throw DeviceError("edges of an encoder were lost, or came faster than gpio's fastest_edges_per_s in " +
+                      file_ + ": start the program again, so that it takes a new zero");
   }
 
   RigFault catch_up(std::int64_t now_ns) noexcept {

@@ -151,20 +151,27 @@ class GpioLinesRig final : public Rig {
     return is_enabled_ && lines_->beat() ? RigFault::none : RigFault::line_failed;
   }
 
-  void stop() noexcept override {
-    rest();
-    rig_->stop();
+  StopReport stop() noexcept override {
+    const bool is_disabled = rest();
+    StopReport report = rig_->stop();
+    if (is_disabled) return report;
+    report.disabled = false;
+    if (report.fault == RigFault::none) report.fault = RigFault::line_failed;
+    return report;
   }
+
+  int last_exception() const noexcept override { return rig_->last_exception(); }
 
   SafetyInputs safety_inputs() const noexcept override {
     return {config_.emergency_stop.has_value(), static_cast<int>(config_.limit_switches.size())};
   }
 
  private:
-  void rest() noexcept {
+  /// False: the line did not take it.
+  bool rest() noexcept {
     rests_ = true;
     is_enabled_ = false;
-    if (lines_) lines_->enable(false);
+    return !lines_ || lines_->enable(false);
   }
 
   std::unique_ptr<Rig> rig_;

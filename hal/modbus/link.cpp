@@ -1,16 +1,10 @@
 #include "link.hpp"
 
-#include <linux/serial.h>
 #include <netdb.h>
-#include <netinet/in.h>
-#include <netinet/tcp.h>
-#include <sys/ioctl.h>
 #include <sys/socket.h>
-#include <termios.h>
+#include <time.h>
 
 #include <algorithm>
-#include <cerrno>
-#include <cmath>
 #include <filesystem>
 #include <span>
 
@@ -20,24 +14,20 @@ namespace upright {
 
 namespace {
 
-/// The IPv4 address of a host: libmodbus's TCP context takes numbers only.
+constexpr int illegal_function = 1;
+
+/// The IPv4 address of a host.
 std::string address_of(const std::string& host) {
   addrinfo hints{};
   hints.ai_family = AF_INET;
   hints.ai_socktype = SOCK_STREAM;
   addrinfo* found = nullptr;
   if (const int problem = getaddrinfo(host.c_str(), nullptr, &hints, &found); problem != 0)
-    throw DeviceError("check modbus.host: " + host + " has no address (" + gai_strerror(problem) + ")");
+    throw DeviceError(host + " has no address (" + gai_strerror(problem) + "): check modbus.host");
   char text[NI_MAXHOST] = "";
   getnameinfo(found->ai_addr, found->ai_addrlen, text, sizeof text, nullptr, 0, NI_NUMERICHOST);
   freeaddrinfo(found);
   return text;
-}
-
-modbus_t* new_context(const ModbusRig& rig, const std::string& address) {
-  if (!address.empty()) return modbus_new_tcp(address.c_str(), rig.port);
-  const char parity = rig.parity == Parity::none ? 'N' : rig.parity == Parity::even ? 'E' : 'O';
-  return modbus_new_rtu(rig.device.c_str(), rig.baud, parity, 8, rig.stop_bits);
 }
 
 std::string name_of(const ModbusRig& rig, const std::string& address) {
@@ -47,26 +37,15 @@ std::string name_of(const ModbusRig& rig, const std::string& address) {
   return unresolved ? rig.device : line.string();
 }
 
-RigFault fault_of_errno(int error) noexcept {
-  if (error == ETIMEDOUT) return RigFault::link_timeout;
-  if (error == EMBBADCRC || error == EMBBADDATA || error == EMBBADEXC || error == EMBMDATA ||
-      error == EMBBADSLAVE || error == EMBUNKEXC)
-    return RigFault::corrupt_reply;
-  if (error >= EMBXILFUN && error < EMBBADCRC) return RigFault::device_refused;
-  return RigFault::link_lost;
+bool is_answer(RigFault fault) noexcept {
+  return fault == RigFault::none || fault == RigFault::device_refused || fault == RigFault::device_busy;
 }
 
-void set_timeout(modbus_t* context, double seconds) noexcept {
-  const auto us = static_cast<std::uint32_t>(std::max(1.0, seconds * 1e6));
-  modbus_set_response_timeout(context, us / 1'000'000, us % 1'000'000);
-}
-
-/// USB serial adapters otherwise hold bytes back for up to 16 ms. Not every driver knows the request.
-void ask_for_low_latency(int descriptor) noexcept {
-  serial_struct settings{};
-  if (ioctl(descriptor, TIOCGSERIAL, &settings) != 0) return;
-  settings.flags |= ASYNC_LOW_LATENCY;
-  ioctl(descriptor, TIOCSSERIAL, &settings);
+std::int64_t now_ns() noexcept {
+  constexpr std::int64_t ns_per_s = 1'000'000'000;
+  timespec now{};
+  clock_gettime(CLOCK_MONOTONIC, &now);
+  return now.tv_sec * ns_per_s + now.tv_nsec;
 }
 
 }  // namespace
@@ -78,12 +57,9 @@ ModbusLink::ModbusLink(const RigFile& rig)
       roles_(roles_of(rig, serial_ ? Backend::modbus_rtu : Backend::modbus_tcp)),
       address_(serial_ ? std::string() : address_of(config_.host)),
       name_(name_of(config_, address_)),
-      context_(new_context(config_, address_)) {
-  if (!context_) throw DeviceError(std::string("check the link's settings: ") + modbus_strerror(errno));
+      patience_s_(config_.response_timeout_s),
+      channel_(serial_ ? make_serial_channel(config_) : make_tcp_channel(config_, address_)) {
   find_block();
-  modbus_set_slave(context_.get(), config_.unit);
-  modbus_set_error_recovery(context_.get(), MODBUS_ERROR_RECOVERY_NONE);
-  modbus_set_byte_timeout(context_.get(), 0, 0);
 }
 
 void ModbusLink::find_block() noexcept {
@@ -104,55 +80,65 @@ void ModbusLink::find_block() noexcept {
 }
 
 std::array<std::uint16_t, 2> ModbusLink::voltage_words(double voltage_v) const noexcept {
-  return encode_voltage(roles_.output ? amplifier_sign_ * voltage_v : 0.0, config_.voltage);
+  // Not minus zero, which some device may take for a number like another.
+  const double at_device_v = roles_.output && voltage_v != 0.0 ? amplifier_sign_ * voltage_v : 0.0;
+  return encode_voltage(at_device_v, config_.voltage);
 }
 
 RigFault ModbusLink::connect(double patience_s) noexcept {
   close();
-  set_timeout(context_.get(), patience_s);
-  if (modbus_connect(context_.get()) != 0) return RigFault::link_lost;
-  set_timeout(context_.get(), config_.response_timeout_s);
-  const int descriptor = modbus_get_socket(context_.get());
-  if (serial_) {
-    ask_for_low_latency(descriptor);
-  } else {
-    const int on = 1;
-    setsockopt(descriptor, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
-  }
+  if (!channel_->connect(patience_s)) return RigFault::link_lost;
   connected_ = true;
   in_step_ = !serial_;  // whatever a serial line still carries is not for us
-  modbus_flush(context_.get());
   return RigFault::none;
 }
 
 void ModbusLink::close() noexcept {
-  if (connected_) modbus_close(context_.get());
+  if (connected_) channel_->close();
   connected_ = false;
 }
 
-/// The fault of an exchange that should have moved `expected` registers. After an error the peer may still
-/// answer: TCP closes, so that the answer goes nowhere; a serial line resynchronises.
-RigFault ModbusLink::result(int count, int expected) noexcept {
-  if (count == expected) return RigFault::none;
-  const RigFault fault = count < 0 ? fault_of_errno(errno) : RigFault::corrupt_reply;
+void ModbusLink::await_silence(double quiet_s) noexcept {
+  if (!connected_) return;
+  channel_->await_silence(quiet_s);
+  in_step_ = true;
+}
+
+/// One exchange, with its reply in `reply_`. After a request without an answer the peer may still answer:
+/// TCP closes, so that the answer goes nowhere; a serial line resynchronises.
+RigFault ModbusLink::ask(const Pdu& request) noexcept {
+  if (!connected_) return RigFault::link_lost;
+  channel_->flush();
+  RigFault fault = channel_->exchange(request, reply_, patience_s_);
+  if (fault == RigFault::none) fault = check_reply(request, reply_, exception_);
+  if (is_answer(fault)) return fault;
+  unanswered_ns_ = now_ns();
   in_step_ = false;
-  if (!serial_ || fault == RigFault::link_lost) close();
+  if (!serial_ || fault == RigFault::link_lost) {
+    channel_->abandon();
+    connected_ = false;
+  }
+  return fault;
+}
+
+/// The first `count` of `registers_`.
+RigFault ModbusLink::read_registers(const Pdu& request, int count) noexcept {
+  const RigFault fault = ask(request);
+  if (fault == RigFault::none)
+    take_registers(reply_, std::span(registers_).first(static_cast<std::size_t>(count)));
   return fault;
 }
 
 RigFault ModbusLink::read_block(int registers, double held_v) noexcept {
-  if (!connected_) return RigFault::link_lost;
-  modbus_t* context = context_.get();
-  modbus_flush(context);
-  if (config_.exchange == ModbusExchange::read_write) {
-    const auto words = voltage_words(held_v);
-    return result(
-        modbus_write_and_read_registers(context, config_.voltage_address, config_.voltage.registers(),
-                                        words.data(), first_, registers, registers_.data()),
+  const RegisterRange range{first_, registers};
+  if (config_.exchange == ModbusExchange::separate)
+    return read_registers(
+        read_request(config_.input_registers ? ModbusFunction::read_input : ModbusFunction::read_holding,
+                     range),
         registers);
-  }
-  const auto read = config_.input_registers ? modbus_read_input_registers : modbus_read_registers;
-  return result(read(context, first_, registers, registers_.data()), registers);
+  const auto words = voltage_words(held_v);
+  const auto used = std::span(words).first(static_cast<std::size_t>(config_.voltage.registers()));
+  return read_registers(read_write_request(range, config_.voltage_address, used), registers);
 }
 
 RigFault ModbusLink::read(double held_v, DeviceReading& reading) noexcept {
@@ -170,26 +156,46 @@ RigFault ModbusLink::read(double held_v, DeviceReading& reading) noexcept {
 
 RigFault ModbusLink::write_voltage(double voltage_v) noexcept {
   if (config_.exchange == ModbusExchange::read_write) return read_block(block_, voltage_v);
-  if (!connected_) return RigFault::link_lost;
-  modbus_flush(context_.get());
   const auto words = voltage_words(voltage_v);
+  const auto used = std::span(words).first(static_cast<std::size_t>(config_.voltage.registers()));
+  return ask(write_multiple_request(config_.voltage_address, used));
+}
+
+RigFault ModbusLink::write_zero(ModbusFunction function) noexcept {
+  constexpr std::array<std::uint16_t, 2> zero{};
   const int count = config_.voltage.registers();
-  return result(modbus_write_registers(context_.get(), config_.voltage_address, count, words.data()), count);
+  if (function == ModbusFunction::read_write) return read_block(block_, 0.0);
+  if (function == ModbusFunction::write_multiple)
+    return ask(write_multiple_request(config_.voltage_address,
+                                      std::span(zero).first(static_cast<std::size_t>(count))));
+  RigFault fault = RigFault::none;
+  for (int i = 0; i < count && fault == RigFault::none; ++i)
+    fault = ask(write_single_request(config_.voltage_address + i, 0));
+  return fault;
+}
+
+RigFault ModbusLink::read_voltage(double& voltage_v) noexcept {
+  const int count = config_.voltage.registers();
+  const RigFault fault =
+      read_registers(read_request(ModbusFunction::read_holding, {config_.voltage_address, count}), count);
+  if (fault == RigFault::none) voltage_v = amplifier_sign_ * decode_voltage(registers_, config_.voltage);
+  return fault;
 }
 
 RigFault ModbusLink::write_register(int address, int value) noexcept {
-  if (!connected_) return RigFault::link_lost;
-  modbus_flush(context_.get());
   const auto word = static_cast<std::uint16_t>(value);
-  return result(modbus_write_registers(context_.get(), address, 1, &word), 1);
+  if (knows_write_multiple_) {
+    const RigFault fault = ask(write_multiple_request(address, std::span(&word, 1)));
+    if (fault != RigFault::device_refused || exception_ != illegal_function) return fault;
+  }
+  const RigFault fault = ask(write_single_request(address, word));
+  if (fault == RigFault::none) knows_write_multiple_ = false;
+  return fault;
 }
 
 RigFault ModbusLink::read_register(int address, int& value) noexcept {
-  if (!connected_) return RigFault::link_lost;
-  modbus_flush(context_.get());
-  std::uint16_t word = 0;
-  const RigFault fault = result(modbus_read_registers(context_.get(), address, 1, &word), 1);
-  if (fault == RigFault::none) value = word;
+  const RigFault fault = read_registers(read_request(ModbusFunction::read_holding, {address, 1}), 1);
+  if (fault == RigFault::none) value = registers_[0];
   return fault;
 }
 

@@ -10,6 +10,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "upright/hal/modbus_exception.hpp"
 #include "upright/model/error.hpp"
 
 namespace upright {
@@ -24,6 +25,8 @@ constexpr double open_patience_s = 1.0;
 constexpr double share_of_period = 0.75;  // the rest is for computing and writing
 constexpr int replies_until_certain = 3;  // a single one may have a wrong bit that nothing betrays
 constexpr int io_priority = 70;
+/// A cycle may begin up to a period late before it counts as missed; a voltage from before that is old.
+constexpr double freshness_periods = 2.0;
 
 std::int64_t now_ns() noexcept {
   timespec now{};
@@ -49,9 +52,7 @@ const char* words_for(RigFault fault) {
     case RigFault::link_lost:
       return "no connection";
     case RigFault::corrupt_reply:
-      return "a corrupt reply";
-    case RigFault::device_refused:
-      return "the device refused";
+      return "a reply that does not fit the request";
     default:
       return "an unexpected answer";
   }
@@ -65,7 +66,9 @@ ModbusTransport::ModbusTransport(const RigFile& rig, double period_s)
       writes_(roles_.output || rig.modbus->exchange == ModbusExchange::read_write),
       patience_ns_(static_cast<std::int64_t>(
           1e9 * std::max(rig.modbus->response_timeout_s, share_of_period * period_s))),
-      link_(rig) {}
+      freshness_ns_(static_cast<std::int64_t>(1e9 * freshness_periods * period_s)),
+      link_(rig),
+      stop_sequence_(link_, *rig_.modbus) {}
 
 ModbusTransport::~ModbusTransport() {
   end_thread();
@@ -80,67 +83,118 @@ void ModbusTransport::end_thread() noexcept {
 }
 
 void ModbusTransport::fail(RigFault fault, const std::string& doing) {
+  const int exception = link_.last_exception();
   link_.close();
-  throw DeviceError("check that the device at " + link_.name() + " is on, wired and configured as " +
-                    rig_.file.string() + " says: " + words_for(fault) + " while " + doing);
+  const std::string device = "the device at " + link_.name(), file = rig_.file.string();
+  if (fault == RigFault::device_refused)
+    throw DeviceError(device + " refused with " + exception_text(exception) + " while " + doing +
+                      ": check that it knows the addresses and functions that " + file + " names");
+  if (fault == RigFault::device_busy)
+    throw DeviceError(device + " answered with " + exception_text(exception) + " while " + doing +
+                      ": check that no other master uses it, and what stands behind it");
+  if (fault == RigFault::output_kept)
+    throw DeviceError(device +
+                      " acknowledged zero volts, but its output reads back as another voltage: switch "
+                      "the amplifier off and check the device; where that register is no copy of the output, "
+                      "give modbus.voltage read_back: false in " +
+                      file);
+  throw DeviceError(std::string(words_for(fault)) + " from " + device + " while " + doing +
+                    ": check that it is on, wired and configured as " + file + " says");
+}
+
+/// An exchange of open(), until it succeeds; a device that has just been switched on gets a second.
+template <class Exchange>
+void ModbusTransport::retried(Exchange exchange, const std::string& doing) {
+  const std::int64_t end_ns = now_ns() + static_cast<std::int64_t>(1e9 * open_patience_s);
+  int refusals = 0;
+  RigFault last = RigFault::link_lost;
+  for (;;) {
+    if (!link_.connected()) link_.connect(open_patience_s);
+    if (!link_.in_step()) link_.resynchronise(0.0);
+    last = exchange();
+    if (last == RigFault::none) return;
+    if (last == RigFault::device_refused && ++refusals == replies_until_certain) break;
+    if (now_ns() >= end_ns) break;
+    const timespec pause{0, first_pause_ns};
+    nanosleep(&pause, nullptr);
+  }
+  fail(last, doing);
+}
+
+/// True: the device lets its voltage registers be read, and they hold zero volts.
+bool ModbusTransport::offers_read_back() {
+  if (!roles_.output || !rig_.modbus->voltage_reads_back) return false;
+  bool offers = false;
+  RigFault last = RigFault::none;
+  const auto read_zero = [&] {
+    double voltage_v = 0.0;
+    last = link_.read_voltage(voltage_v);
+    offers = last == RigFault::none;
+    // One that takes its time may show zero the next time.
+    if (offers && voltage_v != 0.0) return RigFault::output_kept;
+    return last;
+  };
+  try {
+    retried(read_zero, "reading the voltage back");
+  } catch (const DeviceError&) {
+    if (offers) throw;
+    // It refuses to have it read, or does not answer such a request at all: what it acknowledges must do.
+    if (last == RigFault::device_busy) throw;
+    return false;
+  }
+  return true;
+}
+
+/// Zero volts, amplifier off, and the device's own watchdog as the file says.
+void ModbusTransport::prepare_device() {
+  const ModbusRig& modbus = *rig_.modbus;
+  if (writes_) retried([&] { return link_.write_voltage(0.0); }, "writing zero volts");
+  if (modbus.enable_address)
+    retried([&] { return link_.write_register(*modbus.enable_address, 0); }, "disabling the amplifier");
+  reads_back_ = offers_read_back();
+  if (!modbus.watchdog) return;
+  retried([&] { return link_.write_register(modbus.watchdog->address, modbus.watchdog->counts()); },
+          "programming the device's watchdog");
+  int back = 0;
+  retried([&] { return link_.read_register(modbus.watchdog->address, back); },
+          "reading back the device's watchdog");
+  if (back != modbus.watchdog->counts()) fail(RigFault::none, "reading back the device's watchdog");
 }
 
 void ModbusTransport::open() {
   lock_.take(link_.name());
   end_thread();
-  const auto must = [&](RigFault fault, const std::string& doing) {
-    if (fault != RigFault::none) fail(fault, doing);
-  };
-  must(link_.connect(open_patience_s), "connecting");
-  // A device that has just been switched on, or a line with old bytes on it, gets a second.
-  RigFault fault = RigFault::link_timeout;
-  const std::int64_t until_ns = now_ns() + static_cast<std::int64_t>(1e9 * open_patience_s);
-  while (fault != RigFault::none && now_ns() < until_ns) {
-    if (!link_.connected()) link_.connect(open_patience_s);
-    fault = link_.resynchronise(0.0);
-  }
+  stop_sequence_.reset(false, 0.0);
+  if (const RigFault fault = link_.connect(open_patience_s); fault != RigFault::none)
+    fail(fault, "connecting");
   const std::string reading_it = roles_.encoders() ? "reading the counters" : "asking for an answer";
-  must(fault, reading_it);
-  const ModbusRig& modbus = *rig_.modbus;
-  const auto retried = [&](auto exchange, const std::string& doing) {
-    const std::int64_t end_ns = now_ns() + static_cast<std::int64_t>(1e9 * open_patience_s);
-    int refusals = 0;
-    RigFault last = RigFault::link_lost;
-    do {
-      if (!link_.connected()) link_.connect(open_patience_s);
-      if (!link_.in_step()) link_.resynchronise(0.0);
-      last = exchange();
-      if (last == RigFault::device_refused && ++refusals == replies_until_certain) break;
-    } while (last != RigFault::none && now_ns() < end_ns);
-    must(last, doing);
-  };
-  if (writes_) retried([&] { return link_.write_voltage(0.0); }, "writing zero volts");
-  if (modbus.enable_address)
-    retried([&] { return link_.write_register(*modbus.enable_address, 0); }, "disabling the amplifier");
-  if (modbus.watchdog) {
-    retried([&] { return link_.write_register(modbus.watchdog->address, modbus.watchdog->counts()); },
-            "programming the device's watchdog");
-    int back = 0;
-    retried([&] { return link_.read_register(modbus.watchdog->address, back); },
-            "reading back the device's watchdog");
-    if (back != modbus.watchdog->counts()) fail(RigFault::none, "reading back the device's watchdog");
-  }
+  // A device that has just been switched on, or a line with old bytes on it, gets a second.
+  retried([&] { return link_.resynchronise(0.0); }, reading_it);
+  prepare_device();
   DeviceReading reading;
   retried([&] { return link_.read(0.0, reading); }, reading_it);
   boot_count_ = reading.boot_count;
+  begin_serving();
+}
 
+void ModbusTransport::begin_serving() {
+  const auto& watchdog = rig_.modbus->watchdog;
+  stop_sequence_.reset(reads_back_, watchdog ? watchdog->time_s : 0.0);
   read_wanted_ = write_wanted_ = answered_ = 0;
   read_served_ = write_served_ = 0;
   voltage_v_ = 0.0;
-  write_fault_ = RigFault::none;
+  write_fault_ = stop_fault_ = RigFault::none;
+  exception_ = stop_exception_ = 0;
   stopping_ = ending_ = false;
-  stop_served_ = enabled_ = restarted_ = false;
+  zero_confirmed_ = read_back_ = false;
+  disabled_ = stop_sequence_.report().disabled;
+  enabled_ = restarted_ = false;
   verified_ = true;
   other_boots_in_a_row_ = other_watchdogs_in_a_row_ = 0;
   checks_refused_in_a_row_ = reads_refused_in_a_row_ = writes_refused_in_a_row_ = 0;
   recoveries_ = 0;
   pause_ns_ = first_pause_ns;
-  next_attempt_ns_ = 0;
+  next_attempt_ns_ = stop_begun_ns_ = 0;
   thread_ = std::thread([this] { serve(); });
   const sched_param parameters{io_priority};
   pthread_setschedparam(thread_.native_handle(), SCHED_FIFO, &parameters);  // where allowed
@@ -173,28 +227,61 @@ RigFault ModbusTransport::write(double voltage_v) noexcept {
   if (!roles_.output) return RigFault::device_refused;
   if (stopping_.load(std::memory_order_relaxed)) return RigFault::none;
   voltage_v_.store(safe_voltage(voltage_v, rig_.amplifier.limit_v), std::memory_order_relaxed);
+  commanded_ns_.store(now_ns(), std::memory_order_release);
   write_wanted_.fetch_add(1, std::memory_order_release);
   ring();
   return std::isfinite(voltage_v) ? write_fault_.load(std::memory_order_relaxed) : RigFault::not_finite;
 }
 
-void ModbusTransport::stop() noexcept {
+StopReport ModbusTransport::stop() noexcept {
   voltage_v_.store(0.0);
-  stopping_.store(true);
-  ring();
+  if (!stopping_.exchange(true)) ring();
+  if (!roles_.output) return at_zero_volts();
+  StopReport report;
+  report.zero_confirmed = zero_confirmed_.load(std::memory_order_acquire);
+  report.read_back = read_back_.load(std::memory_order_relaxed);
+  report.disabled = disabled_.load(std::memory_order_relaxed);
+  report.watchdog_s = rig_.modbus->watchdog ? rig_.modbus->watchdog->time_s : 0.0;
+  report.fault = stop_fault_.load(std::memory_order_relaxed);
+  report.exception = stop_exception_.load(std::memory_order_relaxed);
+  return report;
+}
+
+/// True as long as zero volts is to be tried for.
+bool ModbusTransport::stop_is_due() const noexcept {
+  return stopping_.load() && roles_.output && !stop_sequence_.report().done();
 }
 
 void ModbusTransport::serve() noexcept {
   for (;;) {
     const std::uint32_t rung = doorbell_.load(std::memory_order_acquire);
-    if (stopping_.load() && !stop_served_) serve_stop();
+    if (stop_is_due() && now_ns() >= stop_sequence_.next_ns()) serve_stop();
     if (write_wanted_.load(std::memory_order_acquire) != write_served_) serve_write();
     const std::uint32_t wanted = read_wanted_.load(std::memory_order_acquire);
     if (wanted != read_served_) serve_read(wanted);
-    if (ending_.load()) break;
-    wait_while(doorbell_, rung, now_ns() + ns_per_s);
+    if (ending_.load()) {
+      // Whoever wanted to know has asked by now.
+      const auto patience_ns = static_cast<std::int64_t>(1e9 * rig_.watchdog_s);
+      if (!stop_is_due() || now_ns() > stop_begun_ns_ + patience_ns) break;
+    }
+    wait_while(doorbell_, rung, stop_is_due() ? stop_sequence_.next_ns() : now_ns() + ns_per_s);
   }
   link_.close();
+}
+
+bool ModbusTransport::voltage_is_fresh() const noexcept {
+  return now_ns() - commanded_ns_.load(std::memory_order_acquire) <= freshness_ns_;
+}
+
+/// What an exchange may carry that was not asked for to write.
+double ModbusTransport::fresh_voltage_v() const noexcept {
+  return voltage_is_fresh() ? voltage_v_.load() : 0.0;
+}
+
+/// Keeps the number of an exception for whoever names the fault.
+RigFault ModbusTransport::noted(RigFault fault) noexcept {
+  if (fault != RigFault::none) exception_.store(link_.last_exception(), std::memory_order_relaxed);
+  return fault;
 }
 
 /// Connected, in step, and the device is the one we programmed; or why not. One attempt at most.
@@ -211,10 +298,11 @@ RigFault ModbusTransport::ready() noexcept {
   }
   if (!link_.in_step()) {
     verified_ = false;
-    if (const RigFault fault = link_.resynchronise(voltage_v_.load()); fault != RigFault::none) return fault;
+    if (const RigFault fault = link_.resynchronise(fresh_voltage_v()); fault != RigFault::none)
+      return noted(fault);
   }
   if (!verified_) {
-    const RigFault fault = certain(verify(), checks_refused_in_a_row_);
+    const RigFault fault = certain(noted(verify()), checks_refused_in_a_row_);
     if (fault != RigFault::none) return fault;
     verified_ = true;
     ++recoveries_;
@@ -261,7 +349,7 @@ void ModbusTransport::serve_read(std::uint32_t number) noexcept {
   if (answer.fault == RigFault::none) {
     DeviceReading reading;
     const std::int64_t asked_ns = now_ns();
-    answer.fault = certain(link_.read(voltage_v_.load(), reading), reads_refused_in_a_row_);
+    answer.fault = certain(noted(link_.read(fresh_voltage_v(), reading)), reads_refused_in_a_row_);
     answer.time_ns = asked_ns + (now_ns() - asked_ns) / 2;
     if (answer.fault == RigFault::none) answer.fault = same_device(reading);
     if (answer.fault == RigFault::none) {
@@ -281,32 +369,30 @@ void ModbusTransport::serve_read(std::uint32_t number) noexcept {
 void ModbusTransport::serve_write() noexcept {
   write_served_ = write_wanted_.load(std::memory_order_acquire);
   RigFault fault = ready();
-  if (fault == RigFault::none && !stopping_.load()) {
-    fault = link_.write_voltage(voltage_v_.load());
-    if (fault == RigFault::none && !enabled_ && rig_.modbus->enable_address) {
-      fault = link_.write_register(*rig_.modbus->enable_address, 1);
-      enabled_ = fault == RigFault::none;
-    }
-    fault = certain(fault, writes_refused_in_a_row_);
-  }
+  if (fault == RigFault::none && !stopping_.load()) fault = send_voltage();
   write_fault_.store(fault, std::memory_order_relaxed);
 }
 
-/// Zero volts and the amplifier off, tried for as long as the watchdog would take; a device that cannot be
-/// reached by then has its own.
-void ModbusTransport::serve_stop() noexcept {
-  stop_served_ = true;
-  const std::int64_t until_ns = now_ns() + static_cast<std::int64_t>(rig_.watchdog_s * 1e9);
-  for (;;) {
-    RigFault fault = link_.connected() ? RigFault::none : link_.connect(connect_patience_s);
-    if (fault == RigFault::none && !link_.in_step()) fault = link_.resynchronise(0.0);
-    if (fault == RigFault::none && writes_) fault = link_.write_voltage(0.0);
-    if (fault == RigFault::none && rig_.modbus->enable_address)
-      fault = link_.write_register(*rig_.modbus->enable_address, 0);
-    if (fault == RigFault::none || now_ns() > until_ns) return;
-    timespec pause{0, first_pause_ns};
-    nanosleep(&pause, nullptr);
+/// The voltage that was asked for, unless it has become old on the way.
+RigFault ModbusTransport::send_voltage() noexcept {
+  if (!voltage_is_fresh()) return RigFault::link_timeout;
+  RigFault fault = noted(link_.write_voltage(voltage_v_.load()));
+  if (fault == RigFault::none && !enabled_ && rig_.modbus->enable_address) {
+    fault = noted(link_.write_register(*rig_.modbus->enable_address, 1));
+    enabled_ = fault == RigFault::none;
   }
+  return certain(fault, writes_refused_in_a_row_);
+}
+
+void ModbusTransport::serve_stop() noexcept {
+  if (stop_begun_ns_ == 0) stop_begun_ns_ = now_ns();
+  stop_sequence_.attempt();
+  const StopReport& report = stop_sequence_.report();
+  stop_fault_.store(report.fault, std::memory_order_relaxed);
+  stop_exception_.store(report.exception, std::memory_order_relaxed);
+  read_back_.store(report.read_back, std::memory_order_relaxed);
+  disabled_.store(report.disabled, std::memory_order_relaxed);
+  zero_confirmed_.store(report.zero_confirmed, std::memory_order_release);
 }
 
 }  // namespace upright

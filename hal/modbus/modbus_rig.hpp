@@ -5,7 +5,9 @@
 // computed, at once. So a row's voltage acts right after its reading, as the interface says, and not one
 // period later, which is what a single exchange per period would mean. With function 0x17 both exchanges
 // carry both directions: that of read() repeats the voltage that is already on, which also keeps the device's
-// watchdog fed when a write was lost.
+// watchdog fed when a write was lost. A voltage is meant for one period: one that has been on for longer than
+// `freshness_periods` is not sent any more, the exchange of read() then carries zero volts until a fresh one
+// is there.
 //
 // In a joined rig the device has a part of this only. As encoders it is never sent a voltage but zero, and
 // with separate exchanges none at all; as output its readings have no counts and show that it answers.
@@ -16,6 +18,7 @@
 
 #include "../rig_lock.hpp"
 #include "link.hpp"
+#include "stop_sequence.hpp"
 #include "upright/hal/rig.hpp"
 
 namespace upright {
@@ -30,14 +33,22 @@ class ModbusTransport final : public Rig {
   void open() override;
   RigReading read() noexcept override;
   RigFault write(double voltage_v) noexcept override;
-  void stop() noexcept override;
+  /// The thread tries from now on (stop_sequence.hpp) until it is done, or until the rig is destroyed.
+  StopReport stop() noexcept override;
+  int last_exception() const noexcept override { return exception_.load(std::memory_order_relaxed); }
 
  private:
   void end_thread() noexcept;
   void serve() noexcept;
   void serve_read(std::uint32_t number) noexcept;
   void serve_write() noexcept;
+  RigFault send_voltage() noexcept;
   void serve_stop() noexcept;
+  bool stop_is_due() const noexcept;
+  double fresh_voltage_v() const noexcept;
+  bool voltage_is_fresh() const noexcept;
+  bool offers_read_back();
+  RigFault noted(RigFault fault) noexcept;
   RigFault ready() noexcept;
   RigFault other_device(int& in_a_row) noexcept;
   static RigFault certain(RigFault fault, int& refusals_in_a_row) noexcept;
@@ -45,13 +56,19 @@ class ModbusTransport final : public Rig {
   RigFault same_device(const DeviceReading& reading) noexcept;
   void ring() noexcept;
   [[noreturn]] void fail(RigFault fault, const std::string& doing);
+  template <class Exchange>
+  void retried(Exchange exchange, const std::string& doing);
+  void prepare_device();
+  void begin_serving();
 
   RigFile rig_;
   RigRoles roles_;
   bool writes_;  // a voltage, be it always zero
   RigLock lock_;
   std::int64_t patience_ns_;  // how long read() waits at most
+  std::int64_t freshness_ns_;
   ModbusLink link_;
+  StopSequence stop_sequence_;  // the thread's
   std::thread thread_;
 
   // From the loop to the thread.
@@ -59,6 +76,7 @@ class ModbusTransport final : public Rig {
   std::atomic<std::uint32_t> read_wanted_{0};
   std::atomic<std::uint32_t> write_wanted_{0};
   std::atomic<double> voltage_v_{0.0};
+  std::atomic<std::int64_t> commanded_ns_{0};  // set after `voltage_v_`: too old rather than too new
   std::atomic<bool> stopping_{false};
   std::atomic<bool> ending_{false};
   // From the thread to the loop. `reading_` is written before `answered_` is, and only for a request not yet
@@ -66,13 +84,19 @@ class ModbusTransport final : public Rig {
   std::atomic<std::uint32_t> answered_{0};
   RigReading reading_;
   std::atomic<RigFault> write_fault_{RigFault::none};
+  std::atomic<int> exception_{0};
+  // What is known of the stop; `zero_confirmed_` is set last.
+  std::atomic<bool> zero_confirmed_{false}, read_back_{false}, disabled_{false};
+  std::atomic<RigFault> stop_fault_{RigFault::none};
+  std::atomic<int> stop_exception_{0};
 
   // The thread's own.
   std::uint32_t read_served_ = 0, write_served_ = 0;
-  bool stop_served_ = false;
+  std::int64_t stop_begun_ns_ = 0;
   bool enabled_ = false;
   bool restarted_ = false;
   bool verified_ = false;
+  bool reads_back_ = false;
   int boot_count_ = 0;
   int other_boots_in_a_row_ = 0, other_watchdogs_in_a_row_ = 0;
   int checks_refused_in_a_row_ = 0, reads_refused_in_a_row_ = 0, writes_refused_in_a_row_ = 0;

@@ -93,8 +93,14 @@ class SimulatedPlantRig final : public SimulatedRigWithHand {
     return std::isfinite(voltage_v) ? RigFault::none : RigFault::not_finite;
   }
 
-  void stop() noexcept override {
+  StopReport stop() noexcept override {
     if (!held_) write(0.0);
+    return at_zero_volts();
+  }
+
+  std::uint64_t steps_taken() const noexcept override {
+    constexpr std::uint64_t steps_per_event = 20;
+    return simulator_->engine().step_count() + steps_per_event * simulator_->engine().event_count();
   }
 
  private:
@@ -136,13 +142,13 @@ Plant handled(Plant plant, const Hand& hand) {
 
 std::unique_ptr<SimulatedRigWithHand> make_simulated_rig(const RigFile& rig, const Plant& plant, Clock& clock,
                                                          const SimulatedRigOptions& options) {
-  if (!rig.simulated) throw ConfigError("add the section simulated: " + rig.file.string() + " has none");
+  if (!rig.simulated) throw ConfigError(rig.file.string() + ":1: the section simulated is missing: add it");
   return std::make_unique<SimulatedPlantRig>(rig, plant, clock, options);
 }
 
 std::unique_ptr<SimulatedRigWithHand> make_simulated_rig(const RigFile& rig, Clock& clock,
                                                          const SimulatedRigOptions& options) {
-  if (!rig.simulated) throw ConfigError("add the section simulated: " + rig.file.string() + " has none");
+  if (!rig.simulated) throw ConfigError(rig.file.string() + ":1: the section simulated is missing: add it");
   return make_simulated_rig(rig, read_plant_file(rig.simulated->plant), clock, options);
 }
 

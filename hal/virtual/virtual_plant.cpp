@@ -35,7 +35,7 @@ VirtualPlant::VirtualPlant(const RigFile& rig, const Plant& plant, const Virtual
   if (options.trace.empty()) return;
   trace_.open(options.trace);
   if (!trace_)
-    throw ConfigError("check the folder and its permissions: cannot write " + options.trace.string());
+    throw ConfigError("cannot write " + options.trace.string() + ": check the folder and its permissions");
   trace_ << "monotonic_s,voltage_v,cart_m,theta_rad,held\n";
 }
 

@@ -83,6 +83,18 @@ DataRange range_of(const std::vector<Measurement>& runs, const Plant& plant) {
   return range;
 }
 
+bool moves_enough(const std::vector<Measurement>& runs) {
+  constexpr double least_steps = 30.0;
+  const auto range = [](const std::vector<double>& values) {
+    const auto [low, high] = std::minmax_element(values.begin(), values.end());
+    return values.empty() ? 0.0 : *high - *low;
+  };
+  return std::any_of(runs.begin(), runs.end(), [&](const Measurement& run) {
+    return range(run.cart_m) > least_steps * std::sqrt(12.0) * run.cart_noise_m() ||
+           range(run.theta_rad) > least_steps * std::sqrt(12.0) * run.theta_noise_rad();
+  });
+}
+
 std::vector<FreeParameter> free_parameters(std::size_t effect, const DataRange& range) {
   const EffectInfo& info = effect_registry()[effect];
   std::vector<FreeParameter> free;
@@ -208,15 +220,20 @@ std::vector<std::size_t> candidate_effects(const Plant& plant, const DataRange& 
 
 namespace {
 
+/// As many as 5 m of track need down to a pitch of 1 mm. Over a longer one (or in another unit) the shortest
+/// pitches are not looked for: the time that would take grows with the travel without end.
+constexpr double most_frequencies = 20000.0;
+
 /// Pitches at which a sine over the track explains most of the residual force: a periodogram over x.
 std::vector<std::vector<double>> cogging_starts(const std::vector<std::pair<double, double>>& force_residual,
                                                 const DataRange& range) {
   std::vector<std::pair<double, std::vector<double>>> found;
   const double travel = range.cart_high_m - range.cart_low_m;
   if (force_residual.size() < 50 || travel <= 0.0) return {{0.3, 0.02, 0.0}};
-  const double smallest = 0.001, largest = longest_pitch_m(range);
+  const double largest = longest_pitch_m(range);
   // Frequencies over the track one half-cycle apart, so that no crest is missed.
   const double spacing = 0.25 / travel;
+  const double smallest = std::max(0.001, 1.0 / (1.0 / largest + most_frequencies * spacing));
   for (double f = 1.0 / largest; f <= 1.0 / smallest; f += spacing) {
     double ss = 0.0, sc = 0.0, cc = 0.0, sy = 0.0, cy = 0.0, s1 = 0.0, c1 = 0.0, y1 = 0.0;
     for (const auto& [x, y] : force_residual) {

@@ -36,8 +36,8 @@ MatrixXd krylov_basis(const MatrixXd& a, const VectorXd& b) {
 }
 
 [[noreturn]] void refuse(const LinearPlant& linear, const std::string& why) {
-  throw ConfigError("correct the plant: " + why + " (the matrix pair (A, b) is not stabilizable), " +
-                    matrix_text("A", linear.a) + ", " + matrix_text("b", linear.b));
+  throw ConfigError(why + " (the matrix pair (A, b) is not stabilizable), " + matrix_text("A", linear.a) +
+                    ", " + matrix_text("b", linear.b) + ": correct the plant");
 }
 
 std::string short_number(double value) {

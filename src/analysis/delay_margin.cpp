@@ -11,7 +11,9 @@
 #include "upright/analysis/controllable_part.hpp"
 #include "upright/analysis/dense_algebra.hpp"
 #include "upright/analysis/linear_sampled_loop.hpp"
+#include "upright/control/kalman_filter.hpp"
 #include "upright/model/error.hpp"
+#include "upright/model/plant_file.hpp"
 
 namespace upright {
 
@@ -118,12 +120,48 @@ std::vector<double> unit_gain_frequencies(const DelayedFeedback& loop, const Loo
   return frequencies;
 }
 
+/// The loop behind the filter as it is without a period: that of a rate at which the period no longer shows,
+/// with the same density of measurement noise.
+DelayedFeedback with_state_estimator(const DelayedFeedback& plant, const LinearPlant& linear,
+                                     const ControlConfig& config) {
+  constexpr double finer = 64.0;
+  ControlConfig fine = config;
+  fine.sample_rate_hz *= finer;
+  StateEstimatorConfig& estimator = fine.state_estimator;
+  const Plant file = read_plant_file(estimator.plant);
+  const Resolution steps = resolution_of(estimator);
+  estimator.cart_resolution_m = steps.cart_m * std::sqrt(finer);
+  estimator.angle_resolution_rad = steps.angle_rad * std::sqrt(finer);
+  const ContinuousModel model = continuous_model(file);
+  const KalmanFilter::Linear filter = KalmanFilter(fine, file).linear();
+  const std::vector<Index>& at = filter.present;
+  const Index n = plant.a.rows(), count = static_cast<Index>(at.size()), all = n + count;
+  const MatrixXd gain = filter.gain(at, Eigen::all) * fine.sample_rate_hz;
+  const MatrixXd shows = linear.sensor_scale.head<2>().asDiagonal();
+  const MatrixXd believes = model.sensor_scale.asDiagonal() * shown_positions()(Eigen::all, at);
+  DelayedFeedback loop{MatrixXd::Zero(all, all), Eigen::VectorXd(all), Eigen::RowVectorXd::Zero(all)};
+  loop.a.topLeftCorner(n, n) = plant.a;
+  loop.a.block(n, 0, count, 2) = gain * shows;
+  loop.a.bottomRightCorner(count, count) = MatrixXd(model.a(at, at)) - gain * believes;
+  loop.b << plant.b, FilterVector(model.b * model.actuator_slope)(at);
+  const Gains& k = config.gains;
+  const Eigen::RowVector4d gains(k.cart_position_v_per_m, k.pendulum_angle_v_per_rad,
+                                 k.cart_velocity_v_per_mps, k.pendulum_rate_v_per_radps);
+  Eigen::Matrix<double, 1, filter_states> fed_back = gains * filter.fed_back;
+  fed_back(filter_cart_force) = filter.rejecting_v_per_n;
+  loop.k.tail(count) = fed_back(Eigen::all, at);
+  return loop;
+}
+
 }  // namespace
 
-LoopMargin continuous_margin(const Plant& plant, const Gains& gains, double smoothing) {
+LoopMargin continuous_margin(const Plant& plant, const ControlConfig& config, double smoothing) {
   const LinearPlant linear = linearize(plant, smoothing);
   const ControllablePart part = controllable_part(linear);
-  const DelayedFeedback loop{part.a, part.b * linear.actuator_slope, feedback_of(linear, part, gains)};
+  const DelayedFeedback states{part.a, part.b * linear.actuator_slope,
+                               feedback_of(linear, part, config.gains)};
+  const DelayedFeedback loop =
+      config.has_state_estimator() ? with_state_estimator(states, linear, config) : states;
   const LoopGain gain = [&](double w) { return transfer(loop, Complex(0.0, w)); };
   LoopMargin margin;
   margin.root_without_delay = rightmost_root(loop, linear.input_delay_s);
@@ -135,6 +173,12 @@ LoopMargin continuous_margin(const Plant& plant, const Gains& gains, double smoo
   confirm_by_roots(margin,
                    [&](double delay_s) { return rightmost_root(loop, delay_s + linear.input_delay_s); });
   return margin;
+}
+
+LoopMargin continuous_margin(const Plant& plant, const Gains& gains, double smoothing) {
+  ControlConfig config;
+  config.gains = gains;
+  return continuous_margin(plant, config, smoothing);
 }
 
 namespace {
@@ -183,8 +227,9 @@ Crossing sampled_crossing(const LinearSampledLoop& loop, std::pair<double, doubl
 
 }  // namespace
 
-LoopMargin sampled_margin(const Plant& plant, const ControlConfig& config, double smoothing, bool confirm) {
-  const LinearSampledLoop loop(plant, config, smoothing);
+LoopMargin sampled_margin(const Plant& plant, const ControlConfig& config, double smoothing, bool confirm,
+                          ExtraDelay extra) {
+  const LinearSampledLoop loop(plant, config, smoothing, extra);
   LoopMargin margin;
   margin.root_without_delay = loop.rightmost_root(0.0);
   margin.stable_without_delay = margin.root_without_delay.real() < -on_the_boundary_per_s;
@@ -192,12 +237,13 @@ LoopMargin sampled_margin(const Plant& plant, const ControlConfig& config, doubl
   for (const auto& bracket : brackets(gain, std::numbers::pi / loop.period_s()))
     margin.crossings.push_back(sampled_crossing(loop, bracket));
   choose_critical(margin);
-  if (confirm) confirm_by_roots(margin, [&](double delay_s) { return loop.rightmost_root(delay_s); });
-  for (Crossing& crossing : margin.crossings) crossing.delay_s += loop.compensated_delay_s();
-  if (margin.stable_without_delay) margin.critical_delay_s += loop.compensated_delay_s();
+  if (confirm && loop.has_roots(margin.critical_delay_s * (1.0 + aside)))
+    confirm_by_roots(margin, [&](double delay_s) { return loop.rightmost_root(delay_s); });
+  for (Crossing& crossing : margin.crossings) crossing.delay_s += loop.base_delay_s();
+  if (margin.stable_without_delay) margin.critical_delay_s += loop.base_delay_s();
   if (margin.confirmation) {
-    margin.confirmation->below_s += loop.compensated_delay_s();
-    margin.confirmation->above_s += loop.compensated_delay_s();
+    margin.confirmation->below_s += loop.base_delay_s();
+    margin.confirmation->above_s += loop.base_delay_s();
   }
   return margin;
 }
@@ -207,37 +253,54 @@ namespace {
 std::string sentence_for(const OverrunTolerance& tolerance, const ControlConfig& config) {
   char text[240];
   const double delay_ms = 1e3 * config.delay_s;
-  const char* friction =
-      tolerance.sliding ? "while the cart slides" : "near rest, with dry friction smoothed";
-  if (tolerance.extra_delay_s <= 0.0)
+  if (!tolerance.stabilized)
+    std::snprintf(text, sizeof text, "the gains do not stabilize the plant, even without delay");
+  else if (tolerance.exceeded() && tolerance.critical_delay_s <= 0.0)
     std::snprintf(text, sizeof text,
-                  "the gains do not stabilize the plant at %.4g ms delay: expect oscillation or a fall",
+                  "none is left: the delay is %.4g ms, more than the gains bear while the cart slides",
                   delay_ms);
+  else if (tolerance.exceeded())
+    std::snprintf(text, sizeof text,
+                  "none is left: the delay is %.4g ms, and the gains bear %.3g ms while the cart slides",
+                  delay_ms, 1e3 * tolerance.critical_delay_s);
   else if (!std::isfinite(tolerance.extra_delay_s))
-    std::snprintf(text, sizeof text, "beyond the configured %.4g ms the gains tolerate any delay %s",
-                  delay_ms, friction);
+    std::snprintf(text, sizeof text,
+                  "beyond the configured %.4g ms the gains tolerate any delay while the cart slides",
+                  delay_ms);
   else
-    std::snprintf(
-        text, sizeof text,
-        "beyond the configured %.4g ms the gains tolerate %.3g ms more, %d consecutive missed period%s (%s)",
-        delay_ms, 1e3 * tolerance.extra_delay_s, tolerance.missed_periods,
-        tolerance.missed_periods == 1 ? "" : "s", friction);
+    std::snprintf(text, sizeof text,
+                  "beyond the configured %.4g ms the gains tolerate %.3g ms more, %d consecutive missed "
+                  "period%s (while the cart slides)",
+                  delay_ms, 1e3 * tolerance.extra_delay_s, tolerance.missed_periods,
+                  tolerance.missed_periods == 1 ? "" : "s");
   return text;
 }
 
-double extra_delay(const Plant& plant, const ControlConfig& config, double smoothing) {
-  const LoopMargin margin = sampled_margin(plant, config, smoothing, false);
-  return margin.stable_without_delay ? std::max(0.0, margin.critical_delay_s - config.delay_s) : 0.0;
+/// Without delay in the gain file, and without one in the plant: a delay that is too long is no fault of the
+/// gains, whichever side of the loop it is on.
+bool stable_without_delay(Plant plant, ControlConfig config, double smoothing) {
+  plant.remove(effect_number("input_delay"));
+  config.delay_s = 0.0;
+  return sampled_margin(plant, config, smoothing, false).stable_without_delay;
 }
 
 }  // namespace
 
-OverrunTolerance overrun_tolerance(const Plant& plant, const ControlConfig& config, double smoothing) {
+Plant large_motion_plant(const Plant& plant) {
+  Plant large = sliding_plant(plant);
+  large.remove(effect_number("cogging_force"));
+  return large;
+}
+
+OverrunTolerance overrun_tolerance(const Plant& plant, const ControlConfig& config) {
+  constexpr double any_smoothing = 100.0;  // there is no dry friction left to smooth
+  const Plant large = large_motion_plant(plant);
+  const LoopMargin margin = sampled_margin(large, config, any_smoothing, false);
   OverrunTolerance tolerance;
-  tolerance.extra_delay_s = extra_delay(sliding_plant(plant), config, smoothing);
-  if (tolerance.extra_delay_s <= 0.0) {
-    tolerance.sliding = false;
-    tolerance.extra_delay_s = extra_delay(plant, config, smoothing);
+  tolerance.stabilized = margin.stable_without_delay || stable_without_delay(large, config, any_smoothing);
+  if (margin.stable_without_delay) {
+    tolerance.critical_delay_s = margin.critical_delay_s;
+    tolerance.extra_delay_s = std::max(0.0, margin.critical_delay_s - config.delay_s);
   }
   constexpr double most_periods = 1e6;
   const double periods = std::min(most_periods, tolerance.extra_delay_s / config.period_s());

@@ -6,14 +6,14 @@
 #include <sstream>
 #include <tuple>
 
+#include "upright/analysis/adequacy.hpp"
 #include "upright/analysis/confusable.hpp"
 #include "upright/analysis/growth.hpp"
 #include "upright/analysis/held_out.hpp"
 #include "upright/analysis/next_experiment.hpp"
-#include "upright/analysis/noise_floor.hpp"
+#include "upright/analysis/parallel.hpp"
 #include "upright/analysis/residual.hpp"
 #include "upright/analysis/search.hpp"
-#include "upright/analysis/structure.hpp"
 #include "upright/model/error.hpp"
 
 namespace upright {
@@ -35,16 +35,26 @@ class Diagnostician {
         runs_(runs),
         options_(options),
         data_(checked(split(runs, which))),
-        search_(plant_, runs_, data_.train, data_.held),
+        work_samples_(options.search_bound * samples_of(data_)),
+        bound_(work_samples_),
+        search_(plant_, runs_, bounded(data_.train), bounded(data_.held)),
         growth_(search_, options, result_) {}
 
   Diagnosis run() {
-    growth_.find();
-    ResidualStructure left = settle();
-    if (left.structured && growth_.begin_anew()) left = settle();
-    if (left.structured && growth_.find_pairs_of_all()) left = settle();
-    if (left.beyond_sensors && growth_.find_thoroughly(left.structured)) left = settle();
-    conclude(left);
+    try {
+      growth_.begin();
+      growth_.find();
+      ResidualStructure left = settle();
+      if (left.structured && growth_.begin_anew()) left = settle();
+      if (left.structured && growth_.find_pairs_of_all()) left = settle();
+      if (left.beyond_sensors && growth_.find_thoroughly(left.structured)) left = settle();
+      conclude(left);
+    } catch (const Interrupted&) {
+      result_.interrupted = true;
+    } catch (const BoundReached&) {
+      examine_what_was_found();
+    }
+    if (!decided_) report_so_far();
     return std::move(result_);
   }
   /// Whether an effect was found that the plant file lacks, not only numbers of it that are off.
@@ -55,25 +65,87 @@ class Diagnostician {
   /// Of what is unexplained: whether held-out runs excite what is missing still, and the others do not. They
   /// alone show it, or spoke to the end against what the others show beyond doubt.
   bool lacks_what_was_held_out() const {
-    return growth_.contradicted() || !examine(data_.train, final_.train.point).structured;
+    return growth_.contradicted() || !examine_fit(data_.train, final_.train.point).structured;
   }
 
  private:
   static DataSplit checked(DataSplit data) {
     if (data.train.segments.empty())
-      throw ConfigError("record longer runs: no stretch of the data is long enough to simulate");
+      throw ConfigError("no stretch of the data is long enough to simulate: record longer runs");
     return data;
+  }
+
+  const FitData& bounded(FitData& data) {
+    data.bound = &bound_;
+    return data;
+  }
+
+  static double samples_of(const DataSplit& data) {
+    double samples = 0.0;
+    for (const FitData* part : {&data.train, &data.held})
+      for (const Segment& s : part->segments) samples += static_cast<double>(s.last - s.first + 1);
+    return samples;
+  }
+
+  /// After the bound ended the search: what it found is examined as if it had ended by itself, within a bound
+  /// of its own.
+  void examine_what_was_found() {
+    result_.bound_reached = true;
+    if (decided_) return;
+    constexpr double share = 0.25;  // of the search's bound: examining takes about a tenth of a usual search
+    bound_.grant(share * work_samples_);
+    try {
+      conclude(settle());
+    } catch (const Interrupted&) {
+      result_.interrupted = true;
+    } catch (const BoundReached&) {
+      // What is known until here is reported.
+    }
+  }
+
+  /// What a search that was given up has found, unexamined: nothing is claimed of it.
+  void report_so_far() {
+    constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
+    const Hypothesis& h = growth_.current();
+    const auto known_gap = [&](const Hypothesis& of) { return of.simulation ? of.simulation->gap : unknown; };
+    note_runs();
+    result_.examined = false;
+    for (const std::size_t effect : growth_.found()) {
+      FoundEffect found;
+      found.effect = effect;
+      found.gap_before = found.gap_after = unknown;
+      found.parameters = estimates_of(effect, h);
+      found.where = growth_.where(effect);
+      result_.effects.push_back(found);
+    }
+    for (CandidateScore& candidate : result_.candidates) candidate.gap_after = unknown;
+    result_.gap_before = known_gap(growth_.given());
+    result_.gap_after = known_gap(h);
+    result_.noise = h.train.point.noise;
+    result_.model = growth_.found().empty() ? plant_ : model_with(growth_.found(), h.train.point.plant);
+    result_.residual = "not examined: the search was not finished";
+    result_.verdict = moves_enough(runs_) ? Verdict::unexplained : Verdict::not_excited;
+  }
+
+  /// Begins the account of what was found.
+  void note_runs() {
+    result_.notes.clear();
+    result_.effects.clear();
+    for (const Measurement& run : runs_)
+      result_.notes.insert(result_.notes.end(), run.notes.begin(), run.notes.end());
+    if (runs_.size() == 1) result_.notes.push_back("one run only: a third of its segments is held out");
+    result_.held_out_runs = data_.held_out_runs;
   }
 
   /// Settles the corrections, and looks at what is left.
   ResidualStructure settle() {
     settle_corrections();
     options_.tell(0.92, "measuring the gap");
-    FitData all{&runs_, data_.train.segments};
+    FitData all = data_.train;
     all.segments.insert(all.segments.end(), data_.held.segments.begin(), data_.held.segments.end());
     // At what all runs say, so that what few training runs left uncertain is not taken for something missing.
-    ResidualStructure left = examine(all, known_.train.point);
-    if (!left.structured) compare_held_out(left);
+    ResidualStructure left = examine_fit(all, known_.train.point);
+    if (!left.structured) compare_held_out(search_, final_, left);
     if (!left.structured) doubt_what_cannot_be(left);
     return left;
   }
@@ -187,17 +259,14 @@ class Diagnostician {
 
   void conclude(const ResidualStructure& structure) {
     options_.tell(0.93, "measuring the gap");
-    for (const Measurement& run : runs_)
-      result_.notes.insert(result_.notes.end(), run.notes.begin(), run.notes.end());
-    if (runs_.size() == 1) result_.notes.push_back("one run only: a third of its segments is held out");
-    result_.held_out_runs = data_.held_out_runs;
+    note_runs();
     result_.noise = known_.train.point.noise;
     const std::vector<std::size_t> all = all_found();
     const Noise& fitted_noise = final_.train.point.noise;
     const Noise quiet = sensors_only(final_.train.point.noise);
     // Of what is left but cannot be told from noise, the floor is what such noise makes; else the sensors
     // alone.
-    const double floor = structure.structured ? 1.0 : floor_of(final_, structure).usual;
+    const double floor = structure.structured ? 1.0 : held_out_floor(search_, final_, structure).usual;
     const auto gap_with = [&](const std::vector<std::size_t>& effects, const Hypothesis& from, bool settled) {
       Hypothesis h = search_.only(effects, from, &fitted_noise, settled);
       search_.judge(h, quiet);
@@ -217,7 +286,7 @@ class Diagnostician {
     }
     result_.gap_after = gap;
     result_.residual = structure.sentence;
-    result_.model = final_model();
+    result_.model = all.empty() ? plant_ : model_with(all, known_.train.point.plant);
     for (auto& candidate : result_.candidates) {
       candidate.gap_after = result_.gap_before;
       for (auto& [effect, h] : growth_.finalists()) {
@@ -234,13 +303,6 @@ class Diagnostician {
     find_confusable();
   }
 
-  SimulationFloor floor_of(const Hypothesis& h, const ResidualStructure& structure) const {
-    if (data_.held.segments.empty()) return {};
-    FitPoint point = h.held.point;
-    point.noise = as_slow_as_left(h.train.point.noise, structure);
-    return simulation_floor(data_.held, point);
-  }
-
   void trace_residuals() {
     if (data_.held.segments.empty()) return;
     const Noise noise = final_.train.point.noise;
@@ -248,35 +310,6 @@ class Diagnostician {
     Hypothesis as_given = search_.only({}, final_, &noise);
     search_.judge(as_given, noise);
     result_.residual_before = smooth_residuals(data_.held, as_given.held.point);
-  }
-
-  static ResidualStructure examine(const FitData& data, const FitPoint& fitted) {
-    ResidualStructure structure = examine_residuals(data, fitted);
-    FitPoint point = fitted;
-    point.noise = sensors_only(fitted.noise);
-    const FitResult plain = follow(data, point);
-    structure.noise_ratio = whitened_rms(plain);
-    point = plain.point;
-    point.noise = as_slow_as_left(fitted.noise, structure);
-    structure.excess = structure.noise_ratio / simulation_floor(data, point).highest;
-    judge_structure(structure);
-    return structure;
-  }
-
-  /// What is left of the training runs must account for the held-out runs too, with the parameters anywhere
-  /// that the training runs leave open. What is left need not be such noise: all runs together may be further
-  /// off than such noise makes them, and held-out ones by as much again.
-  void compare_held_out(ResidualStructure& structure) {
-    if (data_.held.segments.empty()) return;
-    Hypothesis told = search_.told(final_);
-    const double excess = search_.simulate(told).gap / floor_of(told, structure).highest;
-    if (!(excess > most_excess * std::max(1.0, structure.excess))) return;
-    structure.structured = true;
-    std::ostringstream text;
-    text.precision(3);
-    text << "a plain simulation of held-out runs is " << excess
-         << " times as far off as noise like what is left of the others makes it at most";
-    structure.sentence = text.str();
   }
 
   /// A scale at the end of what it may be stands for something else.
@@ -326,11 +359,8 @@ class Diagnostician {
 
   /// The plant file with the effects added. What moved within what is believed of it goes into the numbers
   /// that were there.
-  Plant final_model() {
+  Plant model_with(const std::vector<std::size_t>& all, const Plant& fitted) const {
     Plant model = plant_;
-    const std::vector<std::size_t> all = all_found();
-    if (all.empty()) return model;
-    const Plant& fitted = known_.train.point.plant;
     for (const std::size_t effect : search_.nuisances()) {
       if (std::find(all.begin(), all.end(), effect) != all.end()) continue;
       if (plant_.find(effect) != nullptr) {
@@ -358,27 +388,21 @@ class Diagnostician {
   }
 
   void decide(const ResidualStructure& structure) {
-    if (structure.structured) {
+    // What held-out data show of an effect that they hardly excite may be so much chance.
+    constexpr double chance = 0.01;
+    const bool worse = result_.gap_after > (1.0 + chance) * result_.gap_before;
+    if (worse)
+      result_.notes.emplace_back(
+          "what was found takes held-out data further from the model, so it explains nothing: check the "
+          "data and the plant file first");
+    if (structure.structured || worse) {
       result_.verdict = Verdict::unexplained;
     } else if (!result_.effects.empty()) {
       result_.verdict = Verdict::explained;
     } else {
-      result_.verdict = moved() ? Verdict::no_discrepancy : Verdict::not_excited;
+      result_.verdict = moves_enough(runs_) ? Verdict::no_discrepancy : Verdict::not_excited;
     }
-  }
-
-  /// Whether anything moved far enough to show an effect: well beyond the sensors' steps.
-  bool moved() const {
-    constexpr double least_steps = 30.0;
-    for (const Measurement& run : runs_) {
-      const auto range = [](const std::vector<double>& values) {
-        const auto [low, high] = std::minmax_element(values.begin(), values.end());
-        return values.empty() ? 0.0 : *high - *low;
-      };
-      if (range(run.cart_m) > least_steps * std::sqrt(12.0) * run.cart_noise_m()) return true;
-      if (range(run.theta_rad) > least_steps * std::sqrt(12.0) * run.theta_noise_rad()) return true;
-    }
-    return false;
+    decided_ = true;
   }
 
   /// Other effects that do as well in the place of one that was found: from sensitivities, or fitted where an
@@ -436,6 +460,9 @@ class Diagnostician {
   const DiagnosisOptions& options_;
   Diagnosis result_;
   DataSplit data_;
+  const double work_samples_;  ///< of the search at most
+  WorkBound bound_;
+  bool decided_ = false;  ///< the verdict stands
   Search search_;
   Growth growth_;
   Hypothesis final_;  ///< fitted to the training runs, judged on the others
@@ -485,7 +512,7 @@ NextBest next_best(const Diagnosis& diagnosis, const FoundEffect& effect) {
 
 Diagnosis diagnose(const Plant& plant, const std::vector<Measurement>& runs,
                    const DiagnosisOptions& options) {
-  if (runs.empty()) throw ConfigError("name at least one run with --data");
+  if (runs.empty()) throw ConfigError("no run was named: name at least one with --data");
   const std::string fault = fault_of(plant);
   if (!fault.empty()) throw ConfigError(fault);
   const bool shared = std::any_of(runs.begin(), runs.end(), [&](const Measurement& run) {
@@ -493,21 +520,32 @@ Diagnosis diagnose(const Plant& plant, const std::vector<Measurement>& runs,
   });
   if (!shared)
     throw ConfigError(
-        "add the pendulum to the plant file: the runs hold theta_rad only, and the model is a cart alone");
+        "the runs hold theta_rad only, and the model is a cart alone: add the pendulum to the plant file");
+  const InterruptibleWork watch(options.signal);
   Diagnostician first(plant, runs, options, HeldOut::middle);
   Diagnosis diagnosis = first.run();
-  if (diagnosis.verdict == Verdict::not_excited) return diagnosis;
-  const bool unexplained = diagnosis.verdict == Verdict::unexplained;
-  // A weak effect may show too little in the runs that are left once one is held out.
-  if (unexplained ? !first.lacks_what_was_held_out() : first.found_what_was_lacking()) return diagnosis;
-  options.tell(0.02, "looking again, with other runs held out");
-  Diagnostician second(plant, runs, options, HeldOut::other);
-  Diagnosis other = second.run();
-  if (other.verdict != Verdict::explained || !(unexplained || second.found_what_was_lacking()))
+  if (diagnosis.verdict == Verdict::not_excited || diagnosis.interrupted || diagnosis.bound_reached)
     return diagnosis;
-  other.notes.emplace_back(
-      "the runs held out at first show what the others alone do not: others were held out instead");
-  return other;
+  const bool unexplained = diagnosis.verdict == Verdict::unexplained;
+  try {
+    // A weak effect may show too little in the runs that are left once one is held out.
+    if (unexplained ? !first.lacks_what_was_held_out() : first.found_what_was_lacking()) return diagnosis;
+    options.tell(0.02, "looking again, with other runs held out");
+    Diagnostician second(plant, runs, options, HeldOut::other);
+    Diagnosis other = second.run();
+    if (other.verdict == Verdict::explained && (unexplained || second.found_what_was_lacking())) {
+      other.notes.emplace_back(
+          "the runs held out at first show what the others alone do not: others were held out instead");
+      return other;
+    }
+    diagnosis.interrupted = other.interrupted;
+    diagnosis.bound_reached = other.bound_reached;
+  } catch (const Interrupted&) {
+    diagnosis.interrupted = true;
+  } catch (const BoundReached&) {
+    diagnosis.bound_reached = true;
+  }
+  return diagnosis;
 }
 
 }  // namespace upright

@@ -89,19 +89,23 @@ json diagnosis_json(const Diagnosis& diagnosis) {
             {"description", diagnosis.next_experiment->description},
             {"file", diagnosis.next_experiment->file},
             {"distance", number(diagnosis.next_experiment->distance)}};
-  return {{"verdict", std::string(name_of(diagnosis.verdict))},
-          {"gap",
-           {{"measure", "held-out simulation error / noise floor"},
-            {"before", number(diagnosis.gap_before)},
-            {"after", number(diagnosis.gap_after)}}},
-          {"effects", effects},
-          {"candidates", candidates},
-          {"next_experiment", next},
-          {"residual", diagnosis.residual},
-          {"noise", noise_json(diagnosis.noise)},
-          {"steps", steps},
-          {"trials", trials},
-          {"notes", diagnosis.notes}};
+  json document = {{"verdict", std::string(name_of(diagnosis.verdict))},
+                   {"gap",
+                    {{"measure", "held-out simulation error / noise floor"},
+                     {"before", number(diagnosis.gap_before)},
+                     {"after", number(diagnosis.gap_after)}}},
+                   {"effects", effects},
+                   {"candidates", candidates},
+                   {"next_experiment", next},
+                   {"residual", diagnosis.residual},
+                   {"noise", noise_json(diagnosis.noise)},
+                   {"steps", steps},
+                   {"trials", trials},
+                   {"notes", diagnosis.notes}};
+  // Of a search that was not finished only.
+  if (diagnosis.interrupted) document["interrupted"] = true;
+  if (diagnosis.bound_reached) document["bound_reached"] = true;
+  return document;
 }
 
 }  // namespace upright

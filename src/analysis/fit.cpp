@@ -570,7 +570,7 @@ class Fitter {
       estimate_noise({4.0, 1.5, 1.15});
       objective = evaluate();
     }
-    for (int round = 0; round < options_.noise_rounds && std::isfinite(objective); ++round) {
+    for (int round = 0; round < options_.noise_rounds && std::isfinite(objective) && may_go_on(); ++round) {
       const double before = objective;
       constexpr double settled = 2.0, no_matter = 0.5;
       const Noise former = point_.noise;
@@ -586,6 +586,7 @@ class Fitter {
       if (round > 0 && before - objective < settled) break;
     }
     result.converged = converged_;
+    result.work_samples = work_samples_;
     finish(result);
     return result;
   }
@@ -600,8 +601,16 @@ class Fitter {
     });
   }
 
+  bool may_go_on() const { return data_.bound == nullptr || !data_.bound->is_reached_with(work_samples_); }
+
+  /// All samples once, whether or not all were looked at: which are may depend on the number of cores.
+  void count_work() {
+    for (const Segment& s : data_.segments) work_samples_ += static_cast<double>(s.last - s.first + 1);
+  }
+
   /// Linearises at the present point; its objective.
   double evaluate() {
+    count_work();
     parallel_for(order_.size(), [&](std::size_t i) { linearise(order_[i]); });
     return likelihood_of_normals() + prior_objective();
   }
@@ -611,6 +620,7 @@ class Fitter {
   /// first from then on.
   double evaluate_step(double promised_fall) {
     constexpr double out_of_reach = 3.0;
+    count_work();
     const std::size_t none = order_.size();
     std::atomic<std::size_t> spoiler = none;
     parallel_for(order_.size(), [&](std::size_t i) {
@@ -643,7 +653,8 @@ class Fitter {
   void descend(double& objective) {
     double damping = least_damping;
     converged_ = false;
-    for (int iteration = 0; iteration < options_.most_iterations && std::isfinite(objective); ++iteration) {
+    for (int iteration = 0; iteration < options_.most_iterations && std::isfinite(objective) && may_go_on();
+         ++iteration) {
       const FitPoint former = point_;
       double next_objective = infinity;
       const double least_fall = options_.tolerance * sample_count() * 0.1 + 0.02;
@@ -952,6 +963,7 @@ class Fitter {
     result.covariance = inverse * (robust_spread(h - prior, spread * small_sample) + prior) * inverse;
     if (!std::isfinite(result.objective)) return;
     const Step further = step(hardly_damped);
+    result.bounded_fall = further.promised_fall;
     if (!further.cut_short) result.promised_fall = further.promised_fall;
   }
 
@@ -963,6 +975,7 @@ class Fitter {
   std::vector<Normal> normals_, former_normals_;
   std::vector<std::size_t> order_;  ///< in which segments are looked at; no result depends on it
   bool converged_ = false;
+  double work_samples_ = 0.0;
 };
 
 /// Least squares of a parabola over samples around k: value and slope there.
@@ -1001,11 +1014,14 @@ std::vector<Segment> cut_segments(const std::vector<Measurement>& runs, double l
     constexpr double upright_rate = 5.0;    // 1/s, of a pendulum of arm's length
     double growth = 0.0;
     std::size_t first = 0;
+    auto next_break = run.breaks.begin();
     const auto close = [&](std::size_t last) {
       if (last >= first + 8) segments.push_back({r, first, last});
     };
     for (std::size_t k = 1; k < run.size(); ++k) {
-      const bool gap = run.time_s[k] - run.time_s[k - 1] > 5.0 * period;
+      while (next_break != run.breaks.end() && *next_break < k) ++next_break;
+      const bool gap = run.time_s[k] - run.time_s[k - 1] > 5.0 * period ||
+                       (next_break != run.breaks.end() && *next_break == k);
       if (run.has_theta())
         growth +=
             upright_rate * std::max(0.0, std::cos(run.theta_rad[k])) * (run.time_s[k] - run.time_s[k - 1]);
@@ -1090,7 +1106,10 @@ std::vector<PlantState<double>> guess_starts(const std::vector<Measurement>& run
 
 FitResult fit(const FitData& data, const FitPoint& start, const std::vector<FreeParameter>& free,
               const FitOptions& options) {
-  return Fitter(data, start, free, options).run();
+  if (data.bound != nullptr) data.bound->check();
+  FitResult result = Fitter(data, start, free, options).run();
+  if (data.bound != nullptr) data.bound->count(result.work_samples);
+  return result;
 }
 
 namespace {
@@ -1099,14 +1118,18 @@ namespace {
 /// one basin to the next: a plain simulation past friction or a cogged track has many.
 FitResult follow_through_noise(const FitData& segment, FitPoint point, const FitOptions& options) {
   const Noise wanted = point.noise;
+  double work_samples = 0.0;
   for (const double share : {1.0, 0.1, 0.01, 1e-3}) {
     point.noise.force = std::max(wanted.force, 0.1 * share);
     point.noise.torque = std::max(wanted.torque, 0.01 * share);
     const FitResult carried = fit(segment, point, {}, options);
+    work_samples += carried.work_samples;
     if (std::isfinite(carried.objective)) point.starts = carried.point.starts;
   }
   point.noise = wanted;
-  return fit(segment, point, {}, options);
+  FitResult found = fit(segment, point, {}, options);
+  found.work_samples += work_samples;
+  return found;
 }
 
 FitResult follow_segment(const FitData& segment, const FitPoint& point, const FitOptions& options) {
@@ -1114,7 +1137,10 @@ FitResult follow_segment(const FitData& segment, const FitPoint& point, const Fi
   constexpr double suspicious = 1.3;  // so far off, in noise standard deviations, that it may be elsewhere
   if (whitened_rms(found) < suspicious) return found;
   FitResult other = follow_through_noise(segment, point, options);
-  return other.objective < found.objective ? other : found;
+  const double work_samples = found.work_samples + other.work_samples;
+  FitResult& better = other.objective < found.objective ? other : found;
+  better.work_samples = work_samples;
+  return better;
 }
 
 }  // namespace
@@ -1123,6 +1149,7 @@ FitResult follow(const FitData& data, const FitPoint& start, int most_iterations
   FitOptions options;
   options.noise_rounds = 0;
   options.most_iterations = most_iterations;
+  if (data.bound != nullptr) data.bound->check();
   std::vector<FitResult> found(data.segments.size());
   parallel_for(found.size(), [&](std::size_t s) {
     found[s] = follow_segment({data.runs, {data.segments[s]}}, {start.plant, {start.starts[s]}, start.noise},
@@ -1135,6 +1162,7 @@ FitResult follow(const FitData& data, const FitPoint& start, int most_iterations
     const FitResult& one = found[s];
     result.point.starts[s] = one.point.starts[0];
     result.objective += one.objective;
+    result.work_samples += one.work_samples;
     result.converged = result.converged && one.converged;
     result.segment_objective.push_back(one.segment_objective[0]);
     result.segment_chi_square.push_back(one.segment_chi_square[0]);
@@ -1142,6 +1170,7 @@ FitResult follow(const FitData& data, const FitPoint& start, int most_iterations
     result.block_objective.insert(result.block_objective.end(), one.block_objective.begin(),
                                   one.block_objective.end());
   }
+  if (data.bound != nullptr) data.bound->count(result.work_samples);
   return result;
 }
 

@@ -163,10 +163,47 @@ std::optional<ForceBalance> balance_forces(const std::vector<Measurement>& runs,
   return balance;
 }
 
-std::vector<Breakaway> find_breakaways(const std::vector<Measurement>& runs, const Plant& plant) {
-  constexpr double rest_s = 0.5, window_s = 0.5, slow_v_per_s = 1.5;
-  std::vector<Breakaway> found;
+namespace {
+
+/// A ramp is straight to this share of its rise: servos, pushes and jumps are not.
+constexpr double straight_share = 0.2;
+constexpr double slow_v_per_s = 1.5;
+
+/// Whether the voltage of samples first..last is one slow ramp toward `direction`, all the way.
+bool is_slow_ramp(const Measurement& run, std::size_t first, std::size_t last, double direction) {
+  const double rise = run.voltage_v[last] - run.voltage_v[first];
+  const double duration_s = run.time_s[last] - run.time_s[first];
+  if (!(rise * direction > 0.0) || std::abs(rise) > slow_v_per_s * duration_s) return false;
+  for (std::size_t k = first; k <= last; ++k) {
+    const double straight_v = run.voltage_v[first] + rise * (run.time_s[k] - run.time_s[first]) / duration_s;
+    if (std::abs(run.voltage_v[k] - straight_v) > straight_share * std::abs(rise)) return false;
+  }
+  return true;
+}
+
+bool rests(const Measurement& run, std::size_t first, std::size_t last, double within_m) {
+  for (std::size_t k = first; k < last; ++k)
+    if (std::abs(run.cart_m[k] - run.cart_m[last]) > within_m) return false;
+  return true;
+}
+
+/// The force on the cart at a sample, the pendulum's reaction included.
+double holding_force_n(const Measurement& run, const Plant& plant, std::size_t k, std::size_t rate_over) {
   const Coupling c = coupling_of(plant);
+  const double force = plant.motor.force_per_volt_n * run.voltage_v[k];
+  if (!run.has_theta() || !(c.moment > 0.0)) return force;
+  const double theta = run.theta_rad[k];
+  const double rate =
+      (run.theta_rad[k] - run.theta_rad[k - rate_over]) / (run.time_s[k] - run.time_s[k - rate_over]);
+  return force - c.moment * (std::cos(theta) * plant.gravity_mps2 * std::sin(theta) / c.length_m -
+                             std::sin(theta) * rate * rate);
+}
+
+}  // namespace
+
+std::vector<Breakaway> find_breakaways(const std::vector<Measurement>& runs, const Plant& plant) {
+  constexpr double rest_s = 0.5, window_s = 0.5;
+  std::vector<Breakaway> found;
   for (std::size_t r = 0; r < runs.size(); ++r) {
     const Measurement& run = runs[r];
     if (!run.has_cart()) continue;
@@ -174,55 +211,90 @@ std::vector<Breakaway> find_breakaways(const std::vector<Measurement>& runs, con
     const double step = std::max(run.cart_resolution_m, 4.0 * run.cart_noise_m());
     const auto before = static_cast<std::size_t>(rest_s / period);
     const auto window = static_cast<std::size_t>(window_s / period);
+    if (window < 10) continue;  // too few samples to tell rest from motion
     for (std::size_t k = before; k + window < run.size(); ++k) {
-      // Gone: ten steps further after the window, and no way back; the onset is its first step.
+      // Gone: twenty steps further after the window; the onset is its first step.
       const double moved = run.cart_m[k + window] - run.cart_m[k];
-      if (std::abs(moved) < 20.0 * step) continue;
-      bool rested = true;
-      for (std::size_t j = k - before; j < k && rested; ++j)
-        rested = std::abs(run.cart_m[j] - run.cart_m[k]) <= 2.0 * step;
-      const double slope =
-          (run.voltage_v[k] - run.voltage_v[k - window / 2]) / (run.time_s[k] - run.time_s[k - window / 2]);
-      if (!rested || std::abs(slope) > slow_v_per_s || slope * moved <= 0.0) continue;
+      if (std::abs(moved) < 20.0 * step || !rests(run, k - before, k, 2.0 * step)) continue;
       std::size_t onset = k;
       while (onset < k + window && std::abs(run.cart_m[onset] - run.cart_m[k]) <= 1.5 * step) ++onset;
-      double force = plant.motor.force_per_volt_n * run.voltage_v[onset];
-      if (run.has_theta() && c.moment > 0.0) {
-        const double theta = run.theta_rad[onset];
-        const double rate = (run.theta_rad[onset] - run.theta_rad[onset - window / 10]) /
-                            (run.time_s[onset] - run.time_s[onset - window / 10]);
-        force -= c.moment * (std::cos(theta) * plant.gravity_mps2 * std::sin(theta) / c.length_m -
-                             std::sin(theta) * rate * rate);
-      }
-      found.push_back({r, run.time_s[onset], force});
+      // What made it go is the ramp that it rested under, and nothing that came between.
+      if ((run.cart_m[onset] - run.cart_m[k]) * moved <= 0.0 ||
+          !is_slow_ramp(run, k - before / 2, onset, moved))
+        continue;
+      found.push_back({r, run.time_s[onset], holding_force_n(run, plant, onset, window / 10)});
       k += window;
     }
   }
   return found;
 }
 
+namespace {
+
+/// Speeds in equal parts of a stretch, and what noise makes of each.
+struct PartSpeeds {
+  double mean_mps = 0.0, lowest_mps = 0.0, highest_mps = 0.0, sigma_mps = 0.0;
+};
+
+/// Least squares of a line over each part of the samples first..first + length - 1.
+PartSpeeds speeds_in_parts(const Measurement& run, std::size_t first, std::size_t length, std::size_t parts) {
+  PartSpeeds speeds;
+  const std::size_t n = length / parts;
+  for (std::size_t part = 0; part < parts; ++part) {
+    const std::size_t begin = first + part * n;
+    double t_mean = 0.0, x_mean = 0.0, tt = 0.0, tx = 0.0;
+    for (std::size_t k = begin; k < begin + n; ++k) {
+      t_mean += run.time_s[k] / static_cast<double>(n);
+      x_mean += run.cart_m[k] / static_cast<double>(n);
+    }
+    for (std::size_t k = begin; k < begin + n; ++k) {
+      tt += (run.time_s[k] - t_mean) * (run.time_s[k] - t_mean);
+      tx += (run.time_s[k] - t_mean) * (run.cart_m[k] - x_mean);
+    }
+    const double speed = tx / tt;
+    speeds.mean_mps += speed / static_cast<double>(parts);
+    speeds.lowest_mps = part == 0 ? speed : std::min(speeds.lowest_mps, speed);
+    speeds.highest_mps = part == 0 ? speed : std::max(speeds.highest_mps, speed);
+    speeds.sigma_mps = run.cart_noise_m() / std::sqrt(tt);
+  }
+  return speeds;
+}
+
+/// The same all along, but for what noise makes of it: with a change of 3 percent over 0.15 s inertia takes a
+/// percent or two of what friction and back-EMF take.
+bool is_steady(const PartSpeeds& speeds) {
+  constexpr double share = 0.03, by_noise = 6.0, least_mps = 0.005;
+  const double noise_mps = by_noise * speeds.sigma_mps;
+  return std::abs(speeds.mean_mps) > std::max(least_mps, noise_mps) &&
+         speeds.highest_mps - speeds.lowest_mps < share * std::abs(speeds.mean_mps) + noise_mps;
+}
+
+}  // namespace
+
 std::vector<SteadyPoint> find_steady_points(const std::vector<Measurement>& runs, const Plant& plant) {
   constexpr double stretch_s = 0.15, settled_s = 0.25;
+  constexpr std::size_t parts = 5, least_of_part = 4;
   std::vector<SteadyPoint> found;
   for (std::size_t r = 0; r < runs.size(); ++r) {
     const Measurement& run = runs[r];
     if (!run.has_cart()) continue;
     const ForceTrace trace = force_trace(run, plant);
     const double period = run.median_period_s();
-    const auto length = static_cast<std::size_t>(stretch_s / period);
+    const std::size_t length = std::max(static_cast<std::size_t>(stretch_s / period), parts * least_of_part);
     const auto settled = static_cast<std::size_t>(settled_s / period);
     std::size_t since = 0;
     for (std::size_t k = 1; k < run.size(); ++k) {
       if (run.voltage_v[k] != run.voltage_v[since]) since = k;
       if (run.voltage_v[since] == 0.0 || k - since < settled + length || (k - since - settled) % length != 0)
         continue;
+      const PartSpeeds speeds = speeds_in_parts(run, k - length, length, parts);
+      if (!is_steady(speeds)) continue;
       double v = 0.0, friction = 0.0;
       for (std::size_t j = k - length; j < k; ++j) {
         v += trace.cart_mps[j] / static_cast<double>(length);
         friction += trace.friction_n[j] / static_cast<double>(length);
       }
-      const double drift = std::abs(trace.cart_mps[k] - trace.cart_mps[k - length]);
-      if (std::abs(v) > 0.005 && drift < 0.3 * std::abs(v)) found.push_back({r, v, friction});
+      found.push_back({r, v, friction});
     }
   }
   return found;

@@ -5,8 +5,8 @@
 #include <cstdio>
 
 #include "upright/analysis/dense_algebra.hpp"
-#include "upright/analysis/riccati.hpp"
 #include "upright/model/error.hpp"
+#include "upright/model/riccati.hpp"
 
 namespace upright {
 
@@ -104,18 +104,16 @@ void find_poles(GainDesign& design, const LinearPlant& linear, const RowVectorXd
   feedback.head(k.size()) = k;
   design.closed_loop_poles = sorted_eigenvalues(whole.a - whole.b * (linear.actuator_slope * feedback));
   if (design.closed_loop_poles.front().real() >= 0.0)
-    throw ConfigError(
-        "raise r or make the motor lag shorter: the gains designed without the motor lag do not "
-        "stabilize the plant with it, " +
-        matrix_text("A", whole.a) + ", " + matrix_text("b", whole.b));
+    throw ConfigError("the gains designed without the motor lag do not stabilize the plant with it, " +
+                      matrix_text("A", whole.a) + ", " + matrix_text("b", whole.b) +
+                      ": raise r or make the motor lag shorter");
 }
 
 void refuse_unreadable(const LinearPlant& linear) {
   if (linear.actuator_slope != 0.0 && std::isfinite(linear.actuator_slope)) return;
-  throw ConfigError(
-      "lower voltage_offset below the limit of voltage_saturation: the amplifier is saturated at zero "
-      "volts, " +
-      matrix_text("b", linear.b * linear.actuator_slope));
+  throw ConfigError("the amplifier is saturated at zero volts, " +
+                    matrix_text("b", linear.b * linear.actuator_slope) +
+                    ": lower voltage_offset below the limit of voltage_saturation");
 }
 
 }  // namespace
@@ -237,7 +235,8 @@ void check_with_all_states(SampledDesign& result, const SampledProblem& direct, 
   const SampledProblem line =
       result.delay_periods > 0 ? with_delay_line(direct, result.delay_periods) : direct;
   const SampledProblem whole = with_estimator(line, coordinates, estimator);
-  const RiccatiSolution solution = solve_discrete_riccati(whole.a, whole.b, whole.q, whole.s, whole.r);
+  const DiscreteRiccatiSolution solution =
+      solve_discrete_riccati(whole.a, whole.b, whole.q, whole.s, MatrixXd::Constant(1, 1, whole.r));
   const RowVectorXd expected = gain_through_prediction(k, direct, result.delay_periods, 2 * coordinates);
   result.delay_line_residual = solution.residual;
   result.delay_line_difference = (solution.gain - expected).norm() / expected.norm();
@@ -255,7 +254,8 @@ SampledDesign design_sampled_gains(const Plant& plant, const DesignWeights& weig
   const double period_s = 1.0 / rate_hz;
   const SampledProblem direct = sample_problem(part.a, part.b * quick.actuator_slope,
                                                weight_matrix(quick, weights), weights.r, period_s);
-  const RiccatiSolution solution = solve_discrete_riccati(direct.a, direct.b, direct.q, direct.s, direct.r);
+  const DiscreteRiccatiSolution solution =
+      solve_discrete_riccati(direct.a, direct.b, direct.q, direct.s, MatrixXd::Constant(1, 1, direct.r));
   SampledDesign result;
   result.prediction_s = delay_s + linear.input_delay_s;
   result.delay_periods = static_cast<int>(std::ceil(result.prediction_s * rate_hz - 1e-9));

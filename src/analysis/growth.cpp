@@ -40,11 +40,13 @@ constexpr std::size_t most_resembling = 8;
 }  // namespace
 
 Growth::Growth(Search& search, const DiagnosisOptions& options, Diagnosis& record)
-    : search_(search), options_(options), record_(record) {
+    : search_(search), options_(options), record_(record) {}
+
+void Growth::begin() {
   options_.tell(0.02, "comparing the model as given");
   given_ = search_.baseline();
   if (!std::isfinite(given_.train.objective))
-    throw ConfigError("check the plant file: the model cannot be simulated with these runs");
+    throw ConfigError("the model cannot be simulated with these runs: check the plant file");
   current_ = given_;
 }
 
@@ -183,6 +185,7 @@ bool Growth::simulates_as_well(Hypothesis& h) {
   if (search_.held_data().segments.empty()) return true;
   const std::vector<double>& now = search_.simulate(h).segment_gap;
   const std::vector<double>& before = search_.simulate(current_).segment_gap;
+  if (found_.empty()) given_.simulation = current_.simulation;
   const auto n = static_cast<double>(now.size());
   double mean = 0.0, square = 0.0;
   for (std::size_t s = 0; s < now.size(); ++s) {
@@ -197,16 +200,18 @@ bool Growth::simulates_as_well(Hypothesis& h) {
 
 void Growth::end_doubt() {
   if (!standing_) return;
-  Hypothesis grown = std::move(current_);
-  current_ = std::move(standing_->hypothesis);
-  if (compare(current_, grown).held > 0.0 && simulates_as_well(grown)) {
-    current_ = std::move(grown);
+  // What stood before is the answer until the held-out runs are on the side of what was added.
+  Standing grown = std::move(*standing_);
+  standing_.reset();
+  std::swap(current_, grown.hypothesis);
+  std::swap(found_, grown.found);
+  if (compare(current_, grown.hypothesis).held > 0.0 && simulates_as_well(grown.hypothesis)) {
+    current_ = std::move(grown.hypothesis);
+    found_ = std::move(grown.found);
   } else {
-    found_ = std::move(standing_->found);
     contradicted_ = true;
     record_step();
   }
-  standing_.reset();
 }
 
 void Growth::level_noise(const Hypothesis& richer) {
@@ -379,9 +384,9 @@ std::size_t Growth::choose(std::vector<Believed>& believed) {
 
 void Growth::take(int round, Believed& best, const std::vector<Screened>& screened) {
   const std::size_t effect = best.effect;
+  where_[effect] = locate(current_);
   for (Trial& trial : record_.trials)
     if (trial.round == static_cast<std::size_t>(round) && trial.effect == effect) trial.taken = true;
-  where_[effect] = locate(current_);
   current_ = std::move(best.hypothesis);
   found_.push_back(effect);
   const auto winner =

@@ -36,7 +36,7 @@ std::vector<std::size_t> choose_held_out(const std::vector<Measurement>& runs,
   std::stable_sort(order.begin(), order.end(),
                    [&](std::size_t a, std::size_t b) { return lively[a] < lively[b]; });
   std::vector<std::size_t> held;
-  const bool middle = which == HeldOut::middle;
+  const bool middle = which != HeldOut::other;
   if (order.size() == 2) held = {order[middle ? 0 : 1]};
   for (std::size_t i = middle ? 1 : 0; i < order.size() && order.size() > 2; i += 3) held.push_back(order[i]);
   std::sort(held.begin(), held.end());
@@ -53,7 +53,12 @@ DataSplit split(const std::vector<Measurement>& runs, HeldOut which) {
   whole.reserve(runs.size());
   for (std::size_t r = 0; r < runs.size(); ++r) whole.push_back({r, 0, runs[r].size() - 1});
   const bool one_run = runs.size() == 1;
-  const std::vector<std::size_t> chosen = choose_held_out(runs, one_run ? segments : whole, which);
+  std::vector<std::size_t> chosen;
+  if (one_run && which == HeldOut::end) {
+    for (std::size_t s = segments.size() - segments.size() / 3; s < segments.size(); ++s) chosen.push_back(s);
+  } else {
+    chosen = choose_held_out(runs, one_run ? segments : whole, which);
+  }
   std::vector<Segment>&train = result.train.segments, &held = result.held.segments;
   for (std::size_t s = 0; s < segments.size(); ++s) {
     const bool out = std::binary_search(chosen.begin(), chosen.end(), one_run ? s : segments[s].run);

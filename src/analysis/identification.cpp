@@ -8,8 +8,12 @@
 #include <tuple>
 #include <utility>
 
+#include "upright/analysis/adequacy.hpp"
 #include "upright/analysis/candidates.hpp"
-#include "upright/model/error.hpp"
+#include "upright/analysis/held_out.hpp"
+#include "upright/analysis/parallel.hpp"
+#include "upright/analysis/score_test.hpp"
+#include "upright/analysis/thinning.hpp"
 
 namespace upright {
 
@@ -22,6 +26,15 @@ constexpr double least_certainty = 4.0;
 constexpr double most_samples = 60000.0;
 constexpr double trial_samples = 10000.0;
 constexpr double few_samples = 2500.0;
+/// Of the runs that are held out, and of the others, when it is judged.
+constexpr double judged_samples = 20000.0;
+/// A simulation of runs that the fit did not see may be this many times as far off as the largest of some
+/// dozens of draws of the noise. A right model comes to 1; what it is more, its numbers make up for
+/// elsewhere.
+constexpr double most_held_out = 1.2;
+/// What an effect that is not fitted may promise of minus twice the log likelihood: some 25 with up to three
+/// parameters are asked, of which chance gives the best about 10.
+constexpr double most_promised = 40.0;
 
 constexpr std::string_view frictions[] = {"viscous_friction",
                                           "coulomb_friction",
@@ -45,44 +58,6 @@ std::string text(const char* format, double a, double b = 0.0) {
   char buffer[160];
   std::snprintf(buffer, sizeof buffer, format, a, b);
   return buffer;
-}
-
-/// Segments in which something moves; those that rest say nothing more than that they rest.
-std::vector<Segment> moving_segments(const std::vector<Measurement>& runs) {
-  std::vector<Segment> kept;
-  for (const Segment& s : cut_segments(runs)) {
-    const Measurement& run = runs[s.run];
-    const auto range = [&](const std::vector<double>& values) {
-      const auto [low, high] = std::minmax_element(values.begin() + static_cast<std::ptrdiff_t>(s.first),
-                                                   values.begin() + static_cast<std::ptrdiff_t>(s.last) + 1);
-      return *high - *low;
-    };
-    const bool cart = run.has_cart() && range(run.cart_m) > 6.0 * std::max(run.cart_resolution_m, 1e-9);
-    const bool decay = run.cart_locked && run.has_theta();
-    if (cart || decay) kept.push_back(s);
-  }
-  return kept;
-}
-
-std::size_t samples_in(const std::vector<Segment>& segments) {
-  std::size_t count = 0;
-  for (const Segment& s : segments) count += s.last - s.first + 1;
-  return count;
-}
-
-/// Every n-th segment, so that about `most` samples are left and every run keeps its share.
-std::vector<Segment> thinned(const std::vector<Segment>& segments, double most) {
-  const double part = most / static_cast<double>(samples_in(segments));
-  if (part >= 1.0) return segments;
-  std::vector<Segment> kept;
-  double owed = 0.5;
-  for (const Segment& s : segments) {
-    owed += part;
-    if (owed < 1.0) continue;
-    owed -= 1.0;
-    kept.push_back(s);
-  }
-  return kept;
 }
 
 /// The runs in an order of their own, whatever order they were read in: which segments are left out, and how
@@ -134,32 +109,124 @@ class Identifier {
         range_(range_of(runs_, base)) {}
 
   Identification run() {
-    result_.breakaways = find_breakaways(runs_, base_);
-    result_.steady_points = find_steady_points(runs_, base_);
-    result_.balance = balance_forces(runs_, base_);
-    const std::vector<Segment> segments = moving_segments(runs_);
-    if (segments.empty()) throw ConfigError("record runs in which the cart or the pendulum moves");
-    whole_ = {&runs_, thinned(segments, most_samples)};
-    trial_ = {&runs_, thinned(segments, trial_samples)};
-    few_ = {&runs_, thinned(segments, few_samples)};
-    tell(0.05, "balance of forces");
-    Model model = start();
-    model = fitted(model, trial_, 8, 1);
-    Model calm = model;
-    calm.fit.point.noise = calmed(calm.fit.point.noise);
-    calm = fitted(calm, trial_, 16, 1);
-    if (rank_of(calm) < rank_of(model)) model = std::move(calm);
-    const bool transition = range_.cart_moves && starts_from_rest() && grow(model);
-    tell(0.6, "fitting everything");
-    model = fitted(model, whole_, 12, 2);
-    report(model);
-    if (!transition && result_.balance) prefer_balance();
+    try {
+      find();
+    } catch (const Interrupted&) {
+      result_.interrupted = true;
+      result_.verdict = Verdict::unexplained;
+      result_.residual = "not examined: the work was not finished";
+      result_.parameters.clear();
+      if (std::isfinite(so_far_.fit.objective) && so_far_.fit.covariance.size() > 0) report(so_far_);
+    }
     result_.breakaways = as_given(std::move(result_.breakaways), order_);
     result_.steady_points = as_given(std::move(result_.steady_points), order_);
     return std::move(result_);
   }
 
  private:
+  void find() {
+    result_.plant = base_;
+    result_.breakaways = find_breakaways(runs_, base_);
+    result_.steady_points = find_steady_points(runs_, base_);
+    result_.balance = balance_forces(runs_, base_);
+    const std::vector<Segment> segments = moving_segments(runs_);
+    if (segments.empty() || !moves_enough(runs_)) {
+      result_.verdict = Verdict::not_excited;
+      result_.residual = "too little moves in these data to show anything";
+      return;
+    }
+    whole_ = {&runs_, thinned(segments, most_samples)};
+    trial_ = {&runs_, thinned(segments, trial_samples)};
+    few_ = {&runs_, thinned(segments, few_samples)};
+    tell(0.05, "balance of forces");
+    Model model = start();
+    model = fitted(model, trial_, 8, 1);
+    so_far_ = model;
+    Model calm = model;
+    calm.fit.point.noise = calmed(calm.fit.point.noise);
+    calm = fitted(calm, trial_, 16, 1);
+    if (rank_of(calm) < rank_of(model)) model = std::move(calm);
+    so_far_ = model;
+    const bool transition = range_.cart_moves && starts_from_rest() && grow(model);
+    so_far_ = model;
+    tell(0.6, "fitting everything");
+    model = fitted(model, whole_, 12, 2);
+    so_far_ = model;
+    tell(0.75, "does it explain the data");
+    judge(model);
+    report(model);
+    if (result_.verdict == Verdict::explained) {
+      doubt_what_is_not_shown();
+    } else if (!transition && result_.balance) {
+      prefer_balance();
+    }
+  }
+
+  /// Whether the model accounts for the data: what it leaves is noise, and what it says of runs that its fit
+  /// did not see is no further off.
+  void judge(const Model& model) {
+    result_.verdict = Verdict::unexplained;
+    if (!std::isfinite(model.fit.objective)) {
+      result_.residual = "the model cannot be simulated with these runs";
+      return;
+    }
+    DataSplit data = split(runs_, HeldOut::end);
+    for (FitData* part : {&data.train, &data.held}) part->segments = thinned(part->segments, judged_samples);
+    const Model trained = fitted(model, data.train, 12, 1);
+    const Search search(base_, runs_, data.train, data.held);
+    Hypothesis judged;
+    judged.train = trained.fit;
+    judged.free = parameters_of(trained);
+    judged.valid = std::isfinite(trained.fit.objective);
+    if (!judged.valid) {
+      result_.residual = "the model cannot be simulated with these runs";
+      return;
+    }
+    ResidualStructure left = examine_fit(whole_, model.fit.point);
+    search.judge(judged, sensors_only(judged.train.point.noise));
+    if (!left.structured) compare_held_out(search, judged, left);
+    const SimulationFloor noise = left.structured ? SimulationFloor{} : held_out_floor(search, judged, left);
+    const double floor = noise.usual;
+    result_.gap_after = search.gap_of(judged) / floor;
+    if (!left.structured) {
+      const PromisedEffect missing = most_promising_effect(data.train, trained.fit, judged.free, range_,
+                                                           {"stribeck_friction", "bristle_friction"});
+      left.structured = missing.fall > most_promised;
+      if (left.structured)
+        left.sentence = "what is left looks like " + kind_of(missing.effect) +
+                        ", which identify does not fit" +
+                        text(" (it promises %.3g of minus twice the log likelihood)", missing.fall);
+    }
+    if (!left.structured && search.gap_of(judged) > most_held_out * noise.highest) {
+      left.structured = true;
+      left.sentence = text(
+          "a simulation of runs that the fit did not see is %.3g times as far off as noise like "
+          "what is left makes it at most",
+          search.gap_of(judged) / noise.highest);
+    }
+    Hypothesis given;
+    given.train.point = {base_, {}, judged.train.point.noise};
+    search.judge(given, sensors_only(judged.train.point.noise));
+    result_.gap_before = search.gap_of(given) / floor;
+    result_.residual = left.sentence;
+    if (!left.structured) result_.verdict = Verdict::explained;
+  }
+
+  /// Numbers that account for the data are the rig's only where the data leave them no choice.
+  void doubt_what_is_not_shown() {
+    // So far off, a mass or a friction is of no use for a controller.
+    constexpr double widest = 0.25;
+    for (const IdentifiedParameter& p : result_.parameters) {
+      const double half = 0.5 * (p.high - p.low);
+      const bool mass = p.name == "cart_mass_kg" || p.name == "pendulum.length_to_com_m";
+      const bool level = p.name == "coulomb_friction.force_n";
+      const double size = level ? widest * range_.largest_force_n : std::abs(p.value);
+      if (!(mass || level) || half <= widest * size) continue;
+      result_.verdict = Verdict::not_excited;
+      result_.residual = "these data leave " + p.name + " open: " + text("%.3g to %.3g", p.low, p.high);
+    }
+  }
+
   void tell(double done, const std::string& what) const {
     if (options_.progress) options_.progress(done, what);
   }
@@ -316,15 +383,15 @@ class Identifier {
       sized = sized && best.plant.find(effect)->values[0] > least_certainty * sigma_of(best, effect, 0);
     }
     const bool kept = evidence > least_evidence && sized;
-    result_.notes.push_back(names +
-                            text(": %.4g is what it saves of minus twice the log likelihood", evidence) +
-                            (kept    ? ""
-                             : sized ? ", too little to believe it"
-                                     : ", but its size is not certain"));
+    const std::string size = text("(evidence %.0f, %.0f is asked for)", evidence, least_evidence);
+    const std::string why = evidence < 0.5 ? "with which the fit is no better"
+                            : sized        ? "with which the fit is hardly better " + size
+                                           : "whose size is not certain";
+    result_.notes.push_back(kept ? "taken: " + names + ", which improves the fit " + size
+                                 : "left out: " + names + ", " + why);
     if (kept) model = best;
     return kept;
   }
-
   /// True when the data show how friction changes between rest and sliding.
   bool grow(Model& model) {
     const Model plain = model;
@@ -393,7 +460,9 @@ class Identifier {
     p.low = value - 1.96 * sigma;
     p.high = value + 1.96 * sigma;
     p.source = source;
-    p.goodness = value != 0.0 ? text("known to %.2g %%", 196.0 * sigma / std::abs(value)) : "";
+    const double percent = value != 0.0 ? 196.0 * sigma / std::abs(value) : HUGE_VAL;
+    p.goodness =
+        percent < 99.0 ? text("known to %.2g %%", std::max(percent, 1e-3)) : "no different from zero";
     result_.parameters.push_back(p);
   }
 
@@ -516,6 +585,7 @@ class Identifier {
   const IdentificationOptions& options_;
   DataRange range_;
   FitData whole_, trial_, few_;
+  Model so_far_;  ///< the best that was fitted
   Identification result_;
 };
 
@@ -523,6 +593,7 @@ class Identifier {
 
 Identification identify(const Plant& base, const std::vector<Measurement>& runs,
                         const IdentificationOptions& options) {
+  const InterruptibleWork watch(options.signal);
   return Identifier(base, runs, options).run();
 }
 

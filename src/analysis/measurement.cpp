@@ -1,13 +1,13 @@
 #include "upright/analysis/measurement.hpp"
 
 #include <algorithm>
-#include <charconv>
+#include <array>
 #include <cmath>
-#include <fstream>
-#include <map>
-#include <numbers>
 #include <optional>
 
+#include "column_delay.hpp"
+#include "folded_angle.hpp"
+#include "upright/analysis/dataset_file.hpp"
 #include "upright/model/error.hpp"
 #include "upright/model/yaml_reader.hpp"
 #include "upright/runtime/experiment_file.hpp"
@@ -25,228 +25,227 @@ class NothingMoves : public ConfigError {
 
 namespace fs = std::filesystem;
 
-/// Where a quantity comes from in a foreign CSV: a column by name or by number, scaled and shifted.
-struct Source {
-  std::string column;
-  double scale = 1.0;
-  double offset = 0.0;
-};
-
-struct Mapping {
-  fs::path file;
-  std::map<std::string, Source> columns;
-  bool header = true;
-  bool cart_locked = false;
-  std::optional<double> cart_resolution_m, theta_resolution_rad;
-  std::optional<double> from_s, to_s;
-};
-
-struct Table {
-  std::vector<std::string> names;
-  std::vector<std::vector<double>> columns;
-  std::vector<std::size_t> lines;
-};
-
-std::vector<std::string> split(const std::string& line) {
-  const char separator = line.find(',') != std::string::npos    ? ','
-                         : line.find(';') != std::string::npos  ? ';'
-                         : line.find('\t') != std::string::npos ? '\t'
-                                                                : ',';
-  std::vector<std::string> cells;
-  std::size_t begin = 0;
-  while (begin <= line.size()) {
-    std::size_t end = line.find(separator, begin);
-    if (end == std::string::npos) end = line.size();
-    std::size_t first = begin, last = end;
-    while (first < last && (line[first] == ' ' || line[first] == '"' || line[first] == '\t')) ++first;
-    while (last > first && (line[last - 1] == ' ' || line[last - 1] == '"' || line[last - 1] == '\r' ||
-                            line[last - 1] == '\t'))
-      --last;
-    cells.push_back(line.substr(first, last - first));
-    begin = end + 1;
-  }
-  return cells;
-}
-
-std::optional<double> number_in(const std::string& cell) {
-  const char* first = cell.data();
-  const char* last = first + cell.size();
-  if (first != last && *first == '+') ++first;
-  double value = 0.0;
-  const auto result = std::from_chars(first, last, value);
-  if (result.ec != std::errc{} || result.ptr != last) return std::nullopt;
-  return value;
-}
-
-/// Reads the wanted columns of a CSV. A last line that was cut off, as a power cut leaves it, is left out.
-Table read_table(const fs::path& file, const std::vector<std::string>& wanted, bool header) {
-  std::ifstream in(file);
-  if (!in) throw ConfigError("check the path: cannot read " + file.string());
-  Table table;
-  std::string line;
-  std::size_t number = 0;
-  std::vector<std::string> names;
-  std::vector<std::size_t> places;
-  while (std::getline(in, line)) {
-    ++number;
-    if (line.empty() || line[0] == '#' || line == "\r") continue;
-    const bool cut_off = in.eof();
-    const std::vector<std::string> cells = split(line);
-    if (names.empty()) {
-      if (header) {
-        names = cells;
-      } else {
-        for (std::size_t i = 1; i <= cells.size(); ++i) names.push_back(std::to_string(i));
-      }
-      for (const std::string& name : wanted) {
-        const auto at = std::find(names.begin(), names.end(), name);
-        if (at == names.end()) continue;
-        places.push_back(static_cast<std::size_t>(at - names.begin()));
-        table.names.push_back(name);
-      }
-      table.columns.resize(places.size());
-      if (header) continue;
-    }
-    std::vector<double> row;
-    for (const std::size_t place : places) {
-      const auto value = place < cells.size() ? number_in(cells[place]) : std::nullopt;
-      if (!value || !std::isfinite(*value)) {
-        if (cut_off) break;
-        throw ConfigError("remove or repair the row: " + file.string() + ":" + std::to_string(number) + ": " +
-                          names[place] + " is " +
-                          (place < cells.size() ? "'" + cells[place].substr(0, 40) + "'" : "missing") +
-                          ", not a finite number");
-      }
-      row.push_back(*value);
-    }
-    if (row.size() != places.size() || (cut_off && cells.size() < names.size())) continue;
-    for (std::size_t i = 0; i < row.size(); ++i) table.columns[i].push_back(row[i]);
-    table.lines.push_back(number);
-  }
-  return table;
-}
-
-Mapping plain_mapping(const fs::path& file) {
-  Mapping mapping;
-  mapping.file = file;
-  for (const char* name : {"time_s", "voltage_v", "cart_m", "theta_rad"})
-    mapping.columns[name] = {name, 1.0, 0.0};
-  return mapping;
-}
-
-Mapping read_mapping(const fs::path& file) {
-  const YamlMap document = YamlMap::from_file(file);
-  const YamlMap map = document.map("dataset");
-  Mapping mapping;
-  mapping.file = map.path("file");
-  mapping.header = map.flag_or("header", true);
-  mapping.cart_locked = map.flag_or("cart_locked", false);
-  mapping.from_s = map.optional_number("from_s");
-  mapping.to_s = map.optional_number("to_s");
-  const YamlMap columns = map.map("columns");
-  for (const char* name : {"time_s", "voltage_v", "cart_m", "theta_rad"}) {
-    if (!columns.has(name)) continue;
-    if (columns.is_map(name)) {
-      const YamlMap source = columns.map(name);
-      mapping.columns[name] = {source.text("column"), source.number_or("scale", 1.0),
-                               source.number_or("offset", 0.0)};
-      source.finish();
-    } else {
-      mapping.columns[name] = {columns.text(name), 1.0, 0.0};
-    }
-  }
-  columns.finish();
-  if (const auto resolution = map.optional_map("resolution")) {
-    mapping.cart_resolution_m = resolution->optional_number("cart_m", Range::positive());
-    mapping.theta_resolution_rad = resolution->optional_number("theta_rad", Range::positive());
-    resolution->finish();
-  }
-  map.finish();
-  document.finish();
-  if (!mapping.columns.contains("time_s"))
-    map.fail("columns", "names no time_s", "map time_s to the column that holds the time");
-  return mapping;
-}
-
-void refuse_bad_time(const std::vector<double>& time, const Table& table, const fs::path& file) {
-  for (std::size_t k = 1; k < time.size(); ++k)
-    if (!(time[k] > time[k - 1]))
-      throw ConfigError("sort the rows by time and remove doubled ones: " + file.string() + ":" +
-                        std::to_string(table.lines[k]) + ": time_s does not grow (" +
-                        exact_text(time[k - 1]) + " then " + exact_text(time[k]) + ")");
-}
-
 bool is_constant(const std::vector<double>& values) {
   return std::all_of(values.begin(), values.end(), [&](double v) { return v == values.front(); });
 }
 
-/// Undoes the wrap of an angle that was folded into one turn: no real pendulum turns half around between two
-/// rows.
-void unwrap(std::vector<double>& theta) {
-  double turns = 0.0;
-  for (std::size_t k = 1; k < theta.size(); ++k) {
-    const double step = theta[k] + turns - theta[k - 1];
-    turns -= 2.0 * std::numbers::pi * std::round(step / (2.0 * std::numbers::pi));
-    theta[k] += turns;
+/// Collects a table's rows into a measurement, as they are read.
+class Collector {
+ public:
+  Collector(const Dataset& dataset, Measurement& measurement) : dataset_(dataset), m_(measurement) {
+    for (const std::string_view quantity : measured_quantities) {
+      const auto at = dataset.columns.find(quantity);
+      sources_.push_back(at == dataset.columns.end() ? nullptr : &at->second);
+      wanted_.push_back(sources_.back() ? sources_.back()->column : "");
+    }
   }
+
+  void read() {
+    read_csv(
+        dataset_.file, wanted_, dataset_.format, [this](const CsvTable& table) { begin(table); },
+        [this](const CsvRow& row) { take(row); });
+    refuse_missing_rows();
+    m_.missing_rows = missing_rows_;
+    if (missing_rows_ == 0) return;
+    m_.notes.push_back(
+        m_.name + ": " + std::to_string(missing_rows_) + " of " + std::to_string(missing_rows_ + m_.size()) +
+        " rows have a cell without a number, the first in line " + std::to_string(first_missing_line_) +
+        "; they are " + (dataset_.missing == MissingCells::skip ? "skipped" : "gaps in the record"));
+  }
+
+ private:
+  enum { time, voltage, cart, theta };
+
+  void begin(const CsvTable& table) {
+    place_ = table.place;
+    const std::string at = dataset_.file.string() + ":1: ";
+    const auto has = [&](int quantity) { return place_[static_cast<std::size_t>(quantity)].has_value(); };
+    if (!has(time)) throw ConfigError(at + "there is no column for time_s" + columns_of(table) + map_them);
+    for (std::size_t q = 0; q < sources_.size(); ++q)
+      if (!place_[q] && sources_[q] && sources_[q]->column != measured_quantities[q])
+        throw ConfigError(at + "there is no column '" + sources_[q]->column + "'" + columns_of(table) +
+                          ": correct its name in the dataset file");
+    if (!has(cart) && !has(theta))
+      throw ConfigError(at + "there is no column for cart_m or theta_rad" + columns_of(table) + map_them);
+    if (!has(voltage) && !dataset_.cart_locked)
+      throw ConfigError(at + "there is no column for voltage_v" + columns_of(table) +
+                        ": map it in a dataset file, or set cart_locked: true there if the pendulum swings "
+                        "alone (docs/datasets.md)");
+    refuse_other_units(table);
+  }
+
+  static constexpr const char* map_them =
+      ": name the columns time_s, voltage_v, cart_m, theta_rad, or map them in a dataset file "
+      "(docs/datasets.md)";
+
+  static std::string columns_of(const CsvTable& table) {
+    constexpr std::size_t most = 20;
+    if (table.names.empty()) return " (the file is empty)";
+    std::string text;
+    for (std::size_t i = 0; i < std::min(most, table.names.size()); ++i)
+      text += (i > 0 ? ", " : " (the columns are: ") + table.names[i].substr(0, 40);
+    return text + (table.names.size() > most ? ", ...)" : ")");
+  }
+
+  /// A row of units is taken at its word where the dataset file says nothing of a scale.
+  void refuse_other_units(const CsvTable& table) const {
+    for (std::size_t q = 0; q < sources_.size(); ++q) {
+      if (!place_[q] || sources_[q]->scaled) continue;
+      const auto factor = factor_of_unit(measured_quantities[q], table.units[q]);
+      if (!factor || *factor == 1.0) continue;
+      DatasetColumn scaled = *sources_[q];
+      scaled.scale = *factor;
+      throw ConfigError(dataset_.file.string() + ":2: the row of units says that " + sources_[q]->column +
+                        " is in " + table.units[q] + ": put this line into the columns of a dataset file: " +
+                        column_line(measured_quantities[q], scaled));
+    }
+  }
+
+  void take(const CsvRow& row) {
+    std::array<double, 4> values{};
+    bool whole = true;
+    for (std::size_t q = 0; q < values.size(); ++q) {
+      if (!place_[q]) continue;
+      values[q] = row.values[*place_[q]] * sources_[q]->scale + sources_[q]->offset;
+      whole = whole && std::isfinite(values[q]);
+    }
+    count_time(values[time]);
+    const bool timed = std::isfinite(values[time]);
+    if (timed && (values[time] < dataset_.from_s.value_or(values[time]) ||
+                  values[time] > dataset_.to_s.value_or(values[time]))) {
+      unfold(values);
+      return;
+    }
+    if (!whole) return leave_out(row.line, values);
+    refuse_bad_time(values[time], row.line);
+    unfold(values);
+    if (broken_ && m_.size() > 0) m_.breaks.push_back(m_.size());
+    broken_ = false;
+    if (turns_ != (m_.unfoldings.empty() ? 0.0 : m_.unfoldings.back().added_rad))
+      m_.unfoldings.push_back({m_.size(), turns_});
+    m_.time_s.push_back(values[time]);
+    if (place_[voltage]) m_.voltage_v.push_back(values[voltage]);
+    if (place_[cart]) m_.cart_m.push_back(values[cart]);
+    if (place_[theta]) m_.theta_rad.push_back(values[theta]);
+  }
+
+  /// Where the stamps only scatter, the rows themselves are the clock.
+  void count_time(double& time_s) {
+    if (sources_[time]->period_s == 0.0) return;
+    if (std::isfinite(time_s)) {
+      if (rows_ == 0) first_stamp_s_ = time_s;
+      last_stamp_s_ = time_s;
+    }
+    last_counted_s_ = first_stamp_s_ + sources_[time]->period_s * static_cast<double>(rows_++);
+    time_s = last_counted_s_;
+  }
+
+  /// Stamps scatter about the rows' clock and stay near it; else the period is another or rows are missing.
+  void refuse_missing_rows() const {
+    constexpr double most_periods = 10.0, most_share = 0.001;
+    const double period_s = sources_[time]->period_s, off_s = last_stamp_s_ - last_counted_s_;
+    if (period_s == 0.0 || rows_ < 2 ||
+        std::abs(off_s) <= most_periods * period_s + most_share * (last_counted_s_ - first_stamp_s_))
+      return;
+    throw ConfigError(dataset_.file.string() + ": the time stamps end " + exact_text(off_s) +
+                      " s after the last row by period_s, so the period is another or rows are missing: "
+                      "period_s: " +
+                      exact_text((last_stamp_s_ - first_stamp_s_) / static_cast<double>(rows_ - 1)) +
+                      " would agree with the stamps");
+  }
+
+  void leave_out(std::size_t line, const std::array<double, 4>& values) {
+    if (dataset_.missing == MissingCells::stop)
+      for (std::size_t q = 0; q < values.size(); ++q)
+        if (!std::isfinite(values[q]))
+          throw ConfigError(dataset_.file.string() + ":" + std::to_string(line) + ": " + sources_[q]->column +
+                            " holds no number, and the dataset file says missing: stop: repair the row, or "
+                            "set missing to gap or skip");
+    if (missing_rows_++ == 0) first_missing_line_ = line;
+    broken_ = broken_ || dataset_.missing == MissingCells::gap;
+  }
+
+  void refuse_bad_time(double time_s, std::size_t line) const {
+    if (m_.time_s.empty() || time_s > m_.time_s.back()) return;
+    throw ConfigError(dataset_.file.string() + ":" + std::to_string(line) + ": time_s does not grow (" +
+                      exact_text(m_.time_s.back()) + " then " + exact_text(time_s) +
+                      "): sort the rows by time and remove doubled ones; if the time was rounded, write it "
+                      "with more digits; if the rows are in order and came at a steady rate, give time_s its "
+                      "period_s in a dataset file (docs/datasets.md)");
+  }
+
+  /// Undoes the wrap of an angle that was folded, mostly into one turn: no real pendulum turns half around
+  /// between two rows.
+  void unfold(std::array<double, 4>& values) {
+    double& angle = values[theta];
+    if (!place_[theta] || !std::isfinite(angle)) return;
+    const double every = sources_[theta]->folded_every_rad;
+    if (has_angle_) turns_ -= every * std::round((angle + turns_ - last_angle_) / every);
+    angle += turns_;
+    last_angle_ = angle;
+    has_angle_ = true;
+  }
+
+  const Dataset& dataset_;
+  Measurement& m_;
+  std::vector<const DatasetColumn*> sources_;
+  std::vector<std::string> wanted_;
+  std::vector<std::optional<std::size_t>> place_;
+  std::size_t missing_rows_ = 0, first_missing_line_ = 0;
+  bool broken_ = false, has_angle_ = false;
+  double turns_ = 0.0, last_angle_ = 0.0;
+  std::size_t rows_ = 0;
+  double first_stamp_s_ = 0.0, last_stamp_s_ = 0.0, last_counted_s_ = 0.0;
+};
+
+/// A record of which too little is left.
+void refuse_too_short(const Measurement& m, const Dataset& dataset) {
+  constexpr std::size_t fewest = 10;
+  if (m.size() >= fewest) return;
+  const std::string head = dataset.file.string() + ":1: " + std::to_string(m.size()) + " samples" +
+                           (m.missing_rows > 0 ? " without a missing cell" : "") +
+                           (dataset.from_s || dataset.to_s ? " from from_s to to_s" : "") +
+                           ", fewer than 10, say nothing: ";
+  throw ConfigError(head + (m.missing_rows > 0               ? "repair the empty cells"
+                            : dataset.from_s || dataset.to_s ? "widen from_s and to_s"
+                                                             : "record a longer run"));
 }
 
-Measurement load(const Mapping& mapping, const std::string& name) {
-  std::vector<std::string> wanted;
-  for (const auto& [quantity, source] : mapping.columns) wanted.push_back(source.column);
-  const Table table = read_table(mapping.file, wanted, mapping.header);
-  const auto column = [&](const std::string& quantity) -> std::vector<double> {
-    const auto at = mapping.columns.find(quantity);
-    if (at == mapping.columns.end()) return {};
-    const auto named = std::find(table.names.begin(), table.names.end(), at->second.column);
-    if (named == table.names.end()) return {};
-    std::vector<double> values = table.columns[static_cast<std::size_t>(named - table.names.begin())];
-    for (double& value : values) value = value * at->second.scale + at->second.offset;
-    return values;
-  };
+/// Gaps so near to each other that nothing is left to be followed between them.
+void refuse_gaps_everywhere(const Measurement& m, const Dataset& dataset) {
+  // A fit begins 0.1 s after a gap (cut_segments), and a quarter of a second is the least it can judge.
+  constexpr double least_s = 0.35;
+  double longest_s = 0.0;
+  std::size_t first = 0;
+  for (std::size_t i = 0; i <= m.breaks.size(); ++i) {
+    const std::size_t end = i < m.breaks.size() ? m.breaks[i] : m.size();
+    longest_s = std::max(longest_s, m.time_s[end - 1] - m.time_s[first]);
+    first = end;
+  }
+  if (m.breaks.empty() || longest_s >= least_s) return;
+  throw ConfigError(dataset.file.string() + ": " + std::to_string(m.missing_rows) +
+                    " rows have a cell without a number, with never more than " + exact_text(longest_s) +
+                    " s between them, so that nothing is left to be followed: set missing: skip in a dataset "
+                    "file if a sensor is written less often than the rows, else repair the cells");
+}
+
+Measurement load(const Dataset& dataset, const std::string& name) {
   Measurement m;
   m.name = name;
-  m.time_s = column("time_s");
-  m.voltage_v = column("voltage_v");
-  m.cart_m = column("cart_m");
-  m.theta_rad = column("theta_rad");
-  m.cart_locked = mapping.cart_locked;
-  const std::string file = mapping.file.string();
-  if (table.names.empty() || std::find(table.names.begin(), table.names.end(),
-                                       mapping.columns.at("time_s").column) == table.names.end())
-    throw ConfigError(
-        "name the columns time_s, voltage_v, cart_m, theta_rad, or map them in a dataset file: " + file +
-        ":1: there is no column for time_s");
-  if (m.cart_m.empty() && m.theta_rad.empty() && !m.time_s.empty())
-    throw ConfigError("give cart_m or theta_rad, by name or by a dataset file: " + file +
-                      ":1: neither is there");
-  if (m.size() < 10)
-    throw ConfigError("record a longer run: " + file + ":1: " + std::to_string(m.size()) +
-                      " samples, fewer than 10, say nothing");
-  refuse_bad_time(m.time_s, table, mapping.file);
-  if (m.voltage_v.empty()) {
-    if (!m.cart_locked)
-      throw ConfigError("give voltage_v, or set cart_locked: true if the pendulum swings alone: " + file +
-                        ":1: there is no column for voltage_v");
-    m.voltage_v.assign(m.size(), 0.0);
-  }
-  unwrap(m.theta_rad);
-  if (mapping.from_s || mapping.to_s) {
-    const auto first =
-        std::lower_bound(m.time_s.begin(), m.time_s.end(), mapping.from_s.value_or(m.time_s.front()));
-    const auto last =
-        std::upper_bound(m.time_s.begin(), m.time_s.end(), mapping.to_s.value_or(m.time_s.back()));
-    const auto a = first - m.time_s.begin(), b = last - m.time_s.begin();
-    if (b - a < 10)
-      throw ConfigError("widen from_s and to_s: " + file + " has fewer than 10 samples between them");
-    for (auto* values : {&m.time_s, &m.voltage_v, &m.cart_m, &m.theta_rad})
-      if (!values->empty()) *values = std::vector<double>(values->begin() + a, values->begin() + b);
-  }
+  m.dataset = std::make_shared<const Dataset>(dataset);
+  m.cart_locked = dataset.cart_locked;
+  Collector(dataset, m).read();
+  refuse_too_short(m, dataset);
+  refuse_gaps_everywhere(m, dataset);
+  if (m.voltage_v.empty()) m.voltage_v.assign(m.size(), 0.0);
   const bool still =
       (m.cart_m.empty() || is_constant(m.cart_m)) && (m.theta_rad.empty() || is_constant(m.theta_rad));
-  if (still) throw NothingMoves("record a run in which something moves: " + file + " holds constant data");
-  m.cart_resolution_m = mapping.cart_resolution_m.value_or(find_resolution(m.cart_m));
-  m.theta_resolution_rad = mapping.theta_resolution_rad.value_or(find_resolution(m.theta_rad));
+  if (still)
+    throw NothingMoves(dataset.file.string() + " holds constant data: record a run in which something moves");
+  const auto angle = dataset.columns.find("theta_rad");
+  if (angle != dataset.columns.end() && angle->second.mirrored) unmirror(m.theta_rad);
+  m.cart_resolution_m = dataset.cart_resolution_m.value_or(find_resolution(m.cart_m));
+  m.theta_resolution_rad = dataset.theta_resolution_rad.value_or(find_resolution(m.theta_rad));
   if (m.cart_resolution_m > 0.0) m.cart_weight = dwell_weights(m.cart_m);
   if (m.theta_resolution_rad > 0.0) m.theta_weight = dwell_weights(m.theta_rad);
   const bool motor_off = is_constant(m.voltage_v) && m.voltage_v.front() == 0.0;
@@ -255,13 +254,16 @@ Measurement load(const Mapping& mapping, const std::string& name) {
     m.notes.push_back(name + ": no cart position and no voltage, so the cart is taken as held");
   }
   if (m.has_cart() && m.cart_locked) m.cart_m.clear();
+  m.known_cart_noise_m = m.cart_noise_m();
+  m.known_theta_noise_rad = m.theta_noise_rad();
+  undo_delays(m, dataset);
   return m;
 }
 
 /// A run directory's mapping. Of an experiment's run, what somebody's hands did is left out: before the
 /// pendulum was let go no equation of motion holds.
-Mapping mapping_of_run(const fs::path& directory) {
-  Mapping mapping = plain_mapping(directory / "samples.csv");
+Dataset mapping_of_run(const fs::path& directory) {
+  Dataset mapping = plain_dataset(directory / "samples.csv");
   std::error_code problem;
   if (!fs::exists(directory / "run.yaml", problem)) return mapping;
   const YamlMap document = YamlMap::from_file(directory / "run.yaml");
@@ -363,11 +365,13 @@ double Measurement::median_period_s() const {
 }
 
 double Measurement::cart_noise_m() const {
+  if (known_cart_noise_m) return *known_cart_noise_m;
   const double step = cart_resolution_m / std::sqrt(12.0);
   return std::max({step, cart_resolution_m > 0.0 ? 0.0 : find_noise(cart_m), 1e-9});
 }
 
 double Measurement::theta_noise_rad() const {
+  if (known_theta_noise_rad) return *known_theta_noise_rad;
   const double step = theta_resolution_rad / std::sqrt(12.0);
   return std::max({step, theta_resolution_rad > 0.0 ? 0.0 : find_noise(theta_rad), 1e-9});
 }
@@ -377,14 +381,13 @@ Measurement read_measurement(const fs::path& path) {
   if (fs::is_directory(path, problem)) {
     const fs::path samples = path / "samples.csv";
     if (!fs::exists(samples, problem))
-      throw ConfigError("name a run directory, a CSV or a dataset file: " + path.string() +
-                        " has no samples.csv");
+      throw ConfigError(path.string() + " has no samples.csv: name a run directory, a CSV or a dataset file");
     return load(mapping_of_run(path),
                 path.filename().empty() ? path.parent_path().filename().string() : path.filename().string());
   }
   const std::string extension = path.extension().string();
-  if (extension == ".yaml" || extension == ".yml") return load(read_mapping(path), path.stem().string());
-  return load(plain_mapping(path), path.stem().string());
+  if (extension == ".yaml" || extension == ".yml") return load(read_dataset_file(path), path.stem().string());
+  return load(plain_dataset(path), path.stem().string());
 }
 
 std::vector<Measurement> read_measurements(const std::vector<fs::path>& paths) {

@@ -6,6 +6,7 @@
 #include <limits>
 #include <numeric>
 
+#include "upright/analysis/effect_starts.hpp"
 #include "upright/analysis/residual.hpp"
 
 namespace upright {
@@ -133,7 +134,7 @@ bool Search::is_nuisance(std::size_t effect) const {
 }
 
 void Search::sieve_every(std::size_t stride) {
-  sieve_ = {train_.runs, {}};
+  sieve_ = {train_.runs, {}, train_.bound};
   sieve_places_.clear();
   for (std::size_t s = 0; s < train_.segments.size(); s += stride) {
     sieve_.segments.push_back(train_.segments[s]);
@@ -551,24 +552,8 @@ Hypothesis Search::with_pair(const Hypothesis& base, const Hypothesis& first, co
   return h;
 }
 
-std::vector<std::pair<double, double>> Search::force_residual(const Hypothesis& base) const {
-  std::vector<std::pair<double, double>> pairs;
-  for (const ResidualTrace& trace : smooth_residuals(train_, base.train.point))
-    for (std::size_t k = 0; k < trace.time_s.size(); ++k)
-      if (std::abs(trace.cart_mps[k]) > 1e-3) pairs.emplace_back(trace.cart_m[k], trace.force_n[k]);
-  constexpr std::size_t most = 4000;
-  if (pairs.size() > most) {
-    std::vector<std::pair<double, double>> thinned;
-    for (std::size_t i = 0; i < most; ++i) thinned.push_back(pairs[i * pairs.size() / most]);
-    pairs = thinned;
-  }
-  return pairs;
-}
-
 std::vector<std::vector<double>> Search::starts_of(std::size_t effect, const Hypothesis& base) const {
-  const bool cogging = effect_registry()[effect].kind == "cogging_force";
-  return search_starts(effect, range_,
-                       cogging ? force_residual(base) : std::vector<std::pair<double, double>>{});
+  return effect_starts(effect, range_, train_, base.train.point);
 }
 
 }  // namespace upright

@@ -58,7 +58,7 @@ class Stages {
       const auto first = cases.begin() + static_cast<std::ptrdiff_t>(g * size);
       const std::size_t count = std::min(size, cases.size() - g * size);
       const std::vector<SweepRun>* kept = journal_ != nullptr ? journal_->find(stage_, g) : nullptr;
-      if (kept != nullptr && kept->size() == count) {
+      if (kept != nullptr && are_of(*kept, first, count)) {
         std::copy(kept->begin(), kept->end(), runs.begin() + static_cast<std::ptrdiff_t>(g * size));
         done_ += count;
       } else {
@@ -88,6 +88,15 @@ class Stages {
   std::size_t runs_made() const { return made_; }
 
  private:
+  /// A journal that a disk or somebody has damaged keeps runs of other cases, which are made anew.
+  static bool are_of(const std::vector<SweepRun>& kept, std::vector<LoopCase>::const_iterator first,
+                     std::size_t count) {
+    if (kept.size() != count) return false;
+    return std::equal(kept.begin(), kept.end(), first, [](const SweepRun& run, const LoopCase& c) {
+      return run.start.theta0_rad == c.theta0_rad && run.start.delay_s == c.delay_s;
+    });
+  }
+
   const SweepConfig& config_;
   const SweepOptions& options_;
   SweepTeam& team_;
@@ -269,6 +278,9 @@ std::string margins_csv(const std::vector<LinearMargin>& margins) {
   return text;
 }
 
+/// It goes last: while it is there the sweep is unfinished.
+constexpr const char* journal_name = "sweep.partial";
+
 /// Whole or not at all.
 void write_file(const std::filesystem::path& file, const std::string& text) {
   const std::filesystem::path beside = file.string() + ".new";
@@ -278,7 +290,7 @@ void write_file(const std::filesystem::path& file, const std::string& text) {
   std::error_code error;
   if (out) std::filesystem::rename(beside, file, error);
   if (!out || error)
-    throw Error(ExitCode::usage, "check the folder and its free space: cannot write " + file.string());
+    throw Error(ExitCode::usage, "cannot write " + file.string() + ": check the folder and its free space");
 }
 
 void prepare_folder(const std::filesystem::path& folder, bool overwrite) {
@@ -286,21 +298,23 @@ void prepare_folder(const std::filesystem::path& folder, bool overwrite) {
   std::filesystem::create_directories(folder, error);
   if (error)
     throw Error(ExitCode::usage,
-                "check the path and its permissions: cannot make the folder " + folder.string());
-  for (const char* name : {"sweep.csv", "transitions.csv", "margins.csv", "sweep.yaml", "sweep.partial"}) {
+                "cannot make the folder " + folder.string() + ": check the path and its permissions");
+  if (overwrite) std::filesystem::remove(folder / journal_name, error);
+  // Beside a journal they are of a call that ended while it wrote them: it was not the last word.
+  const bool unfinished = std::filesystem::exists(folder / journal_name, error);
+  for (const char* name : {"sweep.csv", "transitions.csv", "margins.csv", "sweep.yaml"}) {
     const std::filesystem::path file = folder / name;
-    const bool result = std::string(name) != "sweep.partial";
     if (overwrite)
       std::filesystem::remove(file, error);
-    else if (result && std::filesystem::exists(file, error))
-      throw ConfigError("give another --out, or --overwrite to replace it: " + file.string() + " exists");
+    else if (!unfinished && std::filesystem::exists(file, error))
+      throw ConfigError(file.string() + " exists: give another --out, or --overwrite to replace it");
   }
 }
 
 }  // namespace
 
 std::vector<LinearMargin> linear_margins(const SweepConfig& config) {
-  if (config.setup.make_compensator) return {};
+  if (config.setup.make_parts) return {};
   constexpr double usual_smoothing = 100.0;  // as `upright margin` takes it
   const double smoothing =
       config.setup.model.smoothing > 0.0 ? config.setup.model.smoothing : usual_smoothing;
@@ -322,9 +336,9 @@ void refuse_unstable(const SweepConfig& config, const std::vector<LinearMargin>&
         return margin.critical_delay_s > 0.0;
       }))
     return;
-  throw ConfigError("check the plant file, or design gains for it (upright design PLANT --out GAINS): " +
-                    (config.plant_file.empty() ? std::string("the plant") : config.plant_file.string()) +
-                    " is unstable with these gains even without delay");
+  throw ConfigError((config.plant_file.empty() ? std::string("the plant") : config.plant_file.string()) +
+                    " is unstable with these gains even without delay: check the plant file, or design gains "
+                    "for it (upright design PLANT --out GAINS)");
 }
 
 std::vector<Transition> find_transitions(const SweepConfig& config, SweepTeam& team) {
@@ -343,7 +357,7 @@ SweepResult run_sweep(const SweepConfig& config, const std::filesystem::path& fo
   refuse_unstable(config, margins);
   prepare_folder(folder, options.overwrite);
   const std::string mode = options.transitions_only ? "# transitions only\n" : "";
-  SweepJournal journal(folder / "sweep.partial", mode + config.resolved_text);
+  SweepJournal journal(folder / journal_name, mode + config.resolved_text);
   Stages stages(config, options, team, &journal);
   TransitionSearch search(config, stages);
   SweepResult result;
@@ -365,6 +379,7 @@ SweepResult run_sweep(const SweepConfig& config, const std::filesystem::path& fo
   if (!whole) return result;
   sort_runs(result.runs);
   result.transitions = search.transitions();
+  journal.check();
   write_file(folder / "sweep.yaml", mode + config.resolved_text);
   write_file(folder / "margins.csv", margins_csv(margins));
   write_file(folder / "transitions.csv", transitions_csv(result.transitions));

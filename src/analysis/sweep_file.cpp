@@ -6,8 +6,9 @@
 
 #include "upright/analysis/sweep.hpp"
 #include "upright/control/delay_line.hpp"
+#include "upright/control/filter_model.hpp"
 #include "upright/control/gain_file.hpp"
-#include "upright/control/predictor.hpp"
+#include "upright/control/model_parts.hpp"
 #include "upright/hal/rig_file.hpp"
 #include "upright/model/error.hpp"
 #include "upright/model/plant_file.hpp"
@@ -82,6 +83,8 @@ std::string take_rig(const YamlMap& map, LoopSetup& setup) {
   setup.cart_resolution_m = steps ? rig.calibration.cart.per_count : 0.0;
   setup.angle_resolution_rad = steps ? rig.calibration.pendulum.per_count : 0.0;
   setup.amplifier_limit_v = rig.amplifier.limit_v;
+  setup.control =
+      with_encoders(setup.control, rig.calibration.cart.per_count, rig.calibration.pendulum.per_count);
   return "  # rig: cart step " + exact_text(setup.cart_resolution_m) + " m, angle step " +
          exact_text(setup.angle_resolution_rad) + " rad, amplifier " + exact_text(setup.amplifier_limit_v) +
          " V\n";
@@ -103,17 +106,26 @@ void read_outcome(const YamlMap& map, SweepConfig& config) {
                  "give it more than " + exact_text(config.stable_below_rad));
 }
 
-/// Gives sampled loops the predictor that the gain file asks for; returns its plant file's text, or nothing.
-std::string take_compensation(const YamlMap& map, LoopSetup& setup) {
-  if (setup.control.compensation.kind == CompensationKind::none) return "";
+/// Gives sampled loops the estimator and the predictor that the gain file asks for; returns their plant
+/// files' text, or nothing.
+std::string take_model_parts(const YamlMap& map, LoopSetup& setup) {
+  const ControlConfig& control = setup.control;
+  const bool predicts = control.compensation.kind != CompensationKind::none;
+  const bool estimates = control.has_state_estimator();
+  if (!predicts && !estimates) return "";
   if (!setup.sampled)
-    map.fail("loop", "is continuous, and the gain file's delay_compensation predicts from period to period",
+    map.fail("loop",
+             std::string("is continuous, and the gain file's ") +
+                 (predicts ? "delay_compensation predicts" : "state_estimator works") +
+                 " from period to period",
              "use loop: sampled");
-  const Plant model = read_plant_file(setup.control.compensation.plant);
-  setup.make_compensator = [model](const ControlConfig& control, double) {
-    return std::make_unique<Predictor>(control, model);
+  const Plant predicted = predicts ? read_plant_file(control.compensation.plant) : Plant{};
+  const Plant estimated = estimates ? read_plant_file(control.state_estimator.plant) : Plant{};
+  setup.make_parts = [estimated, predicted](const ControlConfig& asked) {
+    return make_model_parts(asked, estimated, predicted);
   };
-  return "# The predictor's plant file:\n" + plant_text(model);
+  return (predicts ? "# The predictor's plant file:\n" + plant_text(predicted) : std::string()) +
+         (estimates ? "# The estimator's plant file:\n" + plant_text(estimated) : std::string());
 }
 
 }  // namespace
@@ -131,7 +143,7 @@ SweepConfig read_sweep_file(const std::filesystem::path& file) {
   if (!setup.sampled && map.has("rig"))
     map.fail("rig", "is only for sampled loops", "remove it, or use loop: sampled");
   const std::string rig = setup.sampled ? take_rig(map, setup) : std::string();
-  const std::string compensation = take_compensation(map, setup);
+  const std::string compensation = take_model_parts(map, setup);
   read_outcome(map, config);
   config.theta0_rad = read_angles(map, setup.fell_above_rad);
   config.delay_s = read_delays(map);

@@ -1,9 +1,11 @@
 #include "sweep_journal.hpp"
 
-#include <fstream>
+#include <sys/stat.h>
+
 #include <sstream>
 
 #include "upright/model/error.hpp"
+#include "upright/model/input_file.hpp"
 #include "upright/model/yaml_reader.hpp"
 
 namespace upright {
@@ -41,16 +43,17 @@ std::string line_of(std::size_t stage, std::size_t group, const std::vector<Swee
 SweepJournal::SweepJournal(const std::filesystem::path& file, const std::string& sweep_text) : file_(file) {
   const std::string header = header_for(sweep_text);
   std::uintmax_t whole_bytes = 0;
-  if (std::ifstream in(file, std::ios::binary); in) {
+  if (const std::unique_ptr<InputFile> in = InputFile::if_there(file)) {
     std::string line;
-    std::getline(in, line);
-    if (!line.empty() && !in.eof() && line != header)
-      throw ConfigError("give another --out, or --overwrite: " + file.string() +
-                        " keeps an unfinished sweep of another configuration");
-    if (line == header && !in.eof()) {
+    std::getline(*in, line);
+    if (!line.empty() && !in->eof() && line != header)
+      throw ConfigError(
+          file.string() +
+          " keeps an unfinished sweep of another configuration: give another --out, or --overwrite");
+    if (line == header && !in->eof()) {
       whole_bytes = line.size() + 1;
       // A line that was being written when the machine went down has no end; it is cut off below.
-      while (std::getline(in, line) && !in.eof() && line.ends_with(line_end)) {
+      while (std::getline(*in, line) && !in->eof() && line.ends_with(line_end)) {
         whole_bytes += line.size() + 1;
         std::istringstream words(line);
         std::size_t stage = 0, group = 0, count = 0;
@@ -78,7 +81,7 @@ SweepJournal::SweepJournal(const std::filesystem::path& file, const std::string&
   const bool good = out_ != nullptr && (whole_bytes > 0 || std::fputs((header + "\n").c_str(), out_) >= 0) &&
                     std::fflush(out_) == 0;
   if (!good)
-    throw Error(ExitCode::usage, "check the folder and its free space: cannot write " + file.string());
+    throw Error(ExitCode::usage, "cannot write " + file.string() + ": check the folder and its free space");
 }
 
 SweepJournal::~SweepJournal() {
@@ -90,12 +93,32 @@ const std::vector<SweepRun>* SweepJournal::find(std::size_t stage, std::size_t g
   return it == done_.end() ? nullptr : &it->second;
 }
 
+void SweepJournal::check() const {
+  struct stat held {
+  }, named{};
+  if (::fstat(::fileno(out_), &held) != 0) return;
+  const bool in_place =
+      ::stat(file_.c_str(), &named) == 0 && named.st_ino == held.st_ino && named.st_dev == held.st_dev;
+  if (in_place) return;
+  const std::string folder = file_.parent_path().string();
+  std::error_code problem;
+  const std::filesystem::path now =
+      std::filesystem::read_symlink("/proc/self/fd/" + std::to_string(::fileno(out_)), problem);
+  if (held.st_nlink == 0 || problem)
+    throw Error(ExitCode::usage, folder +
+                                     " was removed, or its sweep.partial was, while the sweep went on, so "
+                                     "its runs are lost: start it again and leave the folder alone");
+  throw Error(ExitCode::usage,
+              folder + " was moved to " + now.parent_path().string() +
+                  " while the sweep went on: give that folder as --out, it goes on from there");
+}
+
 void SweepJournal::keep(std::size_t stage, std::size_t group, const std::vector<SweepRun>& runs) {
+  check();
   const std::string line = line_of(stage, group, runs) + "\n";
   if (std::fputs(line.c_str(), out_) < 0 || std::fflush(out_) != 0)
-    throw Error(
-        ExitCode::usage,
-        "free space on the disk and start again, it goes on from there: cannot write " + file_.string());
+    throw Error(ExitCode::usage, "cannot write " + file_.string() +
+                                     ": free space on the disk and start again, it goes on from there");
 }
 
 void SweepJournal::remove() {

@@ -23,7 +23,11 @@ class SweepJournal {
 
   /// The runs of a group when they are there already.
   const std::vector<SweepRun>* find(std::size_t stage, std::size_t group) const;
+  /// Throws Error when the runs could not be kept.
   void keep(std::size_t stage, std::size_t group, const std::vector<SweepRun>& runs);
+  /// Throws Error when another program has removed or moved the journal, with its folder or alone.
+  void check() const;
+  /// Once the results are written.
   void remove();
 
  private:

@@ -219,7 +219,8 @@ void SweepRanks::serve(const SweepConfig& config, unsigned threads) const {
 
 SweepRanks::SweepRanks() {
   if (started_by_mpirun())
-    throw ConfigError("install libopenmpi-dev and build again, or go without mpirun: built without MPI");
+    throw ConfigError(
+        "this program was built without MPI: install libopenmpi-dev and build again, or go without mpirun");
 }
 SweepRanks::~SweepRanks() = default;
 

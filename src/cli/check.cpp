@@ -1,4 +1,5 @@
 // `upright check`: reads files as the other commands would, without hardware.
+#include <algorithm>
 #include <array>
 #include <iostream>
 #include <memory>
@@ -7,9 +8,11 @@
 #include <vector>
 
 #include "commands.hpp"
+#include "upright/analysis/file_agreement.hpp"
 #include "upright/analysis/measurement.hpp"
 #include "upright/analysis/sweep.hpp"
 #include "upright/control/gain_file.hpp"
+#include "upright/control/model_parts.hpp"
 #include "upright/hal/rig_file.hpp"
 #include "upright/model/error.hpp"
 #include "upright/model/plant_file.hpp"
@@ -29,7 +32,7 @@ struct FileKind {
 void check_gains(const std::filesystem::path& file) {
   const ControlConfig config = read_gain_file(file);
   make_estimator_step(config.estimator, config.period_s());
-  if (config.compensation.kind == CompensationKind::predictor) read_plant_file(config.compensation.plant);
+  make_model_parts(config);
 }
 
 void check_rig(const std::filesystem::path& file) {
@@ -43,10 +46,14 @@ void check_experiment(const std::filesystem::path& file) {
   if (!experiment.gains.empty()) check_gains(experiment.gains);
 }
 
+constexpr const char* plant_kind = "plant";
+constexpr const char* gain_kind = "gain";
+constexpr const char* rig_kind = "rig";
+
 constexpr std::array file_kinds = {
-    FileKind{"plant", "plant", [](const std::filesystem::path& file) { read_plant_file(file); }},
-    FileKind{"gain", "gains", check_gains},
-    FileKind{"rig", "backend", check_rig},
+    FileKind{plant_kind, "plant", [](const std::filesystem::path& file) { read_plant_file(file); }},
+    FileKind{gain_kind, "gains", check_gains},
+    FileKind{rig_kind, "backend", check_rig},
     FileKind{"sweep", "sweep", [](const std::filesystem::path& file) { read_sweep_file(file); }},
     FileKind{"experiment", "experiment", check_experiment},
     FileKind{"dataset", "dataset",
@@ -56,7 +63,8 @@ constexpr std::array file_kinds = {
 struct Finding {
   std::string file;
   std::string kind;
-  std::string error;  // empty: valid
+  std::string error;                  // empty: valid
+  std::vector<std::string> warnings;  // valid, and hard to believe
 };
 
 const FileKind& kind_of(const YamlMap& document) {
@@ -73,20 +81,51 @@ const FileKind& kind_of(const YamlMap& document) {
     if (!near.empty())
       document.fail(key, "is not a known key", "did you mean " + near + "? otherwise remove it");
   }
-  throw ConfigError("give the file one of the top-level keys " + list + ": " + document.file().string() +
-                    ":1: none of them is there");
+  throw ConfigError(document.file().string() +
+                    ":1: no top-level key says what kind of file it is: give it one of " + list);
 }
 
 Finding check(const std::string& file) {
-  Finding finding{file, "", ""};
+  Finding finding{file, "", "", {}};
   try {
     const FileKind& kind = kind_of(YamlMap::from_file(file));
     finding.kind = kind.name;
     kind.read(file);
+    if (finding.kind == plant_kind) finding.warnings = doubts_about(read_plant_file(file));
+    if (finding.kind == gain_kind) finding.warnings = doubts_about(read_gain_file(file));
+    if (finding.kind == rig_kind) finding.warnings = doubts_about(read_rig_file(file));
   } catch (const Error& error) {
     finding.error = error.what();
   }
   return finding;
+}
+
+/// The one file of this kind; empty: there is none, or it is not valid.
+std::string only(const std::vector<Finding>& findings, const char* kind) {
+  for (const Finding& finding : findings)
+    if (finding.kind == kind && finding.error.empty()) return finding.file;
+  return "";
+}
+
+/// Files are those of one run where there is no second of a kind; others have nothing to do with each other.
+bool are_of_one_run(const std::vector<Finding>& findings) {
+  const auto several = [&findings](const char* kind) {
+    return std::count_if(findings.begin(), findings.end(),
+                         [kind](const Finding& finding) { return finding.kind == kind; }) > 1;
+  };
+  return !several(plant_kind) && !several(gain_kind) && !several(rig_kind);
+}
+
+Agreement agreement_among(const std::vector<Finding>& findings) {
+  if (!are_of_one_run(findings)) return {};
+  RunFiles files;
+  if (const std::string file = only(findings, rig_kind); !file.empty()) files.rig = read_rig_file(file);
+  if (const std::string file = only(findings, gain_kind); !file.empty()) files.control = read_gain_file(file);
+  if (const std::string file = only(findings, plant_kind); !file.empty())
+    files.plant = read_plant_file(file);
+  else if (files.rig && is_simulated(*files.rig))
+    files.plant = read_plant_file(files.rig->simulated->plant);
+  return agreement_of(files);
 }
 
 using Json = nlohmann::ordered_json;
@@ -99,23 +138,41 @@ Json json_of(const Finding& finding) {
   return {{"file", finding.file},
           {"valid", finding.error.empty()},
           {"kind", text_or_null(finding.kind)},
-          {"error", text_or_null(finding.error)}};
+          {"error", text_or_null(finding.error)},
+          {"warnings", finding.warnings}};
+}
+
+void print(const Finding& finding, bool as_json) {
+  if (!finding.error.empty()) std::cerr << "upright: " << finding.error << "\n";
+  for (const std::string& warning : finding.warnings)
+    std::cerr << "upright: warning: " << finding.file << ": " << warning << "\n";
+  if (!as_json && finding.error.empty())
+    std::cout << finding.file << ": a valid " << finding.kind << " file\n";
+}
+
+void print(const Agreement& agreement) {
+  for (const std::string& error : agreement.errors)
+    std::cerr << "upright: the files do not go together: " << error << "\n";
+  for (const std::string& warning : agreement.warnings) std::cerr << "upright: warning: " << warning << "\n";
 }
 
 bool check_all(const std::vector<std::string>& files, bool as_json) {
+  std::vector<Finding> findings;
   bool all_valid = true;
   Json list = Json::array();
   for (const std::string& file : files) {
-    const Finding finding = check(file);
-    all_valid = all_valid && finding.error.empty();
-    if (!finding.error.empty()) std::cerr << "upright: " << finding.error << "\n";
-    if (as_json)
-      list.push_back(json_of(finding));
-    else if (finding.error.empty())
-      std::cout << file << ": a valid " << finding.kind << " file\n";
+    findings.push_back(check(file));
+    all_valid = all_valid && findings.back().error.empty();
+    print(findings.back(), as_json);
+    list.push_back(json_of(findings.back()));
   }
+  const Agreement agreement = agreement_among(findings);
+  all_valid = all_valid && agreement.errors.empty();
+  print(agreement);
   if (as_json) {
-    const Json document{{"valid", all_valid}, {"files", list}};
+    const Json document{{"valid", all_valid},
+                        {"files", list},
+                        {"together", {{"errors", agreement.errors}, {"warnings", agreement.warnings}}}};
     // A file name need not be UTF-8.
     std::cout << document.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) << "\n";
   }
@@ -125,9 +182,13 @@ bool check_all(const std::vector<std::string>& files, bool as_json) {
 }  // namespace
 
 void add_check(CommandLine& line) {
-  const Command command =
-      line.command("check", "Validate files without hardware",
-                   "Example:  upright check config/plants/*.yaml config/gains/*.yaml config/rigs/*.yaml");
+  const Command command = line.command(
+      "check", "Validate files without hardware",
+      "Examples:\n"
+      "  upright check config/plants/*.yaml config/gains/*.yaml config/rigs/*.yaml\n"
+      "  upright check my-rig.yaml my-gains.yaml my-plant.yaml\n"
+      "A rig, a gain and a plant file, one of each, are checked against each other too: rate and "
+      "link,\nwatchdogs and period, gains and plant.");
   const auto files = std::make_shared<std::vector<std::string>>();
   const auto as_json = std::make_shared<bool>(false);
   command.option("files", *files, "The files to read").required();

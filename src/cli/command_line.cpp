@@ -5,7 +5,9 @@
 #include <charconv>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <optional>
+#include <type_traits>
 #include <utility>
 
 namespace upright::cli {
@@ -57,17 +59,17 @@ std::string sentence_for(const CLI::ParseError& error, CLI::App& app, const std:
     if (word.starts_with("-")) {
       const std::string flag = word.substr(0, word.find('='));
       const std::string bare = flag.substr(std::min(flag.find_first_not_of('-'), flag.size()));
-      return remedy_for(bare, flag_names(command), "--", name) + ": " + name + " has no flag " + flag;
+      return name + " has no flag " + flag + ": " + remedy_for(bare, flag_names(command), "--", name);
     }
     if (at_top)
-      return remedy_for(word, command_names(app), "", name) + ": " + name + " has no command " + word;
-    return "remove it, or see " + name + " --help: " + name + " does not expect '" + word + "'";
+      return name + " has no command " + word + ": " + remedy_for(word, command_names(app), "", name);
+    return name + " does not expect '" + word + "': remove it, or see " + name + " --help";
   }
-  if (at_top) return "name a command, see " + name + " --help: nothing to do";
+  if (at_top) return "no command was given: name one, see " + name + " --help";
   std::string problem = error.what();
   for (char& c : problem)
     if (c == '\n') c = ' ';
-  return "see " + name + " --help: " + printable(problem);
+  return printable(problem) + ": see " + name + " --help";
 }
 
 }  // namespace
@@ -83,7 +85,7 @@ const Option& Option::in(const Range& range) const {
     const char* end = text.data() + text.size();
     const auto result = std::from_chars(text.data(), end, value);
     const bool good = result.ec == std::errc{} && result.ptr == end && std::isfinite(value);
-    return good && range.contains(value) ? std::string() : "give it a number " + range.text();
+    return good && range.contains(value) ? std::string() : "it needs a number " + range.text();
   };
   option_.check(CLI::Validator(check, ""));
   return *this;
@@ -99,6 +101,11 @@ template const Option& Option::from_to(int, int) const;
 template const Option& Option::from_to(unsigned, unsigned) const;
 template const Option& Option::from_to(double, double) const;
 
+const Option& Option::without(const std::function<std::string(const std::string&)>& fault) const {
+  option_.check(CLI::Validator([fault](std::string& text) { return fault(text); }, ""));
+  return *this;
+}
+
 const Option& Option::one_of(const std::vector<std::string>& words) const {
   option_.check(CLI::IsMember(words));
   return *this;
@@ -109,9 +116,52 @@ const Option& Option::list_of(int count) const {
   return *this;
 }
 
+namespace {
+
+/// CLI11 alone takes -1 for the largest number there is.
+template <class Whole>
+std::string fault_of_whole_number(const std::string& text) {
+  Whole value = 0;
+  const char* end = text.data() + text.size();
+  const auto result = std::from_chars(text.data(), end, value);
+  const bool good = result.ec == std::errc{} && result.ptr == end;
+  return good ? std::string()
+              : "it needs a whole number from 0 to " + std::to_string(std::numeric_limits<Whole>::max()) +
+                    ", and is " + printable(text);
+}
+
+/// CLI11 alone takes nan and inf, which pass every comparison with a limit or none.
+std::string fault_of_number(const std::string& text) {
+  double value = 0.0;
+  const char* end = text.data() + text.size();
+  const char* begin = text.data() + (text.starts_with('+') ? 1 : 0);
+  const auto result = std::from_chars(begin, end, value);
+  const bool good = result.ec == std::errc{} && result.ptr == end && std::isfinite(value);
+  return good ? std::string() : "it needs a finite number, and is " + printable(text);
+}
+
+template <class Value>
+constexpr bool is_whole =
+    std::is_same_v<Value, std::uint64_t> || std::is_same_v<Value, std::optional<std::uint64_t>>;
+
+template <class Value>
+constexpr bool is_real = std::is_same_v<Value, double> || std::is_same_v<Value, std::optional<double>> ||
+                         std::is_same_v<Value, std::vector<double>>;
+
+}  // namespace
+
 template <class Value>
 Option Command::option(const std::string& name, Value& value, const std::string& meaning) const {
-  return Option(*app_.add_option(name, value, meaning));
+  CLI::Option* option = app_.add_option(name, value, meaning);
+  if constexpr (is_whole<Value>)
+    option->check(
+        CLI::Validator([](std::string& text) { return fault_of_whole_number<std::uint64_t>(text); }, ""));
+  if constexpr (std::is_same_v<Value, unsigned>)
+    option->check(
+        CLI::Validator([](std::string& text) { return fault_of_whole_number<unsigned>(text); }, ""));
+  if constexpr (is_real<Value>)
+    option->check(CLI::Validator([](std::string& text) { return fault_of_number(text); }, ""));
+  return Option(*option);
 }
 
 template Option Command::option(const std::string&, std::string&, const std::string&) const;
@@ -131,6 +181,7 @@ void Command::flag(const std::string& name, bool& value, const std::string& mean
 void Command::flag_or_text(const std::string& name, const std::string& usual, std::string& value,
                            const std::string& meaning) const {
   app_.add_flag(name + "{" + usual + "}", value, meaning);
+  flags_with_text_.insert(name);
 }
 
 void Command::does(std::function<ExitCode()> work) const {
@@ -147,15 +198,31 @@ CommandLine::CommandLine(const std::string& name, const std::string& version, co
 
 CommandLine::~CommandLine() = default;
 
+/// What was typed, last word first, as CLI11 takes it: a number behind a flag that may have a text is that
+/// text, as in `--live 9000`.
+std::vector<std::string> CommandLine::joined(int argc, const char* const* argv) const {
+  std::vector<std::string> words;
+  for (int i = 1; i < argc; ++i) {
+    const std::string word = argv[i];
+    const bool is_number = !word.empty() && word.find_first_not_of("0123456789") == std::string::npos;
+    if (is_number && !words.empty() && flags_with_text_.contains(words.back()))
+      words.back() += "=" + word;
+    else
+      words.push_back(word);
+  }
+  std::reverse(words.begin(), words.end());
+  return words;
+}
+
 Command CommandLine::command(const std::string& name, const std::string& summary, const std::string& footer) {
   CLI::App& command = *app_->add_subcommand(name, summary);
   command.footer(footer);
-  return {command, exit_code_};
+  return {command, exit_code_, flags_with_text_};
 }
 
 ExitCode CommandLine::run(int argc, const char* const* argv) {
   try {
-    app_->parse(argc, argv);
+    app_->parse(joined(argc, argv));
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() != 0) throw ConfigError(sentence_for(error, *app_, name_));
     app_->exit(error);

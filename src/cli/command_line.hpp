@@ -6,6 +6,7 @@
 
 #include <functional>
 #include <memory>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -30,6 +31,8 @@ class Option {
   /// Both ends included; `--help` shows them. `Number` is int, unsigned or double.
   template <class Number>
   const Option& from_to(Number low, Number high) const;
+  /// `fault` says what is wrong with the text, or nothing.
+  const Option& without(const std::function<std::string(const std::string&)>& fault) const;
   const Option& one_of(const std::vector<std::string>& words) const;
   /// So many values with commas between them.
   const Option& list_of(int count) const;
@@ -41,15 +44,18 @@ class Option {
 /// One command: its flags, and what it does. Refers to its CommandLine, cheap to copy.
 class Command {
  public:
-  Command(CLI::App& app, ExitCode& exit_code) : app_(app), exit_code_(exit_code) {}
+  Command(CLI::App& app, ExitCode& exit_code, std::set<std::string>& flags_with_text)
+      : app_(app), exit_code_(exit_code), flags_with_text_(flags_with_text) {}
 
   /// `name` with its dashes, or without any for a word in its place. `value` must live until the command ran,
-  /// and is left alone when the option is not given. `Value` is a std::string, double, int, unsigned or
-  /// std::uint64_t, a std::vector of the first two or a std::optional of double or std::uint64_t.
+  /// and is left alone when the option is not given. Numbers must be finite, and fit. `Value` is a
+  /// std::string, double, int, unsigned or std::uint64_t, a std::vector of the first two or a std::optional
+  /// of double or std::uint64_t.
   template <class Value>
   Option option(const std::string& name, Value& value, const std::string& meaning) const;
   void flag(const std::string& name, bool& value, const std::string& meaning) const;
-  /// A flag that stands for the text `usual`, or for what follows it: NAME=TEXT.
+  /// A flag that stands for the text `usual`, or for what follows it: NAME=TEXT, or NAME and a whole number
+  /// as the next word.
   void flag_or_text(const std::string& name, const std::string& usual, std::string& value,
                     const std::string& meaning) const;
   /// Called when this is the command that was typed.
@@ -58,6 +64,7 @@ class Command {
  private:
   CLI::App& app_;
   ExitCode& exit_code_;
+  std::set<std::string>& flags_with_text_;
 };
 
 class CommandLine {
@@ -75,8 +82,11 @@ class CommandLine {
   ExitCode run(int argc, const char* const* argv);
 
  private:
+  std::vector<std::string> joined(int argc, const char* const* argv) const;
+
   std::string name_;
   std::unique_ptr<CLI::App> app_;
+  std::set<std::string> flags_with_text_;
   ExitCode exit_code_ = ExitCode::done;
 };
 

@@ -8,6 +8,7 @@
 namespace upright::cli {
 
 void add_check(CommandLine& line);
+void add_compare(CommandLine& line);
 void add_design(CommandLine& line);
 void add_diagnose(CommandLine& line);
 void add_doctor(CommandLine& line);

@@ -1,5 +1,6 @@
 // `upright design`: gains for a plant by linear-quadratic design.
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <iostream>
@@ -9,6 +10,8 @@
 #include <string>
 
 #include "commands.hpp"
+#include "progress.hpp"
+#include "upright/analysis/estimator_design.hpp"
 #include "upright/analysis/gain_design.hpp"
 #include "upright/control/gain_file.hpp"
 #include "upright/model/error.hpp"
@@ -20,12 +23,17 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
+constexpr const char* no_estimator = "none";
+constexpr const char* extended_estimator = "extended_kalman";
+
 struct DesignOptions {
   std::string plant;
-  std::vector<double> q{5000.0, 3000.0, 20.0, 20.0};
-  double r = 1.0;
+  std::vector<double> q;
+  std::optional<double> r;
+  std::string estimator = no_estimator;
   double smoothing = 100.0;
   std::optional<double> delay_s;
+  std::optional<double> uncertainty;
   double rate_hz = 1000.0;
   double cutoff_hz = 50.0;
   double damping = 0.9;
@@ -84,9 +92,29 @@ std::string path_from(const std::filesystem::path& file, const std::filesystem::
   return error || relative.empty() ? std::filesystem::absolute(plant).string() : relative.string();
 }
 
-void write_gains(const DesignOptions& options, const GainDesign& design) {
+void refuse_replacing(const DesignOptions& options) {
   if (std::filesystem::exists(options.out) && !options.force)
-    throw ConfigError("give another --out or add --force: " + options.out + " exists already");
+    throw ConfigError(options.out + " exists already: give another --out or add --force");
+}
+
+DesignWeights weights_of(const DesignOptions& options, DesignWeights weights) {
+  std::copy(options.q.begin(), options.q.end(), weights.q.begin());
+  weights.r = options.r.value_or(weights.r);
+  return weights;
+}
+
+/// What the file cannot say in keys: the plant, and the weights that the gains follow from.
+std::vector<std::string> comments_for(const DesignOptions& options, const DesignWeights& weights) {
+  std::string text = "--q ";
+  for (std::size_t i = 0; i < weights.q.size(); ++i)
+    text += std::string(i > 0 ? "," : "") + exact_text(weights.q[i]);
+  text += " --r " + exact_text(weights.r) + " --smoothing " + exact_text(options.smoothing);
+  return {"Designed by `upright design` on " + options.plant,
+          "Weights on x, theta, x_dot, theta_dot and the voltage: " + text};
+}
+
+void write_gains(const DesignOptions& options, const DesignWeights& weights, const GainDesign& design) {
+  refuse_replacing(options);
   ControlConfig config;
   config.gains = {design.gains[0], design.gains[1], design.gains[2], design.gains[3]};
   config.delay_s = options.delay_s.value_or(0.0);
@@ -95,14 +123,81 @@ void write_gains(const DesignOptions& options, const GainDesign& design) {
   config.estimator.damping = options.damping;
   if (options.delay_s)
     config.compensation = {CompensationKind::predictor, path_from(options.out, options.plant)};
-  write_gain_file(config, options.out, {"Designed by `upright design` on " + options.plant});
+  write_gain_file(config, options.out, comments_for(options, weights));
+}
+
+Json json_of(const EstimatorDesign& design) {
+  Json document = json_of(design.gains.design, design.gains);
+  document["estimator"] = {
+      {"cart_force_noise_n2_per_s", *design.config.state_estimator.cart_force_noise_n2_per_s},
+      {"bears_delay_s", std::isfinite(design.bears_delay_s) ? Json(design.bears_delay_s) : Json(nullptr)},
+      {"bears_unmodelled_delay_s",
+       std::isfinite(design.bears_unmodelled_s) ? Json(design.bears_unmodelled_s) : Json(nullptr)}};
+  if (const auto& trials = design.trials)
+    document["trials"] = {{"runs", trials->runs},
+                          {"fell", trials->fell},
+                          {"hunting_m", trials->hunting_m},
+                          {"largest_hunting_m", trials->largest_hunting_m},
+                          {"most_sensitive_to", trials->most_sensitive_to}};
+  return document;
+}
+
+void print(const ParameterTrials& trials, double uncertainty) {
+  std::printf("%d simulated runs with parameters %.3g percent off, alone and together: none fell\n",
+              trials.runs, 100.0 * uncertainty);
+  std::printf(
+      "  the cart hunts %.1f mm with the plant file as it is, %.1f mm at most; most sensitive to %s\n",
+      1e3 * trials.hunting_m, 1e3 * trials.largest_hunting_m, trials.most_sensitive_to.c_str());
+}
+
+void design_estimator(const DesignOptions& options, const Plant& plant, Progress& progress) {
+  EstimatorRequest request;
+  if (options.estimator == extended_estimator) request.kind = StateEstimatorKind::extended_kalman;
+  request.uncertainty = options.uncertainty.value_or(parameter_uncertainty);
+  request.plant_file = std::filesystem::absolute(options.plant);
+  request.weights = weights_of(options, quiet_weights);
+  request.smoothing = options.smoothing;
+  request.rate_hz = options.rate_hz;
+  request.delay_s = options.delay_s;
+  const EstimatorDesign design = design_with_estimator(plant, request);
+  progress.end();
+  char borne[160];
+  std::snprintf(
+      borne, sizeof borne,
+      "while the cart slides it bears %.3g ms more of delay, and %.3g ms of an actuator slower than "
+      "the plant file says",
+      1e3 * design.bears_delay_s, 1e3 * design.bears_unmodelled_s);
+  if (!options.out.empty()) {
+    refuse_replacing(options);
+    ControlConfig config = design.config;
+    config.state_estimator.plant = path_from(options.out, options.plant);
+    if (options.delay_s) config.compensation.plant = config.state_estimator.plant;
+    write_gain_file(
+        config, options.out,
+        {"Designed by `upright design --estimator " + options.estimator + "` on " + options.plant + ":",
+         borne});
+  }
+  if (options.as_json) {
+    std::cout << json_of(design).dump(2) << "\n";
+    return;
+  }
+  print(design.gains.design, design.gains);
+  std::printf("estimator: force noise %.4g N^2/s; %s\n",
+              *design.config.state_estimator.cart_force_noise_n2_per_s, borne);
+  if (design.trials) print(*design.trials, request.uncertainty);
+  std::fflush(stdout);
 }
 
 void design(const DesignOptions& options) {
+  Progress progress("design");
   const Plant plant = read_plant_file(options.plant);
-  DesignWeights weights;
-  std::copy(options.q.begin(), options.q.end(), weights.q.begin());
-  weights.r = options.r;
+  if (options.estimator != no_estimator) {
+    design_estimator(options, plant, progress);
+    return;
+  }
+  if (options.uncertainty)
+    throw ConfigError("--uncertainty is for the design of an estimator: add --estimator, or leave it out");
+  const DesignWeights weights = weights_of(options, {});
   std::optional<SampledDesign> sampled;
   GainDesign gains;
   if (options.delay_s) {
@@ -115,11 +210,17 @@ void design(const DesignOptions& options) {
   } else {
     gains = design_gains(plant, weights, options.smoothing);
   }
-  if (!options.out.empty()) write_gains(options, gains);
-  if (options.as_json)
-    std::cout << json_of(gains, sampled).dump(2) << "\n";
-  else
-    print(gains, sampled);
+  if (!options.out.empty()) write_gains(options, weights, gains);
+  progress.end();
+  if (options.as_json) {
+    Json document = json_of(gains, sampled);
+    document["written_to"] = options.out.empty() ? Json(nullptr) : Json(options.out);
+    std::cout << document.dump(2, ' ', false, Json::error_handler_t::replace) << "\n";
+    return;
+  }
+  print(gains, sampled);
+  if (!options.out.empty()) std::printf("written to %s\n", options.out.c_str());
+  std::fflush(stdout);
 }
 
 }  // namespace
@@ -130,14 +231,31 @@ void add_design(CommandLine& line) {
       "Examples:\n"
       "  upright design config/plants/exponential.yaml --q 5000,3000,20,20 --r 1 --out gains.yaml\n"
       "  upright design config/plants/viscous.yaml --delay 0.1 --rate 1000 --out compensated.yaml\n"
+      "  upright design config/plants/viscous.yaml --estimator kalman --out quiet.yaml\n"
+      "  upright design config/plants/exponential.yaml --estimator extended_kalman --out quieter.yaml\n"
       "With --delay the gains feed back the state predicted to when the voltage acts (delay_compensation: "
       "predictor).");
   const auto options = std::make_shared<DesignOptions>();
   command.option("plant", options->plant, "Plant file").required();
-  command.option("--q", options->q, "Weights on x, theta, x_dot, theta_dot")
+  command
+      .option("--q", options->q,
+              "Weights on x, theta, x_dot, theta_dot (5000,3000,20,20; with --estimator 2500,1000,20,20)")
       .list_of(4)
       .in(Range::not_negative());
-  command.option("--r", options->r, "Weight on the voltage").in(Range::positive());
+  command.option("--r", options->r, "Weight on the voltage (1)").in(Range::positive());
+  command
+      .option(
+          "--estimator", options->estimator,
+          "none: velocity filter; kalman: a Kalman filter on the plant file, which also estimates and takes "
+          "away the force that the file does not know, its dry friction included; extended_kalman: one that "
+          "predicts with the file's friction and every other effect, and takes the friction away too")
+      .one_of({no_estimator, "kalman", extended_estimator});
+  command
+      .option(
+          "--uncertainty", options->uncertainty,
+          "With --estimator: share by which the parameters may be off without a fall (0.05); a design that "
+          "does not hold then is refused")
+      .in(Range::within(0.0, 0.5));
   command.option("--smoothing", options->smoothing, "sgn(v) is taken as tanh(smoothing v)")
       .in(Range::positive());
   command

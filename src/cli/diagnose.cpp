@@ -1,6 +1,4 @@
 // `upright diagnose`: where model and data disagree, which effect is missing, the model with it.
-#include <unistd.h>
-
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -12,9 +10,14 @@
 #include <vector>
 
 #include "commands.hpp"
+#include "experiment_data.hpp"
 #include "options.hpp"
+#include "progress.hpp"
+#include "signals.hpp"
+#include "upright/analysis/data_check.hpp"
 #include "upright/analysis/diagnosis.hpp"
 #include "upright/analysis/diagnosis_json.hpp"
+#include "upright/analysis/long_records.hpp"
 #include "upright/analysis/trace.hpp"
 #include "upright/model/error.hpp"
 #include "upright/model/plant_file.hpp"
@@ -31,16 +34,9 @@ struct DiagnoseFlags {
   std::string out;
   bool as_json = false;
   bool trials = false;
+  bool trust_data = false;
+  double effort = default_search_bound;
 };
-
-/// A bar on stderr, only where a person watches.
-void show_progress(double done, const std::string& what) {
-  constexpr int width = 30;
-  const int filled = static_cast<int>(std::clamp(done, 0.0, 1.0) * width);
-  std::fprintf(stderr, "\r[%s%s] %-44.44s", std::string(static_cast<std::size_t>(filled), '#').c_str(),
-               std::string(static_cast<std::size_t>(width - filled), '.').c_str(), what.c_str());
-  std::fflush(stderr);
-}
 
 std::string in_words(const ParameterEstimate& p) {
   char text[160];
@@ -86,7 +82,16 @@ void print_next_best(const NextBest& best) {
   }
 }
 
-void print(const Diagnosis& d, const std::string& out) {
+void print_verdict(const Diagnosis& d) {
+  if (d.interrupted)
+    std::printf("INTERRUPTED: the search was not finished. %s\n",
+                d.examined ? "What it had found was examined, what else it could be was not looked into."
+                           : "This is the best answer so far, and nothing says that it is right.");
+  if (d.bound_reached)
+    std::printf("SEARCH BOUND REACHED: the search was not finished. %s\n",
+                d.examined ? "What it had found was examined; --effort gives it more."
+                           : "This is the best answer so far; --effort gives it more.");
+  if (!d.examined) return;
   switch (d.verdict) {
     case Verdict::explained:
       std::printf("Explained: the model lacked what is listed here.\n");
@@ -101,11 +106,24 @@ void print(const Diagnosis& d, const std::string& out) {
       std::printf("Not excited: too little moves in these data to show anything.\n");
       break;
   }
-  std::printf("Gap on held-out data, in units of the noise: %.2f before, %.2f after.\n", d.gap_before,
-              d.gap_after);
+}
+
+std::string gap_text(double gap) {
+  if (!std::isfinite(gap)) return "not measured";
+  char text[32];
+  std::snprintf(text, sizeof text, "%.2f", gap);
+  return text;
+}
+
+void print(const Diagnosis& d, const std::string& out) {
+  print_verdict(d);
+  std::printf("Gap on held-out data, in units of the noise: %s before, %s after.\n",
+              gap_text(d.gap_before).c_str(), gap_text(d.gap_after).c_str());
   for (const FoundEffect& effect : d.effects) {
-    std::printf("  %-28s gap %.2f -> %.2f\n", kind_of(effect.effect).c_str(), effect.gap_before,
-                effect.gap_after);
+    std::printf("  %-28s", kind_of(effect.effect).c_str());
+    if (d.examined)
+      std::printf(" gap %s -> %s", gap_text(effect.gap_before).c_str(), gap_text(effect.gap_after).c_str());
+    std::printf("\n");
     for (const ParameterEstimate& p : effect.parameters) std::printf("      %s\n", in_words(p).c_str());
     if (!effect.where.empty()) std::printf("      %s\n", effect.where.c_str());
     if (!effect.confusable_with.empty()) {
@@ -140,6 +158,7 @@ void print_trials(const Diagnosis& d) {
 std::vector<std::string> provenance(const Diagnosis& d, const DiagnoseFlags& flags) {
   std::vector<std::string> lines = {"Diagnosed from " + flags.model + " by upright " UPRIGHT_VERSION "."};
   for (const std::string& data : flags.data) lines.push_back("data: " + data);
+  if (!d.examined) lines.emplace_back("The search was not finished: nothing says that this model is right.");
   for (const FoundEffect& effect : d.effects) {
     char text[200];
     std::snprintf(text, sizeof text, "added %s: gap %.3g -> %.3g", kind_of(effect.effect).c_str(),
@@ -173,7 +192,8 @@ void write_residuals(const Diagnosis& d, const fs::path& file) {
   }
   out.close();
   if (!out)
-    throw ConfigError("free some space or choose another folder with --out: cannot write " + file.string());
+    throw ConfigError("cannot write " + file.string() +
+                      ": free some space or choose another folder with --out");
 }
 
 /// Measured and simulated on held-out segments, with the plant file as given and with the model that was
@@ -209,7 +229,8 @@ void write_traces(const Diagnosis& d, const Plant& given, const std::vector<Meas
   }
   out.close();
   if (!out)
-    throw ConfigError("free some space or choose another folder with --out: cannot write " + file.string());
+    throw ConfigError("cannot write " + file.string() +
+                      ": free some space or choose another folder with --out");
 }
 
 void write_results(const Diagnosis& d, const Plant& given, const std::vector<Measurement>& runs,
@@ -217,8 +238,8 @@ void write_results(const Diagnosis& d, const Plant& given, const std::vector<Mea
   std::error_code problem;
   fs::create_directories(flags.out, problem);
   if (problem)
-    throw ConfigError("choose another folder with --out: cannot make " + flags.out + " (" +
-                      problem.message() + ")");
+    throw ConfigError("cannot make " + flags.out + " (" + problem.message() +
+                      "): choose another folder with --out");
   write_plant_file(d.model, fs::path(flags.out) / "model.yaml", provenance(d, flags));
   write_plant_file(given, fs::path(flags.out) / "given.yaml", {"The plant file as given: " + flags.model});
   write_residuals(d, fs::path(flags.out) / "residuals.csv");
@@ -228,20 +249,30 @@ void write_results(const Diagnosis& d, const Plant& given, const std::vector<Mea
   json << diagnosis_json(d).dump(2) << "\n";
   json.close();
   if (!json)
-    throw ConfigError("free some space or choose another folder with --out: cannot write " + file.string());
+    throw ConfigError("cannot write " + file.string() +
+                      ": free some space or choose another folder with --out");
 }
 
-void run_diagnose(const DiagnoseFlags& flags) {
+ExitCode run_diagnose(const DiagnoseFlags& flags) {
+  end_on_signal();
+  Progress progress("reading the data");
   const Plant plant = read_plant_file(flags.model);
-  const std::vector<Measurement> runs = read_measurements({flags.data.begin(), flags.data.end()});
+  const NamedRuns named = runs_named(flags.data);
+  std::vector<Measurement> runs = read_measurements(named.runs);
+  if (!flags.trust_data) refuse_mistakes(runs, plant);
+  runs = within_samples(std::move(runs), most_diagnosed_samples);
   if (!flags.out.empty() && fs::exists(fs::path(flags.out) / "diagnosis.json"))
-    throw ConfigError("choose another folder with --out: " + flags.out + " holds a diagnosis already");
+    throw ConfigError(flags.out + " holds a diagnosis already: choose another folder with --out");
   DiagnosisOptions options;
-  const bool watched = isatty(STDERR_FILENO) != 0;
-  if (watched) options.progress = show_progress;
-  const Diagnosis diagnosis = diagnose(plant, runs, options);
-  if (watched) std::fprintf(stderr, "\r%80s\r", "");
+  options.signal = &answer_on_signal();
+  options.search_bound = flags.effort;
+  progress.begin("diagnose");
+  options.progress = progress.callback();
+  Diagnosis diagnosis = diagnose(plant, runs, options);
+  diagnosis.notes.insert(diagnosis.notes.begin(), named.left_out.begin(), named.left_out.end());
+  progress.begin("writing the results");
   if (!flags.out.empty()) write_results(diagnosis, plant, runs, flags);
+  progress.end();
   if (flags.as_json) {
     std::cout << diagnosis_json(diagnosis).dump(2) << "\n";
   } else {
@@ -250,6 +281,7 @@ void run_diagnose(const DiagnoseFlags& flags) {
     std::fflush(stdout);
   }
   finish_output();
+  return diagnosis.interrupted ? ExitCode::stopped : ExitCode::done;
 }
 
 }  // namespace
@@ -257,17 +289,22 @@ void run_diagnose(const DiagnoseFlags& flags) {
 void add_diagnose(CommandLine& line) {
   const Command command = line.command(
       "diagnose", "Find the effect that a model lacks, from measured runs",
-      "Example:  upright diagnose --model config/plants/viscous.yaml --data runs/a runs/b --out diagnosis");
+      "Example:  upright diagnose --model config/plants/viscous.yaml --data runs/a runs/b --out diagnosis\n"
+      "Ctrl-C ends it with the best answer so far and exit code 3; a second Ctrl-C ends it at once.");
   const auto flags = std::make_shared<DiagnoseFlags>();
   command.option("--model", flags->model, "Plant file: what is believed of the rig").required();
-  command.option("--data", flags->data, "Runs: run directories, CSV or dataset files").required();
+  command.option("--data", flags->data, "Runs: experiment folders, run directories, CSV or dataset files")
+      .required();
   command.option("--out", flags->out, "Folder for diagnosis.json and model.yaml");
+  command.flag("--trust-data", flags->trust_data,
+               "Search though signs, zeros or units of the data contradict the plant file");
   command.flag("--trials", flags->trials, "Show every fit of the search, and which were taken");
+  command
+      .option("--effort", flags->effort,
+              "How often the search may follow each sample at most, before it gives the best answer so far")
+      .in(Range::positive());
   command.flag("--json", flags->as_json, "One JSON document on stdout");
-  command.does([flags] {
-    run_diagnose(*flags);
-    return ExitCode::done;
-  });
+  command.does([flags] { return run_diagnose(*flags); });
 }
 
 }  // namespace upright::cli

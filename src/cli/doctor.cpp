@@ -2,6 +2,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <iostream>
 #include <memory>
@@ -11,6 +12,7 @@
 
 #include "commands.hpp"
 #include "histogram_json.hpp"
+#include "progress.hpp"
 #include "signals.hpp"
 #include "upright/control/gain_file.hpp"
 #include "upright/hal/gpio_rig.hpp"
@@ -59,7 +61,9 @@ void append(std::vector<Finding>& to, const std::vector<Finding>& more) {
 void examine_timing(const Arguments& arguments, Page& page) {
   std::fprintf(stderr, "upright: measuring wake-ups, %.0f s idle and %.0f s under load\n", arguments.seconds,
                arguments.seconds);
+  Progress progress("wake-ups, idle", arguments.seconds);
   const WakeProbe idle = probe_wake_ups(page.rate_hz, arguments.seconds, false, {});
+  progress.begin("wake-ups, loaded", arguments.seconds);
   const WakeProbe loaded = probe_wake_ups(page.rate_hz, arguments.seconds, true, {});
   page.idle = idle.late;
   page.loaded = loaded.late;
@@ -112,7 +116,9 @@ void examine_simulated(const Arguments& arguments, const RigFile& file, Page& pa
     return;
   }
   std::fprintf(stderr, "upright: reading the digital lines for %.0f s, at zero volts\n", arguments.seconds);
+  Progress progress("digital lines", arguments.seconds);
   const LinkProbe probe = probe_link(*rig, clock, page.rate_hz, arguments.seconds, signal);
+  progress.end();
   page.findings.push_back(judge_lines(probe));
   examine_lines(arguments, {file, *rig, clock, signal}, probe, page);
   rig->stop();
@@ -128,7 +134,9 @@ void examine_rig(const Arguments& arguments, const RigFile& file, Page& page) {
   const std::unique_ptr<Rig> rig = make_rig(file, {1.0 / page.rate_hz});
   rig->open();
   std::fprintf(stderr, "upright: measuring the link for %.0f s, at zero volts\n", arguments.seconds);
+  Progress progress("link", arguments.seconds);
   page.link = probe_link(*rig, clock, page.rate_hz, arguments.seconds, signal);
+  progress.end();
   page.findings.push_back(judge_link(*page.link, page.rate_hz));
   page.findings.push_back(judge_zero(page.link->counts, calibration_in_use(file)));
   const Bedside at{file, *rig, clock, signal};
@@ -137,10 +145,8 @@ void examine_rig(const Arguments& arguments, const RigFile& file, Page& page) {
   rig->stop();
 }
 
-const char* sentence_for(Health verdict) {
-  if (verdict == Health::bad) return "not fit to run a rig: see the lines marked bad";
-  if (verdict == Health::poor) return "fit to run a rig, less well than it could: see the remedies";
-  return "fit to run a rig";
+std::string sentence_for(const Page& page, Health verdict) {
+  return verdict_sentence(verdict, page.rate_hz, page.link ? &page.link->round_trip : nullptr);
 }
 
 Json json_of(const Page& page, Health verdict) {
@@ -151,7 +157,7 @@ Json json_of(const Page& page, Health verdict) {
                         {"what", f.what},
                         {"remedy", f.remedy.empty() ? Json(nullptr) : Json(f.remedy)}});
   Json document{{"verdict", name_of(verdict)},
-                {"sentence", sentence_for(verdict)},
+                {"sentence", sentence_for(page, verdict)},
                 {"findings", findings},
                 {"rate_hz", page.rate_hz},
                 {"wake_late_idle", histogram_json(page.idle)},
@@ -180,7 +186,7 @@ void print(const Page& page, Health verdict) {
     if (!f.remedy.empty()) std::printf("              -> %s\n", f.remedy.c_str());
   }
   print_histograms(page);
-  std::printf("Verdict: %s.\n", sentence_for(verdict));
+  std::printf("Verdict: %s.\n", sentence_for(page, verdict).c_str());
   std::fflush(stdout);
 }
 

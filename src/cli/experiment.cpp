@@ -8,10 +8,13 @@
 #include <cstdio>
 #include <ctime>
 #include <filesystem>
+#include <functional>
 #include <iostream>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <numbers>
+#include <optional>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -19,7 +22,10 @@
 #include "commands.hpp"
 #include "live.hpp"
 #include "options.hpp"
+#include "progress.hpp"
 #include "signals.hpp"
+#include "stop_watcher.hpp"
+#include "upright/analysis/overrun_limit.hpp"
 #include "upright/hal/gpio_rig.hpp"
 #include "upright/hal/rig_factory.hpp"
 #include "upright/model/error.hpp"
@@ -39,27 +45,19 @@ struct Arguments {
   std::optional<double> rate_hz;
   std::optional<std::uint64_t> seed;
   RealtimeRequest realtime;
-  bool fast = false, dry_run = false, ready = false, as_json = false;
+  bool fast = false, dry_run = false, ready = false, force = false, as_json = false;
 };
 
 bool needs_hands(const Piece& piece) {
   return !piece.operator_does.empty();
 }
 
-void refuse_unchecked_signs(const ExperimentSetup& setup, const std::vector<Piece>& pieces) {
-  if (is_simulated(setup.rig) || pieces.front().kind == PieceKind::sign_check || signs_are_checked(setup.rig))
-    return;
-  throw ConfigError("run upright experiment config/experiments/sign-check.yaml --rig " +
-                    setup.rig.file.string() + " first: no sign check was done on this rig as it is wired (" +
-                    sign_record_of(setup.rig).string() + ")");
-}
-
 void refuse_without_hands(const ExperimentSetup& setup, const std::vector<Piece>& pieces, bool ready) {
   if (is_simulated(setup.rig) || ready || ::isatty(STDIN_FILENO) != 0) return;
   const auto at = std::find_if(pieces.begin(), pieces.end(), needs_hands);
   if (at != pieces.end())
-    throw ConfigError("start it on a terminal, or give --ready when it is done: the piece " + at->label +
-                      " needs somebody to " + at->operator_does);
+    throw ConfigError("the piece " + at->label + " needs somebody to " + at->operator_does +
+                      ": start it on a terminal, or give --ready when it is done");
 }
 
 std::string utc_name(const std::string& name) {
@@ -77,9 +75,10 @@ fs::path folder_of(const Arguments& arguments, const ExperimentSetup& setup,
                    const std::vector<Piece>& pieces) {
   if (!arguments.out.empty()) {
     const std::vector<TrialResult> done = read_trials(arguments.out, setup, pieces);
+    const std::string missing = missing_transitions(pieces, done);
     if (!done.empty() && !next_trial(pieces, done))
-      throw ConfigError("choose another folder with --out: " + arguments.out +
-                        " holds this experiment, complete");
+      throw ConfigError(arguments.out + " holds this experiment with every run made" +
+                        (missing.empty() ? "" : " (" + missing + ")") + ": choose another folder with --out");
     return arguments.out;
   }
   const fs::path runs = "runs";
@@ -97,46 +96,55 @@ fs::path folder_of(const Arguments& arguments, const ExperimentSetup& setup,
   return runs / utc_name(setup.experiment.name);
 }
 
-struct PlanLine {
-  std::string label, kind;
-  double duration_s = 0.0, farthest_m = 0.0, most_v = 0.0;
-};
-
-std::vector<PlanLine> plan_lines(const std::vector<Piece>& pieces, const ExperimentSetup& setup) {
-  std::vector<PlanLine> lines;
-  for (Piece piece : pieces) {
-    if (piece.kind == PieceKind::delay_sweep) piece.delay_s = piece.delays_s.front();
-    const Rehearsal r = rehearse(piece, setup);
-    PlanLine line{piece.label, name_of(piece.kind), r.outcome.time_s, r.farthest_m, 0.0};
-    for (const LogRecord& row : r.rows) line.most_v = std::max(line.most_v, std::abs(row.voltage_v));
-    lines.push_back(line);
-  }
-  return lines;
-}
-
-void print_plan(const std::vector<PlanLine>& lines, const ExperimentSetup& setup) {
+void print_plan(const std::vector<PlannedPiece>& plan, const ExperimentSetup& setup) {
   std::printf("%s: %s\n", setup.experiment.name.c_str(), setup.experiment.why.c_str());
-  for (const PlanLine& line : lines)
-    std::printf("  %-24s %-18s %7.1f s  to %5.0f mm  %5.2f V\n", line.label.c_str(), line.kind.c_str(),
-                line.duration_s, line.farthest_m * 1e3, line.most_v);
+  for (const PlannedPiece& p : plan)
+    std::printf("  %-24s %-18s %7.1f s  to %5.0f mm  %5.2f V\n", p.piece.label.c_str(), name_of(p.piece.kind),
+                p.duration_s, p.farthest_m * 1e3, p.most_v);
   std::fflush(stdout);
 }
 
-Json json_of(const std::vector<PlanLine>& lines) {
+Json json_of(const std::vector<PlannedPiece>& plan) {
   Json list = Json::array();
-  for (const PlanLine& line : lines)
-    list.push_back({{"piece", line.label},
-                    {"kind", line.kind},
-                    {"duration_s", line.duration_s},
-                    {"farthest_m", line.farthest_m},
-                    {"largest_v", line.most_v}});
+  for (const PlannedPiece& p : plan)
+    list.push_back({{"piece", p.piece.label},
+                    {"kind", name_of(p.piece.kind)},
+                    {"duration_s", p.duration_s},
+                    {"farthest_m", p.farthest_m},
+                    {"largest_v", p.most_v}});
   return list;
 }
 
-Json json_of(const ExperimentResult& result, const std::vector<Piece>& pieces, const fs::path& folder) {
+/// As `run` does: gains that cannot hold the plant's pendulum are refused where a piece balances.
+void refuse_unstable(const ExperimentSetup& setup) {
+  std::set<fs::path> judged;
+  const auto judge = [&](const fs::path& file, const ControlConfig& control) {
+    if (judged.insert(file).second)
+      require_stabilized(overrun_limit(setup.plant, control), "the gains of " + file.string());
+  };
+  for (const Piece& piece : setup.experiment.pieces) {
+    if (balances(piece) && !compares(piece)) judge(setup.experiment.gains, setup.control);
+    for (std::size_t k = 0; k < piece.controllers.size(); ++k)
+      judge(piece.controllers[k].file, control_of(setup, piece, k));
+  }
+}
+
+/// The limit that a trial of a balancing piece had; null for the others.
+Json overrun_json(const ExperimentSetup& setup, const Piece& piece, const ExperimentTrial& trial) {
+  if (!balances(piece)) return nullptr;
+  ControlConfig control = control_of(setup, piece, trial.controller);
+  control.delay_s = trial.delay_s;
+  return overrun_limit(setup.plant, control).most_periods_late;
+}
+
+Json json_of(const ExperimentResult& result, const ExperimentSetup& setup, const std::vector<Piece>& pieces,
+             const fs::path& folder) {
   Json trials = Json::array();
   for (const TrialResult& r : result.trials) {
     const auto or_null = [](double value) { return std::isnan(value) ? Json(nullptr) : Json(value); };
+    const auto text_or_null = [](const std::string& text) {
+      return text.empty() ? Json(nullptr) : Json(text);
+    };
     trials.push_back({{"piece", pieces[r.trial.piece].label},
                       {"repeat", r.trial.repeat},
                       {"delay_s", r.trial.delay_s},
@@ -147,11 +155,16 @@ Json json_of(const ExperimentResult& result, const std::vector<Piece>& pieces, c
                       {"theta_amplitude_rad", r.theta_amplitude_rad},
                       {"cart_amplitude_m", r.cart_amplitude_m},
                       {"frequency_hz", or_null(r.frequency_hz)},
-                      {"fall_time_s", or_null(r.fall_time_s)}});
+                      {"fall_time_s", or_null(r.fall_time_s)},
+                      {"most_periods_late", overrun_json(setup, pieces[r.trial.piece], r.trial)},
+                      {"controller", text_or_null(r.controller)},
+                      {"gains", text_or_null(r.gains)}});
   }
   return {{"folder", folder.string()},
           {"complete", result.complete},
           {"made", result.made},
+          {"zero_volts", name_of_zero(result.stop)},
+          {"zero_volts_sentence", sentence_of(result.stop)},
           {"sentence", result.sentence.empty() ? Json(nullptr) : Json(result.sentence)},
           {"trials", trials}};
 }
@@ -168,6 +181,9 @@ const char* lifting_words(const Piece& piece) {
 
 /// The trial in a few words.
 std::string words_for(const Piece& piece, const ExperimentTrial& trial) {
+  if (compares(piece))
+    return piece.label + ": " + piece.controllers[trial.controller].name + ", round " +
+           std::to_string(trial.repeat + 1) + " of " + std::to_string(piece.repeats);
   if (piece.kind != PieceKind::delay_sweep) return piece.label;
   char text[64];
   std::snprintf(text, sizeof text, ": delay %.3f ms, repeat %d", trial.delay_s * 1e3, trial.repeat + 1);
@@ -187,7 +203,7 @@ void announce(const Piece& piece, const ExperimentTrial& trial, bool simulated, 
   std::fprintf(stderr, "  %s, then press Enter: ", piece.operator_does.c_str());
   std::string line;
   if (!std::getline(std::cin, line))
-    throw Error(ExitCode::stopped, "start the same command again to go on: nobody pressed Enter");
+    throw Error(ExitCode::stopped, "nobody pressed Enter: start the same command again to go on");
 }
 
 void show_live(const LiveStatus& live, ScriptPhase phase) {
@@ -226,6 +242,14 @@ std::unique_ptr<LiveView> open_live(const Arguments& arguments, const Experiment
   return open_live(arguments.live_port, subject, arguments.as_json ? stderr : stdout);
 }
 
+void print(const TrialResult& r) {
+  std::printf("  %s, angle +-%.3f deg, cart +-%.1f mm", r.outcome.c_str(),
+              r.theta_amplitude_rad * degrees_per_rad, r.cart_amplitude_m * 1e3);
+  if (std::isfinite(r.frequency_hz)) std::printf(", %.2f Hz", r.frequency_hz);
+  std::printf("\n");
+  std::fflush(stdout);
+}
+
 /// Runs the pieces that were planned.
 ExperimentResult perform(const Arguments& arguments, const ExperimentSetup& setup,
                          const std::vector<Piece>& pieces, const fs::path& folder, const SignalFlag& signal,
@@ -250,22 +274,28 @@ ExperimentResult perform(const Arguments& arguments, const ExperimentSetup& setu
   options.seed = arguments.seed.value_or(1);
   options.realtime = arguments.realtime;
   options.watcher = view;
+  options.know_loop = [&](const ControlConfig& control, LoopLimits& limits) {
+    const OverrunLimit overrun = overrun_limit(setup.plant, control);
+    if (!overrun.warning.empty()) std::cerr << "upright: " << overrun.warning << "\n";
+    apply(overrun, limits);
+  };
+  options.stop = stop_watcher(view);
   std::pair<Piece, ExperimentTrial> current;
   const bool on_terminal = ::isatty(STDERR_FILENO) != 0 && !arguments.fast;
+  // On a terminal a trial in real time shows where the cart is instead.
+  std::optional<Progress> progress;
+  if (!on_terminal) progress.emplace("experiment");
+  const auto say = [&](const std::function<void()>& speak) { progress ? progress->aside(speak) : speak(); };
   options.announce = [&](const Piece& piece, const ExperimentTrial& trial) {
     current = {piece, trial};
-    announce(piece, trial, simulated, arguments.ready, arguments.as_json, view);
+    say([&] { announce(piece, trial, simulated, arguments.ready, arguments.as_json, view); });
+    if (progress) progress->report(trial.piece, pieces.size(), "pieces");
   };
   options.finished = [&](const TrialResult& r) {
     if (on_terminal) std::fputs("\n", stderr);
     if (pieces[r.trial.piece].kind == PieceKind::sign_check)
       judge_sign_check(setup, options.folder / r.run_directory, arguments.as_json);
-    if (arguments.as_json || r.outcome == "done") return;
-    std::printf("  %s, angle +-%.3f deg, cart +-%.1f mm", r.outcome.c_str(),
-                r.theta_amplitude_rad * degrees_per_rad, r.cart_amplitude_m * 1e3);
-    if (std::isfinite(r.frequency_hz)) std::printf(", %.2f Hz", r.frequency_hz);
-    std::printf("\n");
-    std::fflush(stdout);
+    if (!arguments.as_json && (r.outcome != "done" || !r.controller.empty())) say([&] { print(r); });
   };
   if (on_terminal || view != nullptr)
     options.show = [&](const LiveStatus& live, ScriptPhase phase) {
@@ -274,8 +304,9 @@ ExperimentResult perform(const Arguments& arguments, const ExperimentSetup& setu
     };
   ExperimentResult result = run_experiment(setup, pieces, *rig, hand, clock, signal, options);
   if (view != nullptr)
-    view->end({result.complete ? LiveState::Kind::completed : LiveState::Kind::stopped,
-               (result.complete ? "every piece is done" : result.sentence) + ". The runs are in " +
+    view->end({result.complete && result.stop.done() ? LiveState::Kind::completed : LiveState::Kind::stopped,
+               (result.stop.done() ? "" : sentence_of(result.stop) + ". ") +
+                   (result.complete ? "every piece is done" : result.sentence) + ". The runs are in " +
                    folder.string()});
   return result;
 }
@@ -285,20 +316,25 @@ ExitCode run(const Arguments& arguments) {
       resolve_experiment(arguments.file, arguments.rig, arguments.plant, arguments.rate_hz);
   const bool simulated = is_simulated(setup.rig);
   if (!simulated) {
-    const std::string why = ": " + arguments.rig + " is not a simulated rig";
-    if (arguments.fast) throw ConfigError("remove --fast, or name a simulated rig" + why);
-    if (arguments.seed) throw ConfigError("remove --seed, or name a simulated rig" + why);
+    const std::string why = arguments.rig + " is not a simulated rig: remove ";
+    if (arguments.fast) throw ConfigError(why + "--fast, or name a simulated rig");
+    if (arguments.seed) throw ConfigError(why + "--seed, or name a simulated rig");
   }
-  const std::vector<Piece> pieces = plan_pieces(setup);
+  if (!arguments.force) refuse_unstable(setup);
+  Progress progress("planning");
+  const std::vector<PlannedPiece> plan = rehearse_all(setup, progress.callback());
+  progress.end();
   if (arguments.dry_run) {
-    const std::vector<PlanLine> lines = plan_lines(pieces, setup);
     if (arguments.as_json)
-      std::cout << Json{{"experiment", setup.experiment.name}, {"pieces", json_of(lines)}}.dump(2) << "\n";
+      std::cout << Json{{"experiment", setup.experiment.name}, {"pieces", json_of(plan)}}.dump(2) << "\n";
     else
-      print_plan(lines, setup);
+      print_plan(plan, setup);
     return ExitCode::done;
   }
-  refuse_unchecked_signs(setup, pieces);
+  std::vector<Piece> pieces;
+  pieces.reserve(plan.size());
+  for (const PlannedPiece& planned : plan) pieces.push_back(planned.piece);
+  if (pieces.front().kind != PieceKind::sign_check) require_checked_signs(setup.rig, "");
   refuse_without_hands(setup, pieces, arguments.ready);
   const SignalFlag& signal = catch_signals();
   const fs::path folder = folder_of(arguments, setup, pieces);
@@ -306,9 +342,15 @@ ExitCode run(const Arguments& arguments) {
   const ExperimentResult result =
       shown_by(view.get(), [&] { return perform(arguments, setup, pieces, folder, signal, view.get()); });
   if (arguments.as_json)
-    std::cout << json_of(result, pieces, folder).dump(2, ' ', false, Json::error_handler_t::replace) << "\n";
+    std::cout << json_of(result, setup, pieces, folder).dump(2, ' ', false, Json::error_handler_t::replace)
+              << "\n";
   else
     std::cout << folder.string() << std::endl;
+  if (!result.stop.done()) {
+    std::cerr << "upright: " << sentence_of(result.stop) << "\n";
+    if (!result.sentence.empty()) std::cerr << "upright: " << result.sentence << "\n";
+    return ExitCode::device;
+  }
   if (result.complete) return ExitCode::done;
   std::cerr << "upright: " << result.sentence << "\n";
   return ExitCode::stopped;
@@ -331,6 +373,8 @@ void add_experiment(CommandLine& line) {
       .in(Range::within(lowest_sample_rate_hz, highest_sample_rate_hz));
   add_simulated(command, a->seed, a->fast);
   command.flag("--dry-run", a->dry_run, "Plan and rehearse, then stop: nothing moves");
+  command.flag("--force", a->force,
+               "Plan with gains that do not stabilize the plant; the rehearsal decides then");
   command.flag("--ready", a->ready, "What pieces ask of an operator is done: do not wait for Enter");
   command.option("--out", a->out, "Folder of this experiment (runs/<UTC start>-<name>)");
   add_realtime(command, a->realtime);

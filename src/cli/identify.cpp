@@ -1,7 +1,6 @@
 // `upright identify`: friction and motor constants from measured runs.
-#include <unistd.h>
-
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
@@ -12,12 +11,16 @@
 #include <vector>
 
 #include "commands.hpp"
+#include "experiment_data.hpp"
 #include "options.hpp"
+#include "progress.hpp"
+#include "signals.hpp"
+#include "upright/analysis/data_check.hpp"
 #include "upright/analysis/identification.hpp"
+#include "upright/analysis/long_records.hpp"
 #include "upright/model/error.hpp"
 #include "upright/model/plant_file.hpp"
 #include "upright/report/identification_report.hpp"
-#include "upright/runtime/experiment.hpp"
 
 namespace upright::cli {
 
@@ -30,6 +33,7 @@ struct IdentifyFlags {
   std::string plant, out;
   std::vector<std::string> data;
   bool as_json = false;
+  bool trust_data = false;
 };
 
 /// Masses and motor: the plant file's, or those a simulated rig wrote into its run.
@@ -43,37 +47,45 @@ Plant base_of(const IdentifyFlags& flags) {
     if (document.has("plant")) return read_plant(document);
   }
   throw ConfigError(
-      "name a plant file with --plant: its masses and the motor's force per volt are needed, its friction is "
-      "not");
+      "no plant file was named, and its masses and the motor's force per volt are needed: name one with "
+      "--plant; its friction is not used");
 }
 
-/// Experiment folders stand for the runs in them.
-std::vector<std::string> runs_in(const std::vector<std::string>& data) {
-  std::vector<std::string> runs;
-  for (const std::string& item : data) {
-    std::error_code problem;
-    if (!fs::exists(fs::path(item) / "trials.csv", problem)) {
-      runs.push_back(item);
-      continue;
-    }
-    // In the order of the trials: names hold the second of the start only, so that sorting them would let the
-    // speed of the machine decide the order, and with it which samples are thinned out.
-    for (const TrialResult& trial : read_trials(item))
-      if (const fs::path run = fs::path(item) / trial.run_directory; fs::exists(run / "samples.csv", problem))
-        runs.push_back(run.string());
-  }
-  return runs;
+Json number(double value) {
+  return std::isfinite(value) ? Json(value) : Json(nullptr);
 }
 
-Json json_of(const Identification& id) {
+/// Asks what else moves the rig.
+std::string next_command(const IdentifyFlags& flags) {
+  std::string command =
+      "upright diagnose --model " + (flags.plant.empty() ? "PLANT" : flags.plant) + " --data";
+  for (const std::string& data : flags.data) command += " " + data;
+  return command;
+}
+
+Json verdict_json(const Identification& id, const IdentifyFlags& flags) {
+  Json document = {{"verdict", std::string(name_of(id.verdict))},
+                   {"gap",
+                    {{"measure", "held-out simulation error / noise floor"},
+                     {"before", number(id.gap_before)},
+                     {"after", number(id.gap_after)}}},
+                   {"trustworthy", id.is_trustworthy()},
+                   {"residual", id.residual}};
+  if (id.interrupted) document["interrupted"] = true;
+  if (id.verdict == Verdict::unexplained && !id.interrupted) document["next_command"] = next_command(flags);
+  return document;
+}
+
+Json json_of(const Identification& id, const IdentifyFlags& flags) {
   Json parameters = Json::array();
   for (const IdentifiedParameter& p : id.parameters)
     parameters.push_back({{"name", p.name},
                           {"unit", p.unit},
-                          {"value", p.value},
-                          {"ci95", {p.low, p.high}},
+                          {"value", number(p.value)},
+                          {"ci95", {number(p.low), number(p.high)}},
                           {"from", p.source},
-                          {"goodness", p.goodness}});
+                          {"goodness", p.goodness},
+                          {"trustworthy", id.is_trustworthy()}});
   Json balance = nullptr;
   if (id.balance)
     balance = {{"mass_kg", id.balance->mass_kg},
@@ -88,11 +100,49 @@ Json json_of(const Identification& id) {
   Json steady = Json::array();
   for (const SteadyPoint& s : id.steady_points)
     steady.push_back({{"run", s.run}, {"cart_mps", s.cart_mps}, {"friction_n", s.friction_n}});
-  return {{"parameters", parameters}, {"force_balance", balance}, {"breakaways", breakaways},
-          {"steady_points", steady},  {"residual_rms", id.rms},   {"notes", id.notes}};
+  Json document = verdict_json(id, flags);
+  document.update(Json{{"parameters", parameters},
+                       {"force_balance", balance},
+                       {"breakaways", breakaways},
+                       {"steady_points", steady},
+                       {"residual_rms", number(id.rms)},
+                       {"notes", id.notes}});
+  return document;
 }
 
-void print(const Identification& id) {
+void print_verdict(const Identification& id, const IdentifyFlags& flags) {
+  if (id.interrupted) {
+    std::printf(
+        "INTERRUPTED: the work was not finished. Nothing says that the numbers below are the rig's: they are "
+        "the best so far.\n");
+    return;
+  }
+  switch (id.verdict) {
+    case Verdict::explained:
+      std::printf("Explained: these numbers account for the data, of runs that their fit did not see too.\n");
+      break;
+    case Verdict::not_excited:
+      std::printf("NOT EXCITED: the data cannot show the numbers (%s). Those below are not the rig's.\n",
+                  id.residual.c_str());
+      break;
+    default:
+      std::printf(
+          "UNEXPLAINED: something moves this rig that identify does not know. The numbers below make up for "
+          "it "
+          "and are not the rig's.\n"
+          "What is missing, says:  %s\n",
+          next_command(flags).c_str());
+      break;
+  }
+  if (std::isfinite(id.gap_after))
+    std::printf("Gap on held-out data, in units of the noise: %.2f with the plant file, %.2f identified.\n",
+                id.gap_before, id.gap_after);
+  if (id.verdict != Verdict::not_excited) std::printf("Remaining: %s.\n", id.residual.c_str());
+}
+
+void print(const Identification& id, const IdentifyFlags& flags) {
+  print_verdict(id, flags);
+  if (!id.is_trustworthy() && !id.parameters.empty()) std::printf("Not to be used:\n");
   for (const IdentifiedParameter& p : id.parameters)
     std::printf("  %-44s %11.5g %-10s (95%%: %.5g to %.5g)  %s\n", p.name.c_str(), p.value, p.unit.c_str(),
                 p.low, p.high, p.source.c_str());
@@ -112,43 +162,55 @@ void write_results(const Identification& id, const std::vector<Measurement>& run
   std::error_code problem;
   fs::create_directories(flags.out, problem);
   if (problem)
-    throw ConfigError("choose another folder with --out: cannot make " + flags.out + " (" +
-                      problem.message() + ")");
-  std::vector<std::string> comments = {"Identified by upright " UPRIGHT_VERSION "."};
-  for (const std::string& data : flags.data) comments.push_back("data: " + data);
-  write_plant_file(id.plant, fs::path(flags.out) / "plant.yaml", comments);
+    throw ConfigError("cannot make " + flags.out + " (" + problem.message() +
+                      "): choose another folder with --out");
+  // A plant file says that these are the rig's numbers.
+  if (id.is_trustworthy()) {
+    std::vector<std::string> comments = {"Identified by upright " UPRIGHT_VERSION "."};
+    for (const std::string& data : flags.data) comments.push_back("data: " + data);
+    write_plant_file(id.plant, fs::path(flags.out) / "plant.yaml", comments);
+  }
   const fs::path file = fs::path(flags.out) / "identification.json";
   std::ofstream json(file);
-  json << json_of(id).dump(2, ' ', false, Json::error_handler_t::replace) << "\n";
+  json << json_of(id, flags).dump(2, ' ', false, Json::error_handler_t::replace) << "\n";
   json.close();
   if (!json)
-    throw ConfigError("free some space or choose another folder with --out: cannot write " + file.string());
-  write_identification_report(id, runs, fs::path(flags.out) / "report.html");
+    throw ConfigError("cannot write " + file.string() +
+                      ": free some space or choose another folder with --out");
+  // Drawing takes longer than whoever interrupts wants to wait.
+  if (!id.interrupted) write_identification_report(id, runs, fs::path(flags.out) / "report.html");
 }
 
-void run_identify(const IdentifyFlags& flags) {
+ExitCode run_identify(const IdentifyFlags& flags) {
+  end_on_signal();
+  Progress progress("reading the data");
   const Plant base = base_of(flags);
+  const NamedRuns named = runs_named(flags.data);
   std::vector<Measurement> runs;
-  for (const std::string& data : runs_in(flags.data)) runs.push_back(read_measurement(data));
+  for (const fs::path& data : named.runs) runs.push_back(read_measurement(data));
+  if (!flags.trust_data) refuse_mistakes(runs, base);
+  runs = within_samples(std::move(runs), most_identified_samples);
   if (!flags.out.empty() && fs::exists(fs::path(flags.out) / "identification.json"))
-    throw ConfigError("choose another folder with --out: " + flags.out + " holds an identification already");
+    throw ConfigError(flags.out + " holds an identification already: choose another folder with --out");
   IdentificationOptions options;
-  const bool watched = isatty(STDERR_FILENO) != 0;
-  if (watched)
-    options.progress = [](double done, const std::string& what) {
-      std::fprintf(stderr, "\r%3.0f %%  %-40.40s", 100.0 * done, what.c_str());
-    };
-  const Identification id = identify(base, runs, options);
-  if (watched) std::fprintf(stderr, "\r%60s\r", "");
+  options.signal = &answer_on_signal();
+  progress.begin("identify");
+  options.progress = progress.callback();
+  Identification id = identify(base, runs, options);
+  id.notes.insert(id.notes.begin(), named.left_out.begin(), named.left_out.end());
+  for (const Measurement& run : runs) id.notes.insert(id.notes.end(), run.notes.begin(), run.notes.end());
+  progress.begin("writing the results");
   if (!flags.out.empty()) write_results(id, runs, flags);
+  progress.end();
   if (flags.as_json) {
-    std::cout << json_of(id).dump(2, ' ', false, Json::error_handler_t::replace) << "\n";
+    std::cout << json_of(id, flags).dump(2, ' ', false, Json::error_handler_t::replace) << "\n";
   } else {
-    print(id);
+    print(id, flags);
     if (!flags.out.empty()) std::printf("Written: %s\n", flags.out.c_str());
     std::fflush(stdout);
   }
   finish_output();
+  return id.interrupted ? ExitCode::stopped : ExitCode::done;
 }
 
 }  // namespace
@@ -158,17 +220,19 @@ void add_identify(CommandLine& line) {
       "identify", "Friction and motor constants from measured runs",
       "Example:  upright identify --data runs/20260101T120000Z-friction --plant config/plants/viscous.yaml "
       "--out identified\n"
-      "Of the plant file the masses, the length and the motor are used; its friction is found anew.");
+      "Of the plant file the masses, the length and the motor are used; its friction is found anew.\n"
+      "Whether the numbers account for the data is its verdict; the exit code is 0 whatever that is.\n"
+      "Ctrl-C ends it with the best numbers so far and exit code 3; a second Ctrl-C ends it at once.");
   const auto flags = std::make_shared<IdentifyFlags>();
   command.option("--data", flags->data, "Experiment folders, run directories, CSV or dataset files")
       .required();
   command.option("--plant", flags->plant, "Plant file with masses and motor (a simulated run's own)");
-  command.option("--out", flags->out, "Folder for identification.json, plant.yaml and report.html");
+  command.option("--out", flags->out,
+                 "Folder for identification.json, report.html and, where the data are explained, plant.yaml");
+  command.flag("--trust-data", flags->trust_data,
+               "Go on though signs, zeros or units of the data contradict the plant file");
   command.flag("--json", flags->as_json, "One JSON document on stdout");
-  command.does([flags] {
-    run_identify(*flags);
-    return ExitCode::done;
-  });
+  command.does([flags] { return run_identify(*flags); });
 }
 
 }  // namespace upright::cli

@@ -33,7 +33,7 @@ double pendulum_length_m(const Plant* plant) {
 void add_live(const Command& command, std::string& port) {
   command.flag_or_text("--live", usual_port, port,
                        std::string("Serve a page that shows the run and can stop it, on this machine only "
-                                   "(--live=PORT; 0: any free port; ") +
+                                   "(--live PORT; 0: any free port; ") +
                            usual_port + ")");
 }
 
@@ -41,10 +41,10 @@ std::unique_ptr<LiveView> open_live(const std::string& port, const LiveSubject& 
   if (port.empty()) return nullptr;
   const std::optional<int> number = port_number(port);
   if (!number)
-    throw ConfigError("give --live a port from 0 to 65535, as in --live=8090: '" + port + "' is none");
+    throw ConfigError("'" + port + "' is no port: give --live one from 0 to 65535, as in --live 8090");
   if (subject.fast)
     throw ConfigError(
-        "remove --fast or --live: in virtual time there is nothing to watch, a report shows it");
+        "in virtual time there is nothing to watch: remove --fast or --live; a report shows the run");
   LiveScene scene;
   scene.title = subject.title;
   scene.track_limit_m = subject.rig->track_limit_m;

@@ -32,6 +32,7 @@ ExitCode run(int argc, char** argv) {
   upright::cli::add_experiment(line);
   upright::cli::add_replay(line);
   upright::cli::add_report(line);
+  upright::cli::add_compare(line);
   upright::cli::add_design(line);
   upright::cli::add_margin(line);
   upright::cli::add_diagnose(line);
@@ -53,7 +54,7 @@ int main(int argc, char** argv) {
   } catch (const upright::Error& error) {
     return fail(error.code(), error.what());
   } catch (const std::bad_alloc&) {
-    return fail(ExitCode::usage, "give smaller input or more memory: out of memory");
+    return fail(ExitCode::usage, "out of memory: give smaller input or more memory");
   } catch (const std::exception& error) {
     return fail(ExitCode::device, std::string("report this as a bug: unexpected error: ") + error.what());
   }

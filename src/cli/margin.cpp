@@ -4,10 +4,14 @@
 #include <iostream>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 
 #include "commands.hpp"
+#include "progress.hpp"
 #include "upright/analysis/delay_margin.hpp"
+#include "upright/analysis/overrun_limit.hpp"
+#include "upright/analysis/physical_limits.hpp"
 #include "upright/model/linear_plant.hpp"
 #include "upright/model/plant_file.hpp"
 
@@ -26,8 +30,15 @@ struct MarginOptions {
 
 struct Margins {
   LoopMargin continuous, sampled, sliding;
-  OverrunTolerance tolerance;
+  OverrunLimit limit;
+  std::optional<LoopMargin> unmodelled;  ///< with a state estimator: of an actuator slower than its model
+  PhysicalLimits physics;
 };
+
+constexpr const char* extended_note =
+    "The extended Kalman filter is taken as its line while the cart slides, as a stationary one on the same "
+    "plant: neither the friction in its prediction nor friction_compensation is in these margins. `upright "
+    "design` judges both by simulated runs.";
 
 Json finite_or_null(double value) {
   return std::isfinite(value) ? Json(value) : Json(nullptr);
@@ -60,22 +71,61 @@ Json json_of(const LoopMargin& margin) {
           {"roots", margin.confirmation ? json_of(*margin.confirmation) : Json(nullptr)}};
 }
 
+bool predicts(const ControlConfig& config) {
+  return config.compensation.kind == CompensationKind::predictor;
+}
+
+std::string milliseconds(double seconds) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.3g ms", 1e3 * seconds);
+  return text;
+}
+
+/// What the loop bears on the rig, and how much of it is left.
+std::string verdict_for(const Margins& margins, const ControlConfig& config) {
+  if (!margins.limit.warning.empty()) return margins.limit.warning;
+  const OverrunTolerance& tolerance = *margins.limit.tolerance;
+  const std::string how =
+      std::string(" (sampled, while the cart slides") + (predicts(config) ? ", with its predictor)" : ")");
+  if (!std::isfinite(tolerance.critical_delay_s)) return "on the rig the loop bears any delay" + how;
+  return "on the rig the loop bears " + milliseconds(tolerance.critical_delay_s) + " of delay" + how +
+         "; it is configured with " + milliseconds(config.delay_s) + ", so that " +
+         milliseconds(tolerance.extra_delay_s) + " are left, " + std::to_string(tolerance.missed_periods) +
+         (tolerance.missed_periods == 1 ? " missed period" : " missed periods") + " in a row";
+}
+
 Json json_of(const Margins& margins, const ControlConfig& config) {
-  Json document = json_of(margins.continuous);
+  const OverrunTolerance& tolerance = *margins.limit.tolerance;
+  Json document{{"verdict",
+                 {{"sentence", verdict_for(margins, config)},
+                  {"bears_delay_s", finite_or_null(tolerance.critical_delay_s)},
+                  {"will_hold", !tolerance.exceeded()}}}};
+  document.update(json_of(margins.continuous));
+  document["predictor_included"] = !predicts(config);
   document["sampled"] = json_of(margins.sampled);
   document["sampled_sliding"] = json_of(margins.sliding);
+  document["sampled_sliding_unmodelled"] = margins.unmodelled ? json_of(*margins.unmodelled) : Json(nullptr);
+  document["notes"] = Json::array();
+  if (config.state_estimator.kind == StateEstimatorKind::extended_kalman)
+    document["notes"].push_back(extended_note);
+  document["limits_of_physics"] = {{"unstable_rate_radps", margins.physics.unstable_rate_radps},
+                                   {"plant_pole_radps", margins.physics.plant_pole_radps},
+                                   {"proportional_derivative_s", margins.physics.proportional_derivative_s},
+                                   {"with_acceleration_s", margins.physics.with_acceleration_s},
+                                   {"linear_controller_s", margins.physics.linear_controller_s}};
   document["tolerance"] = {{"delay_s", config.delay_s},
-                           {"extra_delay_s", finite_or_null(margins.tolerance.extra_delay_s)},
-                           {"missed_periods", margins.tolerance.missed_periods},
-                           {"sliding", margins.tolerance.sliding},
-                           {"sentence", margins.tolerance.sentence}};
+                           {"extra_delay_s", finite_or_null(tolerance.extra_delay_s)},
+                           {"missed_periods", tolerance.missed_periods},
+                           {"sliding", true},
+                           {"sentence", tolerance.sentence}};
   return document;
 }
 
-void print(const char* name, const LoopMargin& margin) {
-  std::printf("%s\n", name);
+/// `at` is the delay at which a loop that is unstable was looked at: none, or what a predictor makes up for.
+void print(const std::string& name, const LoopMargin& margin, const std::string& at) {
+  std::printf("%s\n", name.c_str());
   if (!margin.stable_without_delay)
-    std::printf("  unstable without any delay (rightmost root %.4g %+.4gi 1/s)\n",
+    std::printf("  unstable %s (rightmost root %.4g %+.4gi 1/s)\n", at.c_str(),
                 margin.root_without_delay.real(), margin.root_without_delay.imag());
   else if (!std::isfinite(margin.critical_delay_s))
     std::printf("  stable with any delay\n");
@@ -91,22 +141,57 @@ void print(const char* name, const LoopMargin& margin) {
                 found->confirmed ? "confirmed" : "NOT confirmed");
 }
 
+void print(const Margins& margins, const ControlConfig& config) {
+  std::printf("Verdict: %s.\n\n", verdict_for(margins, config).c_str());
+  const std::string without = "without any delay";
+  const std::string at = predicts(config)
+                             ? "at the " + milliseconds(config.delay_s) + " that its predictor makes up for"
+                             : without;
+  const std::string estimator = config.has_state_estimator() ? "state estimator" : "velocity estimator";
+  const std::string parts = "hold, " + estimator + ", delay line" + (predicts(config) ? ", predictor" : "");
+  print("sampled loop while the cart slides (" + parts + "; no dry friction): this one decides",
+        margins.sliding, at);
+  print("sampled loop near rest (" + parts + "; dry friction smoothed)", margins.sampled, at);
+  if (!margins.sampled.stable_without_delay && !margins.limit.tolerance->exceeded())
+    std::printf("  the loop holds the pendulum and does not come to rest: it sticks and slips\n");
+  print(predicts(config) ? "continuous loop of the gains alone, without their predictor: not what runs"
+        : config.has_state_estimator()
+            ? "continuous loop near rest (no hold; its estimator without a period; dry friction smoothed)"
+            : "continuous loop near rest (no hold, no estimator; dry friction smoothed)",
+        margins.continuous, without);
+  if (margins.unmodelled)
+    print("the same of an actuator later than the estimator believes (on top of the gain file's delay)",
+          *margins.unmodelled, at);
+  if (config.state_estimator.kind == StateEstimatorKind::extended_kalman) std::printf("%s\n", extended_note);
+  const PhysicalLimits& physics = margins.physics;
+  std::printf(
+      "Limits of physics: feedback of angle and rate bears at most %s on this pendulum (Stepan), with "
+      "acceleration %s (Insperger, Milton, Stepan); no linear controller that also holds it without delay "
+      "bears "
+      "more than %s (Middleton, Miller).\n",
+      milliseconds(physics.proportional_derivative_s).c_str(),
+      milliseconds(physics.with_acceleration_s).c_str(), milliseconds(physics.linear_controller_s).c_str());
+  std::fflush(stdout);
+}
+
 void margin(const MarginOptions& options) {
+  Progress progress("margin");
   const Plant plant = read_plant_file(options.plant);
   const ControlConfig config = read_gain_file(options.gains);
-  const Margins margins{continuous_margin(plant, config.gains, options.smoothing),
-                        sampled_margin(plant, config, options.smoothing),
-                        sampled_margin(sliding_plant(plant), config, options.smoothing),
-                        overrun_tolerance(plant, config, options.smoothing)};
-  if (options.as_json) {
+  Margins margins{continuous_margin(plant, config, options.smoothing),
+                  sampled_margin(plant, config, options.smoothing),
+                  sampled_margin(large_motion_plant(plant), config, options.smoothing),
+                  overrun_limit(plant, config),
+                  std::nullopt,
+                  physical_limits(plant)};
+  if (config.has_state_estimator())
+    margins.unmodelled =
+        sampled_margin(large_motion_plant(plant), config, options.smoothing, true, ExtraDelay::unmodelled);
+  progress.end();
+  if (options.as_json)
     std::cout << json_of(margins, config).dump(2) << "\n";
-    return;
-  }
-  print("continuous loop", margins.continuous);
-  print("sampled loop (hold, velocity estimator, delay line)", margins.sampled);
-  print("sampled loop while the cart slides (no dry friction)", margins.sliding);
-  std::printf("%s\n", margins.tolerance.sentence.c_str());
-  std::fflush(stdout);
+  else
+    print(margins, config);
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "commands.hpp"
+#include "progress.hpp"
 #include "upright/model/error.hpp"
 
 namespace upright::cli {
@@ -26,10 +27,12 @@ void add_paper(CommandLine& line) {
   command.does([=] {
     const std::filesystem::path file = std::filesystem::path(*out) / "paper.md";
     if (std::filesystem::exists(file) && !*overwrite)
-      throw ConfigError("give another --out, or --overwrite to replace it: " + file.string() + " exists");
+      throw ConfigError(file.string() + " exists: give another --out, or --overwrite to replace it");
     options->config = *config;
-    options->progress = [](const std::string& part) { std::fprintf(stderr, "%s\n", part.c_str()); };
+    Progress progress("paper");
+    options->progress = progress.callback();
     write_paper(*out, *options);
+    progress.end();
     std::printf("%s\n", file.c_str());
     std::fflush(stdout);
     return ExitCode::done;

@@ -7,7 +7,8 @@
 #include <nlohmann/json.hpp>
 
 #include "commands.hpp"
-#include "upright/control/predictor.hpp"
+#include "progress.hpp"
+#include "upright/control/model_parts.hpp"
 #include "upright/model/error.hpp"
 #include "upright/model/yaml_reader.hpp"
 #include "upright/runtime/experiment.hpp"
@@ -51,10 +52,13 @@ void print(const ReplayResult& result, bool truncated) {
 }
 
 ExitCode replay_run(const std::string& directory, bool as_json) {
+  Progress progress("replay");
   const RunRecord run = read_run_without_samples(directory);
   SampleReader rows(run.path / "samples.csv");
   const std::unique_ptr<CommandSource> script = script_of(run);
-  const ReplayResult result = replay(run, rows, make_compensator(run.control), script.get());
+  const ReplayResult result =
+      replay(run, rows, make_model_parts(run.control), script.get(), progress.callback());
+  progress.end();
   if (as_json)
     std::cout << json_of(run, result, rows.truncated()).dump(2, ' ', false, Json::error_handler_t::replace)
               << "\n";

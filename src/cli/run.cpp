@@ -14,9 +14,12 @@
 #include "histogram_json.hpp"
 #include "live.hpp"
 #include "options.hpp"
+#include "progress.hpp"
 #include "signals.hpp"
-#include "upright/analysis/delay_margin.hpp"
-#include "upright/control/predictor.hpp"
+#include "stop_watcher.hpp"
+#include "upright/analysis/overrun_limit.hpp"
+#include "upright/control/filter_model.hpp"
+#include "upright/control/model_parts.hpp"
 #include "upright/hal/gpio_rig.hpp"
 #include "upright/hal/guarded_rig.hpp"
 #include "upright/hal/rig_factory.hpp"
@@ -25,6 +28,7 @@
 #include "upright/model/plant_file.hpp"
 #include "upright/runtime/histogram_text.hpp"
 #include "upright/runtime/session.hpp"
+#include "upright/runtime/sign_check.hpp"
 #include "upright/runtime/wait_upright.hpp"
 
 namespace upright::cli {
@@ -35,18 +39,38 @@ constexpr double degrees_per_rad = 180.0 / std::numbers::pi;
 
 struct Arguments {
   std::string rig, gains, plant, out = "runs", label = "run", live_port;
-  std::optional<double> delay_s, theta0_deg;
-  double duration_s = 10.0, wait_s = WaitOptions{}.patience_s;
+  std::optional<double> delay_s, theta0_deg, wait_s;
+  double duration_s = 10.0;
   std::optional<std::uint64_t> seed;
   RealtimeRequest realtime;
-  bool fast = false, as_json = false;
+  bool fast = false, as_json = false, unchecked = false, force = false;
 };
 
 void refuse_what_only_simulation_can(const Arguments& arguments) {
-  const std::string why = ": " + arguments.rig + " is not a simulated rig";
-  if (arguments.fast) throw ConfigError("remove --fast, or name a simulated rig" + why);
-  if (arguments.theta0_deg) throw ConfigError("remove --theta0-deg, or name a simulated rig" + why);
-  if (arguments.seed) throw ConfigError("remove --seed, or name a simulated rig" + why);
+  const std::string why = arguments.rig + " is not a simulated rig: remove ",
+                    or_else = ", or name a simulated rig";
+  if (arguments.fast) throw ConfigError(why + "--fast" + or_else);
+  if (arguments.theta0_deg) throw ConfigError(why + "--theta0-deg" + or_else);
+  if (arguments.seed) throw ConfigError(why + "--seed" + or_else);
+}
+
+void refuse_what_only_hardware_can(const Arguments& arguments, const RigFile& rig) {
+  if (arguments.wait_s)
+    throw ConfigError("nobody lifts the pendulum of " + arguments.rig +
+                      ", which is simulated and starts where it is told to: remove --wait");
+  if (!arguments.plant.empty())
+    throw ConfigError("the plant of " + arguments.rig + ", which is simulated, is the one it names (" +
+                      rig.simulated->plant.string() +
+                      "): remove --plant, or name the other plant in a copy of the rig file");
+}
+
+/// The model to judge the gains by: the one named, the simulated rig's, or the predictor's.
+std::optional<Plant> model_of(const Arguments& arguments, const RunSetup& setup) {
+  if (!arguments.plant.empty()) return read_plant_file(arguments.plant);
+  if (setup.plant) return setup.plant;
+  if (setup.control.compensation.kind == CompensationKind::predictor)
+    return read_plant_file(setup.control.compensation.plant);
+  return std::nullopt;
 }
 
 RunSetup make_setup(const Arguments& arguments) {
@@ -59,52 +83,20 @@ RunSetup make_setup(const Arguments& arguments) {
   setup.control = read_gain_file(arguments.gains);
   if (arguments.delay_s) setup.control.delay_s = *arguments.delay_s;
   setup.rig = read_rig_file(arguments.rig);
-  if (is_simulated(setup.rig))
+  if (is_simulated(setup.rig)) {
+    refuse_what_only_hardware_can(arguments, setup.rig);
     setup.plant = read_plant_file(setup.rig.simulated->plant);
-  else
+  } else {
     refuse_what_only_simulation_can(arguments);
+  }
+  const Calibration& encoders = setup.rig.calibration;
+  setup.control = with_encoders(setup.control, encoders.cart.per_count, encoders.pendulum.per_count);
+  require_link_fits(setup.rig, setup.control.period_s());
   if (arguments.theta0_deg) setup.theta0_rad = *arguments.theta0_deg / degrees_per_rad;
+  setup.limits = rig_limits(setup.rig, model_of(arguments, setup));
   setup.limits.periods =
       static_cast<std::uint64_t>(std::llround(arguments.duration_s * setup.control.sample_rate_hz));
-  setup.limits.track_limit_m = setup.rig.track_limit_m;
-  setup.limits.coast_s = setup.rig.coast_s;
-  setup.limits.fall_angle_rad = setup.rig.fall_angle_rad;
-  setup.limits.watchdog_s = setup.rig.watchdog_s;
-  setup.limits.most_periods_late = default_periods_late(setup.control.period_s());
   return setup;
-}
-
-/// The model to judge the gains by: the one named, the simulated rig's, or the predictor's.
-std::optional<Plant> model_of(const Arguments& arguments, const RunSetup& setup) {
-  if (!arguments.plant.empty()) return read_plant_file(arguments.plant);
-  if (setup.plant) return setup.plant;
-  if (setup.control.compensation.kind == CompensationKind::predictor)
-    return read_plant_file(setup.control.compensation.plant);
-  return std::nullopt;
-}
-
-/// What the gains tolerate, where there is a model with a pendulum to tell.
-std::optional<OverrunTolerance> tolerance_of(const Arguments& arguments, const RunSetup& setup) {
-  const std::optional<Plant> model = model_of(arguments, setup);
-  if (!model || !model->pendulum) return std::nullopt;
-  return overrun_tolerance(*model, setup.control);
-}
-
-/// The overrun limit that follows: what the gains tolerate, but not less than a kernel's ordinary hiccup
-/// makes and not more than leaves time before a fall.
-std::uint64_t periods_late(const OverrunTolerance& tolerance, double period_s) {
-  constexpr int fewest = 3;
-  const int tolerated = std::max(fewest, tolerance.missed_periods);
-  return std::min(static_cast<std::uint64_t>(tolerated), default_periods_late(period_s));
-}
-
-std::string tolerance_line(const std::optional<OverrunTolerance>& tolerance, const LoopLimits& limits) {
-  const std::string limit = std::to_string(limits.most_periods_late);
-  if (!tolerance)
-    return "Delay margin: unknown without a model of the rig (--plant); the run stops when more than " +
-           limit + " periods in a row are late.";
-  return "Delay margin: " + tolerance->sentence + "; the run stops when more than " + limit +
-         " periods in a row are late.";
 }
 
 std::string delay_line(const ControlConfig& control) {
@@ -129,6 +121,10 @@ void show_live(const LiveStatus& live) {
                live.theta_rad.load() * degrees_per_rad, live.voltage_v.load(), live.worst_late_us.load());
 }
 
+std::string seconds(double value_s) {
+  return std::to_string(std::llround(value_s)) + " s";
+}
+
 void show_wait(const WaitStatus& wait, bool on_terminal, bool first) {
   constexpr const char* request =
       "lift the pendulum upright, hold it still and keep the cart off the ends: waiting at zero volts";
@@ -143,14 +139,15 @@ void show_wait(const WaitStatus& wait, bool on_terminal, bool first) {
 /// On a real rig the operator lifts the pendulum first.
 void wait_for_operator(const Arguments& arguments, Rig& rig, Clock& clock, const RigFile& file,
                        const SignalFlag& caught_signal, bool on_terminal, LiveView* view) {
-  if (is_simulated(file) || arguments.wait_s <= 0.0) return;
+  const double wait_s = arguments.wait_s.value_or(WaitOptions{}.patience_s);
+  if (is_simulated(file) || wait_s <= 0.0) return;
   bool asked = false;
-  wait_upright(rig, clock, file, caught_signal, {arguments.wait_s, [&](const WaitStatus& wait) {
+  wait_upright(rig, clock, file, caught_signal, {wait_s, [&](const WaitStatus& wait) {
                                                    show_wait(wait, on_terminal, !asked);
                                                    if (view != nullptr)
                                                      view->show_waiting(
                                                          "lift the pendulum upright and hold it still",
-                                                         arguments.wait_s - wait.left_s, wait.pose);
+                                                         wait_s - wait.left_s, wait.pose);
                                                    asked = true;
                                                  }});
   if (asked && on_terminal) std::fputs("\n", stderr);
@@ -158,10 +155,16 @@ void wait_for_operator(const Arguments& arguments, Rig& rig, Clock& clock, const
 
 using Json = nlohmann::ordered_json;
 
+Json finite_or_null(double value) {
+  return std::isfinite(value) ? Json(value) : Json(nullptr);
+}
+
 Json json_of(const std::optional<OverrunTolerance>& tolerance) {
   if (!tolerance) return nullptr;
-  const bool any = !std::isfinite(tolerance->extra_delay_s);
-  return {{"extra_delay_s", any ? Json(nullptr) : Json(tolerance->extra_delay_s)},
+  return {{"stabilized", tolerance->stabilized},
+          {"exceeded", tolerance->exceeded()},
+          {"critical_delay_s", finite_or_null(tolerance->critical_delay_s)},
+          {"extra_delay_s", finite_or_null(tolerance->extra_delay_s)},
           {"missed_periods", tolerance->missed_periods},
           {"sentence", tolerance->sentence}};
 }
@@ -175,15 +178,18 @@ Json json_of(const LinkCounts& link) {
   return document;
 }
 
-Json json_of(const SessionResult& result, const LoopLimits& limits,
-             const std::optional<OverrunTolerance>& tolerance) {
+Json json_of(const SessionResult& result, const LoopLimits& limits, const OverrunLimit& overrun) {
   const LoopOutcome& o = result.outcome;
   const LoopCounts& c = o.counts;
   return {{"run_directory", result.directory.string()},
           {"outcome", result_of(o)},
           {"reason", name_of(o.reason)},
-          {"sentence", sentence_of(o, limits)},
+          {"sentence", sentence_of(o, limits, result.log)},
           {"stayed_up", o.reason == StopReason::duration},
+          {"zero_volts", name_of_zero(o.stop)},
+          {"zero_volts_read_back", o.stop.read_back},
+          {"amplifier_disabled", o.stop.disabled},
+          {"zero_volts_sentence", sentence_of(o.stop)},
           {"time_s", o.time_s},
           {"tick", o.first_bad_tick},
           {"worst_theta_rad", o.worst_theta_rad},
@@ -210,8 +216,10 @@ Json json_of(const SessionResult& result, const LoopLimits& limits,
             {"compute", histogram_json(o.compute)},
             {"write", histogram_json(o.write)},
             {"cycle", histogram_json(o.cycle)}}},
-          {"delay_margin", json_of(tolerance)},
+          {"delay_margin", json_of(overrun.tolerance)},
           {"most_periods_late", limits.most_periods_late},
+          {"overrun_limit", overrun.sentence},
+          {"warning", overrun.warning.empty() ? Json(nullptr) : Json(overrun.warning)},
           {"scheduling", result.scheduling.note},
           {"elapsed_s", result.elapsed_s}};
 }
@@ -247,8 +255,12 @@ void print_summary(const SessionResult& result, const LoopLimits& limits, bool f
   if (o.reason == StopReason::duration)
     std::printf("Stayed up for %.4g s.\n", o.time_s);
   else
-    std::printf("%s after %.4g s: %s.\n", o.reason == StopReason::fell ? "Fell" : "Stopped at zero volts",
-                o.time_s, sentence_of(o, limits).c_str());
+    std::printf("%s after %.4g s: %s.\n",
+                o.reason == StopReason::fell ? "Fell"
+                : o.stop.zero_confirmed      ? "Stopped at zero volts"
+                                             : "Stopped",
+                o.time_s, sentence_of(o, limits, result.log).c_str());
+  if (!o.stop.done()) std::printf("%s.\n", sentence_of(o.stop).c_str());
   std::printf(
       "Worst angle %.3f deg, worst cart position %.1f mm, %llu of %llu periods at the voltage limit.\n",
       o.worst_theta_rad * degrees_per_rad, o.worst_cart_m * 1e3, static_cast<unsigned long long>(c.saturated),
@@ -280,8 +292,10 @@ std::unique_ptr<LiveView> open_live(const Arguments& arguments, const RunSetup& 
 
 LiveState end_of(const SessionResult& result, const LoopLimits& limits) {
   const bool completed = result.outcome.reason == StopReason::duration;
-  return {completed ? LiveState::Kind::completed : LiveState::Kind::stopped,
-          sentence_of(result.outcome, limits) + ". The run is in " + result.directory.string()};
+  const StopReport& stop = result.outcome.stop;
+  return {completed && stop.done() ? LiveState::Kind::completed : LiveState::Kind::stopped,
+          (stop.done() ? "" : sentence_of(stop) + ". ") + sentence_of(result.outcome, limits, result.log) +
+              ". The run is in " + result.directory.string()};
 }
 
 SessionResult balance(const Arguments& arguments, RunSetup setup, const SignalFlag& caught_signal,
@@ -299,12 +313,22 @@ SessionResult balance(const Arguments& arguments, RunSetup setup, const SignalFl
   SessionOptions options;
   options.out = arguments.out;
   options.realtime = arguments.realtime;
-  options.compensator = make_compensator(setup.control);
+  options.parts = make_model_parts(setup.control);
   options.watcher = view;
-  if (on_terminal && !arguments.fast) options.show = show_live;
+  options.stop = stop_watcher(view);
   const LoopLimits limits = setup.limits;
+  // On a terminal a run in real time shows where the cart is instead.
+  std::optional<Progress> progress;
+  if (on_terminal && !arguments.fast)
+    options.show = show_live;
+  else
+    options.show = [&, duration_s = setup.duration_s](const LiveStatus& live) {
+      progress->report(live.time_s / duration_s, seconds(live.time_s) + " of " + seconds(duration_s));
+    };
   if (view != nullptr) view->say({LiveState::Kind::running, "balancing"});
+  progress.emplace("run");
   SessionResult result = run_session(std::move(setup), *rig, clock, caught_signal, std::move(options));
+  progress.reset();
   if (on_terminal && !arguments.fast) std::fputs("\n", stderr);
   if (view != nullptr) view->end(end_of(result, limits));
   return result;
@@ -312,10 +336,13 @@ SessionResult balance(const Arguments& arguments, RunSetup setup, const SignalFl
 
 ExitCode run(const Arguments& arguments) {
   RunSetup setup = make_setup(arguments);
-  const std::optional<OverrunTolerance> tolerance = tolerance_of(arguments, setup);
-  if (tolerance) setup.limits.most_periods_late = periods_late(*tolerance, setup.control.period_s());
+  const OverrunLimit overrun = overrun_limit(model_of(arguments, setup), setup.control);
+  if (!arguments.force) require_stabilized(overrun);
+  if (!arguments.unchecked) require_checked_signs(setup.rig, ", or give --unchecked");
+  apply(overrun, setup.limits);
   if (!arguments.as_json)
-    std::cout << delay_line(setup.control) << ".\n" << tolerance_line(tolerance, setup.limits) << std::endl;
+    std::cout << delay_line(setup.control) << ".\nDelay margin: " << overrun.sentence << "." << std::endl;
+  if (!overrun.warning.empty()) std::cerr << "upright: " << overrun.warning << "\n";
   const LoopLimits limits = setup.limits;
   const SignalFlag& caught_signal = catch_signals();
   const std::unique_ptr<LiveView> view = open_live(arguments, setup);
@@ -323,15 +350,19 @@ ExitCode run(const Arguments& arguments) {
       shown_by(view.get(), [&] { return balance(arguments, std::move(setup), caught_signal, view.get()); });
 
   if (arguments.as_json)
-    std::cout << json_of(result, limits, tolerance).dump(2, ' ', false, Json::error_handler_t::replace)
-              << "\n";
+    std::cout << json_of(result, limits, overrun).dump(2, ' ', false, Json::error_handler_t::replace) << "\n";
   else
     print_summary(result, limits, arguments.fast);
   if (!result.log.failure.empty()) std::cerr << "upright: " << result.log.failure << "\n";
-  if (!result.outcome_written)
-    std::cerr << "upright: free space where the run directory goes: run.yaml could not be completed\n";
+  if (result.directory != result.made_at)
+    std::cerr << "upright: " << result.made_at.string() << " was moved to " << result.directory.string()
+              << " while the run went on; no row is lost\n";
+  if (!result.outcome.stop.done()) {
+    std::cerr << "upright: " << sentence_of(result.outcome.stop) << std::endl;
+    return ExitCode::device;
+  }
   if (result.outcome.reason == StopReason::duration) return ExitCode::done;
-  if (arguments.as_json) std::cerr << "upright: " << sentence_of(result.outcome, limits) << "\n";
+  if (arguments.as_json) std::cerr << "upright: " << sentence_of(result.outcome, limits, result.log) << "\n";
   return ExitCode::stopped;
 }
 
@@ -347,7 +378,7 @@ void add_run(CommandLine& line) {
   command.option("--rig", a->rig, "Rig file").required();
   command.option("--gains", a->gains, "Gain file").required();
   command.option("--plant", a->plant,
-                 "Model of the rig, whose delay margin limits overruns (a simulated rig's own)");
+                 "Model of a real rig: its delay margin limits overruns, and gains must stabilize it");
   command.option("--delay", a->delay_s, "Delay of the feedback [s], in place of the gain file's")
       .in(Range::within(0.0, DelayLine::longest_delay_s));
   constexpr double longest_run_s = 1e6;
@@ -363,6 +394,8 @@ void add_run(CommandLine& line) {
   command.option("--label", a->label, "End of the run directory's name (run)");
   add_realtime(command, a->realtime);
   add_live(command, a->live_port);
+  command.flag("--unchecked", a->unchecked, "Run a real rig whose signs were not checked");
+  command.flag("--force", a->force, "Run gains that do not stabilize the plant");
   command.flag("--json", a->as_json, "One JSON document");
   command.does([a] { return run(*a); });
 }

@@ -1,10 +1,6 @@
 // `upright sweep`: outcomes over starting angle and delay, and the delays at which they change.
-#include <unistd.h>
-
 #include <array>
 #include <atomic>
-#include <chrono>
-#include <cmath>
 #include <csignal>
 #include <cstdio>
 #include <iostream>
@@ -13,6 +9,7 @@
 #include <string>
 
 #include "commands.hpp"
+#include "progress.hpp"
 #include "upright/analysis/sweep_ranks.hpp"
 #include "upright/model/error.hpp"
 
@@ -42,57 +39,6 @@ class StopOnSignal {
  private:
   void (*interrupt_)(int);
   void (*terminate_)(int);
-};
-
-/// A line on the terminal with the time left; nothing where stderr is not one.
-class ProgressBar {
- public:
-  ProgressBar() : shown_(isatty(STDERR_FILENO) != 0) {}
-  ~ProgressBar() {
-    if (drawn_) std::fputs("\n", stderr);
-  }
-  ProgressBar(const ProgressBar&) = delete;
-  ProgressBar& operator=(const ProgressBar&) = delete;
-
-  void show(std::size_t done, std::size_t known) {
-    if (!shown_) return;
-    const auto now = std::chrono::steady_clock::now();
-    if (drawn_ && done < known && now - drawn_at_ < std::chrono::milliseconds(100)) return;
-    const double part = static_cast<double>(done) / static_cast<double>(known);
-    constexpr int width = 30;
-    const std::string bar(static_cast<std::size_t>(width * part), '#');
-    std::fprintf(stderr, "\r[%-*s] %zu of %zu runs, %s left   ", width, bar.c_str(), done, known,
-                 time_left(done, known, now).c_str());
-    std::fflush(stderr);
-    drawn_ = true;
-    drawn_at_ = now;
-  }
-
- private:
-  using Time = std::chrono::steady_clock::time_point;
-
-  /// By the pace since the first report: what an earlier call had done took no time in this one.
-  std::string time_left(std::size_t done, std::size_t known, Time now) {
-    if (done_at_first_ == 0) {
-      done_at_first_ = done;
-      first_at_ = now;
-    }
-    if (done == known) return "0 s";
-    if (done == done_at_first_) return "? s";
-    const double pace_s =
-        std::chrono::duration<double>(now - first_at_).count() / static_cast<double>(done - done_at_first_);
-    const double left_s = std::ceil(pace_s * static_cast<double>(known - done));
-    std::array<char, 32> text;
-    if (left_s < 120.0)
-      std::snprintf(text.data(), text.size(), "%.0f s", left_s);
-    else
-      std::snprintf(text.data(), text.size(), "%.0f min", std::ceil(left_s / 60.0));
-    return text.data();
-  }
-
-  bool shown_, drawn_ = false;
-  std::size_t done_at_first_ = 0;
-  Time first_at_{}, drawn_at_{};
 };
 
 struct SweepArguments {
@@ -152,8 +98,10 @@ ExitCode run_here(const SweepArguments& arguments, const SweepRanks& ranks) {
   SweepResult result;
   {
     const StopOnSignal on_signal;
-    ProgressBar bar;
-    options.progress = [&bar](std::size_t done, std::size_t known) { bar.show(done, known); };
+    Progress progress("sweep");
+    options.progress = [&progress](std::size_t done, std::size_t known) {
+      progress.report(done, known, "runs");
+    };
     result = run_sweep(config, folder, options, *team);
   }
   if (arguments.as_json)
@@ -161,9 +109,9 @@ ExitCode run_here(const SweepArguments& arguments, const SweepRanks& ranks) {
   else if (!result.interrupted)
     print(result, folder);
   if (!result.interrupted) return ExitCode::done;
-  throw Error(ExitCode::stopped,
-              "give the same command again, it goes on from there: the sweep was stopped after " +
-                  std::to_string(result.runs_made) + " runs, kept in " + folder);
+  throw Error(ExitCode::stopped, "the sweep was stopped after " + std::to_string(result.runs_made) +
+                                     " runs, kept in " + folder +
+                                     ": give the same command again, it goes on from there");
 }
 
 /// On the ranks other than the first: it is the first that speaks, of errors too.

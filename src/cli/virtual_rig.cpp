@@ -40,32 +40,31 @@ void take_address(const std::string& text, VirtualRigOptions& options) {
       !port.empty() && port.size() <= 5 && port.find_first_not_of("0123456789") == std::string::npos;
   options.tcp_port = digits ? std::stoi(port) : -1;
   if (options.tcp_port < 0 || options.tcp_port > 65535)
-    throw ConfigError("give --tcp HOST:PORT with a port from 0 (a free one) to 65535: '" + text +
-                      "' has none");
+    throw ConfigError("'" + text +
+                      "' has no port from 0 to 65535: give --tcp HOST:PORT, with port 0 for a free one");
 }
 
 /// Modbus asks nobody who he is: whoever reaches the port moves the rig.
 void say_listening(const std::string& name, bool everybody) {
   std::cout << "listening on " << name << std::endl;
   if (everybody)
-    std::cerr
-        << "upright: give --tcp 127.0.0.1:PORT unless other machines are meant to drive this rig: whoever "
-           "reaches "
-        << name << " can" << std::endl;
+    std::cerr << "upright: whoever reaches " << name
+              << " can drive this rig: give --tcp 127.0.0.1:PORT unless other machines are meant to"
+              << std::endl;
 }
 
 Plant plant_for(const Flags& flags, const RigFile& rig) {
   if (!flags.plant.empty()) return read_plant_file(flags.plant);
   if (rig.simulated) return read_plant_file(rig.simulated->plant);
-  throw ConfigError("give --plant, or add a simulated section with a plant: " + rig.file.string() +
-                    ":1: simulated.plant is missing");
+  throw ConfigError(rig.file.string() +
+                    ":1: simulated.plant is missing: give --plant, or add a simulated section with a plant");
 }
 
 void serve(const Flags& flags) {
   const RigFile rig = read_rig_file(flags.rig);
   VirtualRigOptions options;
   if (flags.tcp.empty() == flags.rtu.empty())
-    throw ConfigError("give either --tcp HOST:PORT or --rtu TTY: virtual-rig serves one link");
+    throw ConfigError("virtual-rig serves one link: give either --tcp HOST:PORT or --rtu TTY");
   if (!flags.tcp.empty()) take_address(flags.tcp, options);
   options.serial_line = flags.rtu;
   options.pace = !flags.no_pace;
@@ -83,8 +82,8 @@ void serve(const Flags& flags) {
   const bool everybody = !options.tcp_host.empty() && options.tcp_host.rfind("127.", 0) != 0;
   options.listening = [everybody](const std::string& name) { say_listening(name, everybody); };
   const Plant plant = plant_for(flags, rig);
-  std::signal(SIGINT, stop_on_signal);
-  std::signal(SIGTERM, stop_on_signal);
+  // A terminal that goes away ends it as any other request does: with the trace written to its end.
+  for (const int number : {SIGINT, SIGTERM, SIGHUP, SIGQUIT}) std::signal(number, stop_on_signal);
   serve_virtual_rig(rig, plant, options, stopped);
 }
 

@@ -6,18 +6,21 @@
 
 namespace upright {
 
-Controller::Controller(const ControlConfig& config, double amplifier_limit_v,
-                       std::unique_ptr<DelayCompensator> compensator)
+Controller::Controller(const ControlConfig& config, double amplifier_limit_v, ModelParts parts)
     : config_(config),
       limit_v_(amplifier_limit_v),
       cart_(make_estimator_step(config.estimator, config.period_s())),
       pendulum_(cart_),
       delay_(config.delay_s, config.period_s()),
-      compensator_(std::move(compensator)) {
+      parts_(std::move(parts)) {
   if (!(limit_v_ > 0.0) || !std::isfinite(limit_v_))
-    throw ConfigError("give the amplifier a voltage limit above 0: it is " + exact_text(limit_v_) + " V");
-  if (config.compensation.kind != CompensationKind::none && !compensator_)
-    throw ConfigError("use delay_compensation: {kind: none}: this controller has no predictor");
+    throw ConfigError("the amplifier's voltage limit is " + exact_text(limit_v_) +
+                      " V: give it a limit above 0");
+  if (config.compensation.kind != CompensationKind::none && !parts_.compensator)
+    throw ConfigError(
+        "the gain file has a predictor, and this controller has none: use delay_compensation: {kind: none}");
+  if (config.has_state_estimator() && !parts_.estimator)
+    throw ConfigError("this controller has no state estimator: use velocity_estimator");
 }
 
 void Controller::begin(const ControlInput& input) noexcept {
@@ -27,41 +30,57 @@ void Controller::begin(const ControlInput& input) noexcept {
   acting_ = state_;
   delay_.start(state_);
   voltage_v_ = 0.0;
-  if (compensator_) compensator_->start(state_);
+  if (parts_.estimator) parts_.estimator->start(input.cart_m, input.theta_rad);
+  if (parts_.compensator) parts_.compensator->start(state_);
   started_ = true;
 }
 
+void Controller::act_on(const ControlState& newest) noexcept {
+  delay_.push(newest);
+  acting_ = delay_.delayed();
+  if (parts_.compensator) acting_ = parts_.compensator->compensate(acting_, voltage_v_);
+}
+
 void Controller::advance(double cart_m, double theta_rad) noexcept {
-  state_.cart_velocity_mps = cart_.step(cart_m);
-  state_.pendulum_rate_radps = pendulum_.step(theta_rad);
+  if (parts_.estimator)
+    state_ = parts_.estimator->update(cart_m, theta_rad, voltage_v_);
+  else
+    state_ = {cart_m, theta_rad, cart_.step(cart_m), pendulum_.step(theta_rad)};
+  act_on(state_);
   state_.cart_m = cart_m;
   state_.theta_rad = theta_rad;
-  delay_.push(state_);
-  acting_ = delay_.delayed();
-  if (compensator_) acting_ = compensator_->compensate(acting_, voltage_v_);
+}
+
+void Controller::advance_to(const ControlInput& input, std::uint64_t periods) noexcept {
+  const ControlState before = state_;
+  for (std::uint64_t i = 1; i < periods; ++i) {
+    if (parts_.estimator) {
+      act_on(parts_.estimator->predict(voltage_v_));
+      continue;
+    }
+    const double part = static_cast<double>(i) / static_cast<double>(periods);
+    advance(before.cart_m + part * (input.cart_m - before.cart_m),
+            before.theta_rad + part * (input.theta_rad - before.theta_rad));
+  }
+  advance(input.cart_m, input.theta_rad);
 }
 
 double Controller::feedback(const Demand& demand) const noexcept {
   const Gains& k = config_.gains;
-  return k.cart_position_v_per_m * (acting_.cart_m - demand.reference_m) +
-         k.pendulum_angle_v_per_rad * (acting_.theta_rad - demand.reference_rad) +
-         k.cart_velocity_v_per_mps * acting_.cart_velocity_mps +
-         k.pendulum_rate_v_per_radps * acting_.pendulum_rate_radps;
+  const double feedback_v = k.cart_position_v_per_m * (acting_.cart_m - demand.reference_m) +
+                            k.pendulum_angle_v_per_rad * (acting_.theta_rad - demand.reference_rad) +
+                            k.cart_velocity_v_per_mps * acting_.cart_velocity_mps +
+                            k.pendulum_rate_v_per_radps * acting_.pendulum_rate_radps;
+  if (!parts_.estimator) return feedback_v;
+  return parts_.estimator->command_v(feedback_v + parts_.estimator->rejecting_v(acting_));
 }
 
 ControlOutput Controller::step(const ControlInput& input) noexcept {
   const std::uint64_t periods = input.tick - tick_;
-  if (!started_ || periods == 0 || periods > most_missing_periods) {
+  if (!started_ || periods == 0 || periods > most_missing_periods)
     begin(input);
-  } else {
-    const ControlState before = state_;
-    for (std::uint64_t i = 1; i < periods; ++i) {
-      const double part = static_cast<double>(i) / static_cast<double>(periods);
-      advance(before.cart_m + part * (input.cart_m - before.cart_m),
-              before.theta_rad + part * (input.theta_rad - before.theta_rad));
-    }
-    advance(input.cart_m, input.theta_rad);
-  }
+  else
+    advance_to(input, periods);
   tick_ = input.tick;
   ControlOutput output;
   output.state = state_;

@@ -10,10 +10,10 @@ namespace upright {
 
 DelayLine::DelayLine(double delay_s, double period_s) : delay_s_(delay_s) {
   if (!(period_s > 0.0) || !std::isfinite(period_s))
-    throw ConfigError("give a sampling period above 0: it is " + exact_text(period_s) + " s");
+    throw ConfigError("the sampling period is " + exact_text(period_s) + " s: give it a value above 0");
   if (!(delay_s >= 0.0 && delay_s <= longest_delay_s && delay_s / period_s <= longest_delay_periods))
-    throw ConfigError("give a delay from 0 to " + exact_text(longest_delay_s) + " s: it is " +
-                      exact_text(delay_s) + " s");
+    throw ConfigError("the delay is " + exact_text(delay_s) + " s: give delay_s from 0 to " +
+                      exact_text(longest_delay_s) + " s");
   constexpr double same_period = 1e-9;
   const double periods = delay_s / period_s;
   const double nearest = std::round(periods);
@@ -45,9 +45,12 @@ ControlState DelayLine::delayed() const noexcept {
   if (fraction_ == 0.0) return later;
   const ControlState& earlier = back(whole_ + 1);
   const auto between = [f = fraction_](double a, double b) { return a + f * (b - a); };
-  return {between(later.cart_m, earlier.cart_m), between(later.theta_rad, earlier.theta_rad),
+  return {between(later.cart_m, earlier.cart_m),
+          between(later.theta_rad, earlier.theta_rad),
           between(later.cart_velocity_mps, earlier.cart_velocity_mps),
-          between(later.pendulum_rate_radps, earlier.pendulum_rate_radps)};
+          between(later.pendulum_rate_radps, earlier.pendulum_rate_radps),
+          between(later.motor_v, earlier.motor_v),
+          between(later.cart_force_n, earlier.cart_force_n)};
 }
 
 }  // namespace upright

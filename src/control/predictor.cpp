@@ -5,7 +5,6 @@
 
 #include "upright/model/error.hpp"
 #include "upright/model/linear_plant.hpp"
-#include "upright/model/plant_file.hpp"
 
 namespace upright {
 
@@ -26,7 +25,7 @@ FilterPolynomials polynomials_of(const EstimatorStep& f) {
 
 LinearPlant sliding_line(const Plant& plant) {
   if (!plant.pendulum)
-    throw ConfigError("give delay_compensation a plant with a pendulum: this one is a cart alone");
+    throw ConfigError("the plant of delay_compensation is a cart alone: name a plant with a pendulum");
   constexpr double any_smoothing = 1.0;  // no dry level is left to smooth
   return linearize(sliding_plant(plant), any_smoothing);
 }
@@ -66,8 +65,8 @@ Predictor::Predictor(const ControlConfig& config, const Plant& plant) : actuator
   const Recovery recovery = recover(step_, make_estimator_step(config.estimator, period_s));
   combine(step_, sampled_line(a, b, f, fraction_ * period_s), recovery);
   if (!weights_.measured.allFinite() || !weights_.on_their_way.allFinite())
-    throw ConfigError("use a shorter delay or a slower plant: the prediction over " + exact_text(horizon_s_) +
-                      " s is not finite, " + matrix_text("A", a));
+    throw ConfigError("the prediction over " + exact_text(horizon_s_) + " s is not finite, " +
+                      matrix_text("A", a) + ": use a shorter delay or a slower plant");
   window_ = whole_ + 2;
   drives_.resize(2 * window_);
   start({});
@@ -195,11 +194,6 @@ ControlState Predictor::compensate(const ControlState& delayed, double applied_v
   }
   if (i < count) even += weights_.on_their_way.col(i) * on_their_way[i];
   return shown(even + odd);
-}
-
-std::unique_ptr<DelayCompensator> make_compensator(const ControlConfig& config) {
-  if (config.compensation.kind == CompensationKind::none) return nullptr;
-  return std::make_unique<Predictor>(config, read_plant_file(config.compensation.plant));
 }
 
 }  // namespace upright

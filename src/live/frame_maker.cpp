@@ -69,7 +69,8 @@ void FrameMaker::add(const LogRecord& row) {
   const double late_us = static_cast<double>(row.wake_late_ns) * 1e-3;
   const auto bin = std::lower_bound(lateness_edges_us.begin(), lateness_edges_us.end(), late_us);
   ++bins_[static_cast<std::size_t>(std::distance(lateness_edges_us.begin(), bin))];
-  if (row.tick < next_point_tick_) return;
+  const bool stopped = (row.flags & row_flag::stopped) != 0;
+  if (row.tick < next_point_tick_ && !stopped) return;
   next_point_tick_ = row.tick + every_;
   add_point({static_cast<double>(row.time_ns) * 1e-9, row.cart_m, row.theta_rad, row.voltage_v});
 }
@@ -80,6 +81,12 @@ void FrameMaker::add_pose(double time_s, const Pose& pose) {
   latest_.cart_m = pose.cart_m;
   latest_.theta_rad = pose.theta_rad;
   add_point({time_s, pose.cart_m, pose.theta_rad, 0.0});
+}
+
+void FrameMaker::rest() {
+  if (run_ == 0 || latest_.voltage_v == 0.0) return;
+  latest_.voltage_v = 0.0;
+  add_point({static_cast<double>(latest_.time_ns) * 1e-9, latest_.cart_m, latest_.theta_rad, 0.0});
 }
 
 void FrameMaker::add_point(const Point& point) {

@@ -11,7 +11,12 @@ void LiveFeed::post(std::string event) {
     events_.pop_front();
     ++first_number_;
   }
-  changed_.notify_all();
+  if (wake_) wake_();
+}
+
+void LiveFeed::wake_with(std::function<void()> wake) {
+  const std::lock_guard lock(mutex_);
+  wake_ = std::move(wake);
 }
 
 void LiveFeed::publish(std::span<const LogRecord> rows, std::uint64_t unseen) {
@@ -37,6 +42,7 @@ void LiveFeed::end(const LiveState& state) {
   const std::lock_guard lock(mutex_);
   if (ended_) return;
   maker_.say(state);
+  maker_.rest();
   ended_ = true;
   post(event_text("end", maker_.frame_json()));
 }
@@ -48,7 +54,7 @@ std::size_t LiveFeed::readers() const {
 
 bool LiveFeed::wait_for_readers(std::chrono::milliseconds patience) {
   std::unique_lock lock(mutex_);
-  return changed_.wait_for(lock, patience, [this] { return readers_ == 0; });
+  return left_.wait_for(lock, patience, [this] { return readers_ == 0; });
 }
 
 LiveFeed::Reader::Reader(LiveFeed& feed) : feed_(feed) {
@@ -59,11 +65,11 @@ LiveFeed::Reader::Reader(LiveFeed& feed) : feed_(feed) {
 LiveFeed::Reader::~Reader() {
   const std::lock_guard lock(feed_.mutex_);
   --feed_.readers_;
-  feed_.changed_.notify_all();
+  feed_.left_.notify_all();
 }
 
-std::string LiveFeed::Reader::next(std::chrono::milliseconds patience) {
-  std::unique_lock lock(feed_.mutex_);
+std::string LiveFeed::Reader::next() {
+  const std::lock_guard lock(feed_.mutex_);
   if (!welcomed_) {
     welcomed_ = true;
     over_ = feed_.ended_;
@@ -72,7 +78,6 @@ std::string LiveFeed::Reader::next(std::chrono::milliseconds patience) {
            event_text(over_ ? "end" : "frame", feed_.maker_.history_json());
   }
   const auto last = [this] { return feed_.first_number_ + feed_.events_.size(); };
-  feed_.changed_.wait_for(lock, patience, [&] { return number_ < last(); });
   std::string text;
   number_ = std::max(number_, feed_.first_number_);
   for (; number_ < last(); ++number_) text += feed_.events_[number_ - feed_.first_number_];

@@ -6,6 +6,7 @@
 #include <condition_variable>
 #include <cstdint>
 #include <deque>
+#include <functional>
 #include <mutex>
 #include <span>
 #include <string>
@@ -17,6 +18,10 @@ namespace upright {
 class LiveFeed {
  public:
   explicit LiveFeed(const LiveScene& scene) : maker_(scene) {}
+
+  /// `wake` is called, under the feed's lock, whenever there is something new for the readers. Before the
+  /// first of them.
+  void wake_with(std::function<void()> wake);
 
   /// Takes rows in, and lets readers have the next frame.
   void publish(std::span<const LogRecord> rows, std::uint64_t unseen);
@@ -33,9 +38,9 @@ class LiveFeed {
     Reader(const Reader&) = delete;
     Reader& operator=(const Reader&) = delete;
 
-    /// Events as text: scene and history first, then what is new. Waits at most `patience`; empty: nothing
-    /// came. One who fell far behind goes on with the oldest frame that is kept.
-    std::string next(std::chrono::milliseconds patience);
+    /// Events as text: scene and history first, then what is new; empty: nothing came. One who fell far
+    /// behind goes on with the oldest frame that is kept.
+    std::string next();
     /// True once everything was read and nothing will come.
     bool over() const { return over_; }
 
@@ -55,7 +60,8 @@ class LiveFeed {
   static constexpr std::size_t kept_events = 128;
 
   mutable std::mutex mutex_;
-  std::condition_variable changed_;
+  std::condition_variable left_;  ///< a reader did
+  std::function<void()> wake_;
   FrameMaker maker_;
   std::deque<std::string> events_;
   std::uint64_t first_number_ = 0;  ///< of events_

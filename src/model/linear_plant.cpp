@@ -102,8 +102,8 @@ void note_stiff_drive(const Plant& plant, LinearPlant& linear) {
 
 void refuse_not_finite(const LinearPlant& linear) {
   if (linear.a.allFinite() && linear.b.allFinite()) return;
-  throw ConfigError("correct the plant's parameters: the linearisation is not finite, " +
-                    matrix_text("A", linear.a) + ", " + matrix_text("b", linear.b));
+  throw ConfigError("the linearisation is not finite, " + matrix_text("A", linear.a) + ", " +
+                    matrix_text("b", linear.b) + ": correct the plant's parameters");
 }
 
 }  // namespace
@@ -141,7 +141,7 @@ SampledPlant hold_input(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b, doub
 
 LinearPlant linearize(const Plant& plant, double smoothing) {
   if (!(smoothing > 0.0) || !std::isfinite(smoothing))
-    throw ConfigError("give a smoothing above 0: sgn(v) has no slope at rest");
+    throw ConfigError("sgn(v) has no slope at rest: give a smoothing above 0");
   LinearPlant linear;
   PlantModel<Dual> model = make_model<Dual>(without_dead_zone(plant, linear));
   model.smoothing = smoothing;

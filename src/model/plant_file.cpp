@@ -53,7 +53,7 @@ Plant read_plant(const YamlMap& document) {
   const std::string fault = fault_of(plant);
   if (!fault.empty()) {
     const std::size_t colon = fault.find(": ");
-    map.fail("effects", "cannot be simulated (" + fault.substr(colon + 2) + ")", fault.substr(0, colon));
+    map.fail("effects", "cannot be simulated (" + fault.substr(0, colon) + ")", fault.substr(colon + 2));
   }
   map.finish();
   return plant;
@@ -98,7 +98,7 @@ void write_plant_file(const Plant& plant, const std::filesystem::path& file,
   out << plant_text(plant, comments);
   out.close();
   if (!out)
-    throw Error(ExitCode::usage, "check the folder and its free space: cannot write " + file.string());
+    throw Error(ExitCode::usage, "cannot write " + file.string() + ": check the folder and its free space");
 }
 
 }  // namespace upright

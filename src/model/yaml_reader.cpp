@@ -6,19 +6,18 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
-#include <fstream>
 #include <iterator>
 #include <numeric>
 #include <set>
 #include <sstream>
 
 #include "upright/model/error.hpp"
+#include "upright/model/input_file.hpp"
 
 namespace upright {
 
 namespace {
 
-constexpr std::uintmax_t largest_file_bytes = 16u << 20;
 constexpr int deepest_nesting = 64;
 
 std::size_t edit_distance(std::string_view a, std::string_view b) {
@@ -60,7 +59,7 @@ std::optional<double> parse_number(const std::string& text) {
 
 [[noreturn]] void refuse_at(const std::filesystem::path& file, std::ptrdiff_t line, const std::string& remedy,
                             const std::string& problem) {
-  throw ConfigError(remedy + ": " + file.string() + ":" + std::to_string(line) + ": " + problem);
+  throw ConfigError(file.string() + ":" + std::to_string(line) + ": " + problem + ": " + remedy);
 }
 
 /// Walks a file's events before any node is built and refuses what yaml-cpp cannot be trusted with: nesting
@@ -71,7 +70,7 @@ class Gatekeeper : public YAML::EventHandler {
   explicit Gatekeeper(std::filesystem::path file) : file_(std::move(file)) {}
 
   void OnDocumentStart(const YAML::Mark& mark) override {
-    if (++documents_ > 1) refuse(mark, "keep one YAML document", "a second one begins here");
+    if (++documents_ > 1) refuse(mark, "keep one YAML document", "a second document begins here");
   }
   void OnDocumentEnd() override {}
   void OnNull(const YAML::Mark&, YAML::anchor_t) override {}
@@ -80,7 +79,8 @@ class Gatekeeper : public YAML::EventHandler {
   }
   void OnScalar(const YAML::Mark& mark, const std::string&, YAML::anchor_t,
                 const std::string& value) override {
-    if (value.find('\0') != std::string::npos) refuse(mark, "correct the YAML", "a zero byte");
+    if (value.find('\0') != std::string::npos)
+      refuse(mark, "correct the YAML", "there is a zero byte in the file");
   }
   void OnSequenceStart(const YAML::Mark& mark, const std::string&, YAML::anchor_t,
                        YAML::EmitterStyle::value) override {
@@ -111,7 +111,8 @@ class Gatekeeper : public YAML::EventHandler {
 void refuse_what_cannot_be_built(const std::string& text, const std::filesystem::path& file) {
   // yaml-cpp takes a zero byte that is not escaped for the end of a value.
   if (const std::size_t at = text.find('\0'); at != std::string::npos)
-    refuse_at(file, 1 + std::count(text.data(), text.data() + at, '\n'), "correct the YAML", "a zero byte");
+    refuse_at(file, 1 + std::count(text.data(), text.data() + at, '\n'), "correct the YAML",
+              "there is a zero byte in the file");
   std::istringstream stream(text);
   YAML::Parser parser(stream);
   Gatekeeper gatekeeper(file);
@@ -230,9 +231,9 @@ void refuse_bad_keys(const YAML::Node& map, const std::filesystem::path& file, c
     const std::string where =
         file.string() + ":" + std::to_string(line) + ": " + (path.empty() ? "" : path + ".");
     if (!entry.first.IsScalar())
-      throw ConfigError("use plain words as keys: " + where + " has a key that is not one");
+      throw ConfigError(where + "a key is not a plain word: use plain words as keys");
     if (!seen.insert(entry.first.Scalar()).second)
-      throw ConfigError("keep one of them: " + where + shown(entry.first.Scalar()) + " stands twice");
+      throw ConfigError(where + shown(entry.first.Scalar()) + " stands twice: keep one of them");
   }
 }
 
@@ -258,24 +259,13 @@ YamlMap YamlMap::from_text(const std::string& text, const std::filesystem::path&
     refuse_at(file, std::max(problem.mark.line, 0) + 1, "correct the YAML", shown(problem.msg));
   }
   if (!node->yaml.IsMap())
-    throw ConfigError("write 'key: value' lines: " + file.string() + ":1: the top level is not a map");
+    throw ConfigError(file.string() + ":1: the top level is not a map: write 'key: value' lines");
   refuse_bad_keys(node->yaml, file, "");
   return YamlMap(std::move(node));
 }
 
 YamlMap YamlMap::from_file(const std::filesystem::path& file) {
-  std::error_code problem;
-  if (std::filesystem::is_directory(file, problem))
-    throw ConfigError("name a file: " + file.string() + " is a folder");
-  const std::uintmax_t size = std::filesystem::file_size(file, problem);
-  if (problem)
-    throw ConfigError("check the path: cannot read " + file.string() + " (" + problem.message() + ")");
-  if (size > largest_file_bytes)
-    throw ConfigError("name a smaller file: " + file.string() + " is larger than 16 MiB");
-  std::ifstream in(file, std::ios::binary);
-  if (!in) throw ConfigError("check the path and its permissions: cannot read " + file.string());
-  const std::string text((std::istreambuf_iterator<char>(in)), std::istreambuf_iterator<char>());
-  return from_text(text, file);
+  return from_text(whole_file(file), file);
 }
 
 bool YamlMap::has(const std::string& key) const {

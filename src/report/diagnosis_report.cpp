@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
-#include <fstream>
 #include <limits>
 #include <map>
 #include <nlohmann/json.hpp>
@@ -13,6 +12,7 @@
 #include <vector>
 
 #include "upright/model/error.hpp"
+#include "upright/model/input_file.hpp"
 #include "upright/report/html.hpp"
 #include "upright/report/plot.hpp"
 
@@ -30,7 +30,7 @@ double number(const json& value) {
 
 std::string file_text(const std::filesystem::path& file) {
   std::ostringstream text;
-  text << std::ifstream(file).rdbuf();
+  if (const auto in = InputFile::if_there(file)) text << in->rdbuf();
   return text.str();
 }
 
@@ -49,7 +49,7 @@ void add_answer(HtmlPage& page, const json& d) {
       {"not_excited", {Tone::neutral, "Not excited: too little moves in these data to show anything"}}};
   const auto known = headlines.find(verdict);
   if (known == headlines.end())
-    throw ConfigError("make the diagnosis anew: its diagnosis.json has a verdict that is none");
+    throw ConfigError("diagnosis.json has an unknown verdict: make the diagnosis anew");
   const auto& [tone, headline] = known->second;
   page.answer(
       tone, headline,
@@ -60,24 +60,14 @@ void add_answer(HtmlPage& page, const json& d) {
 
 void add_gap(HtmlPage& page, const json& d) {
   page.section("How the gap shrinks");
-  Plot plot;
-  plot.x.label = "step: 0 is the model as given, then one effect after the other";
-  plot.y = {"gap [noise standard deviations]", true, {}, {}};
-  Series bars{"", {0.0}, {number(d.at("gap").at("before"))}, Series::Style::bars, -1, false};
-  HtmlTable table{{"step", "effect", "gap before", "gap after"}, {}, ""};
-  for (const json& effect : d.at("effects")) {
-    bars.x.push_back(static_cast<double>(bars.x.size()));
-    bars.y.push_back(number(effect.at("gap_after")));
-    table.rows.push_back({std::to_string(bars.x.size() - 1), effect.at("kind"),
-                          number_text(number(effect.at("gap_before"))),
-                          number_text(number(effect.at("gap_after")))});
-  }
-  plot.series.push_back(bars);
-  plot.horizontal_marks.push_back({1.0, "noise floor"});
-  page.figure(
-      plot,
-      "What a plain simulation of held-out data is off, over what the noise makes of it: 1 is the floor.");
-  if (!table.rows.empty()) page.table(table);
+  std::vector<HtmlBar> bars = {{"the model as given", number(d.at("gap").at("before")), color::before}};
+  for (const json& effect : d.at("effects"))
+    bars.push_back(
+        {"with " + effect.at("kind").get<std::string>(), number(effect.at("gap_after")), color::after});
+  page.bars(
+      bars, 1.0,
+      "What a plain simulation of held-out data is off, over what the noise makes of it; each effect is "
+      "added to those above it. Lengths are logarithmic, and 1, the noise, has none.");
 }
 
 void add_effects(HtmlPage& page, const json& d) {
@@ -86,10 +76,11 @@ void add_effects(HtmlPage& page, const json& d) {
   HtmlTable table{
       {"effect", "parameter", "value", "from", "to", "unit"}, {}, "Intervals hold with 95 percent."};
   for (const json& effect : d.at("effects"))
-    for (const auto& [name, p] : effect.at("parameters").items())
-      table.rows.push_back({effect.at("kind"), name, number_text(number(p.at("value")), 5),
-                            number_text(number(p.at("ci95").at(0)), 5),
-                            number_text(number(p.at("ci95").at(1)), 5), p.at("unit")});
+    for (const auto& [name, p] : effect.at("parameters").items()) {
+      const double low = number(p.at("ci95").at(0)), high = number(p.at("ci95").at(1));
+      table.rows.push_back({effect.at("kind"), name, number_within(number(p.at("value")), low, high),
+                            number_within(low, low, high), number_within(high, low, high), p.at("unit")});
+    }
   page.table(table);
   for (const json& effect : d.at("effects")) {
     const std::string kind = effect.at("kind"), where = effect.at("where");
@@ -108,17 +99,18 @@ void add_effects(HtmlPage& page, const json& d) {
 /// Cells of a CSV without its header, every row `width` long; none where there is no file.
 std::vector<std::vector<std::string>> read_rows(const std::filesystem::path& file, std::size_t width) {
   std::vector<std::vector<std::string>> rows;
-  std::ifstream in(file);
+  const std::unique_ptr<InputFile> in = InputFile::if_there(file);
+  if (!in) return rows;
   std::string line;
-  std::getline(in, line);
-  while (std::getline(in, line)) {
+  std::getline(*in, line);
+  while (std::getline(*in, line)) {
     std::vector<std::string> row;
     std::size_t begin = 0;
     for (std::size_t end; (end = line.find(',', begin)) != std::string::npos; begin = end + 1)
       row.push_back(line.substr(begin, end - begin));
     row.push_back(line.substr(begin));
     if (row.size() != width)
-      throw ConfigError("make the diagnosis anew: " + file.string() + " has a row that is cut off");
+      throw ConfigError(file.string() + " has a row that is cut off: make the diagnosis anew");
     rows.push_back(std::move(row));
   }
   return rows;
@@ -182,24 +174,27 @@ void add_traces(HtmlPage& page, const std::filesystem::path& file) {
       table.rows.push_back(
           {runs[r], label, number_text(trace.before_rms), number_text(trace.after_rms), unit});
       Plot plot, errors;
-      plot.title = runs[r];
+      plot.title = label;
+      errors.title = "measured minus simulated";
       plot.x.label = errors.x.label = "time [s]";
-      plot.y.label = label + " [" + unit + "]";
-      plot.series.push_back({"before", trace.time_s, trace.before, Series::Style::line, 1, false});
-      plot.series.push_back({"measured", trace.time_s, trace.measured, Series::Style::line, 3, false});
-      plot.series.push_back({"after", trace.time_s, trace.after, Series::Style::line, 0, true});
-      errors.y.label = "measured minus simulated [" + unit + "]";
+      plot.y.label = errors.y.label = unit;
+      plot.series.push_back(
+          {"before", trace.time_s, trace.before, Series::Style::line, color::before, false});
+      plot.series.push_back(
+          {"measured", trace.time_s, trace.measured, Series::Style::line, color::measured, false});
+      plot.series.push_back({"after", trace.time_s, trace.after, Series::Style::line, color::after, true});
       std::vector<double> before = trace.before, after = trace.after;
       for (std::size_t k = 0; k < before.size(); ++k) {
         before[k] = trace.measured[k] - before[k];
         after[k] = trace.measured[k] - after[k];
       }
-      errors.series.push_back({"before", trace.time_s, before, Series::Style::line, 1, false});
-      errors.series.push_back({"after", trace.time_s, after, Series::Style::line, 0, false});
+      errors.series.push_back({"before", trace.time_s, before, Series::Style::line, color::before, false});
+      errors.series.push_back({"after", trace.time_s, after, Series::Style::line, color::after, false});
       plot.width_px = errors.width_px = 440;
       plots.push_back(plot);
       plots.push_back(errors);
     }
+    align(plots);
     if (r < most_shown)
       page.figures(plots, "Held-out run " + runs[r] + ": before and after the effects were added.");
   }
@@ -254,8 +249,10 @@ void add_residuals(HtmlPage& page, const std::filesystem::path& file) {
     Plot plot;
     plot.x.label = label;
     plot.y.label = name;
-    plot.series.push_back({"before", columns[column], columns[value], Series::Style::points, 1, false});
-    plot.series.push_back({"after", columns[column], columns[value + 1], Series::Style::points, 0, false});
+    plot.series.push_back(
+        {"before", columns[column], columns[value], Series::Style::points, color::before, false});
+    plot.series.push_back(
+        {"after", columns[column], columns[value + 1], Series::Style::points, color::after, false});
     plot.width_px = 440;
     return plot;
   };
@@ -282,7 +279,8 @@ void add_candidates(HtmlPage& page, const json& d) {
   page.section("The ranking of candidates");
   HtmlTable table{{"effect", "evidence", "gap with it"},
                   {},
-                  "Each alone in the model as given. Evidence: fall of minus twice the log likelihood."};
+                  "Each alone in the model as given. Evidence: twice the natural logarithm of how many times "
+                  "more likely the effect makes the data."};
   for (const json& candidate : d.at("candidates"))
     table.rows.push_back({candidate.at("kind"), number_text(number(candidate.at("evidence"))),
                           number_text(number(candidate.at("gap_after")))});
@@ -322,8 +320,8 @@ std::filesystem::path write_diagnosis_report(const std::filesystem::path& folder
     for (const json& note : d.at("notes")) page.note(Tone::neutral, note.get<std::string>() + ".");
     page.write(file);
   } catch (const json::exception& problem) {
-    throw ConfigError("make the diagnosis anew: " + (folder / "diagnosis.json").string() +
-                      " cannot be read (" + problem.what() + ")");
+    throw ConfigError((folder / "diagnosis.json").string() + " cannot be read (" + problem.what() +
+                      "): make the diagnosis anew");
   }
   return file;
 }

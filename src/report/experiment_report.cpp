@@ -6,13 +6,18 @@
 #include <string>
 #include <vector>
 
+#include "run_data.hpp"
 #include "upright/analysis/delay_margin.hpp"
+#include "upright/analysis/paired_comparison.hpp"
+#include "upright/analysis/parallel.hpp"
 #include "upright/analysis/sweep.hpp"
-#include "upright/control/predictor.hpp"
+#include "upright/control/model_parts.hpp"
 #include "upright/model/error.hpp"
 #include "upright/model/plant_file.hpp"
 #include "upright/report/html.hpp"
+#include "upright/report/paired_report.hpp"
 #include "upright/report/plot.hpp"
+#include "upright/report/run_report.hpp"
 #include "upright/runtime/experiment.hpp"
 
 namespace upright {
@@ -27,6 +32,8 @@ struct Record {
   std::string name;
   std::vector<Piece> pieces;
   std::vector<TrialResult> trials;
+  std::vector<std::string> links;     ///< to each trial's own report; empty: it cannot be read
+  std::vector<std::string> problems;  ///< why not
 };
 
 Record read_record(const std::filesystem::path& folder) {
@@ -34,7 +41,7 @@ Record read_record(const std::filesystem::path& folder) {
   Record record;
   record.name = document.text("name");
   for (const YamlMap& piece : document.maps("pieces")) record.pieces.push_back(read_piece(piece));
-  record.trials = read_trials(folder);
+  record.trials = read_trials(folder, record.pieces);
   return record;
 }
 
@@ -54,9 +61,9 @@ std::vector<SweepRun> simulate(const Plant& plant, const RunRecord& run,
   config.setup.amplifier_limit_v = run.rig.amplifier.limit_v;
   config.setup.duration_s = duration_s;
   config.setup.fell_above_rad = run.rig.fall_angle_rad;
-  if (run.control.compensation.kind != CompensationKind::none)
-    config.setup.make_compensator = [&plant](const ControlConfig& control, double) {
-      return std::make_unique<Predictor>(control, plant);
+  if (run.control.compensation.kind != CompensationKind::none || run.control.has_state_estimator())
+    config.setup.make_parts = [&plant](const ControlConfig& control) {
+      return make_model_parts(control, plant, plant);
     };
   double theta0 = 0.0, longest = 0.0;
   for (const TrialResult& r : trials) {
@@ -107,7 +114,7 @@ void add_sweep(HtmlPage& page, const std::filesystem::path& folder, const Piece&
   plot.y.logarithmic = true;
   plot.height_px = 400;
   constexpr double least_degree = 1e-3;
-  Series line{"simulated", {}, {}};
+  Series line{"simulated", {}, {}, Series::Style::line, color::soft};
   double simulated_oscillates = std::nan(""), simulated_falls = std::nan("");
   for (const SweepRun& r : simulated) {
     line.x.push_back(1e3 * r.start.delay_s);
@@ -119,7 +126,7 @@ void add_sweep(HtmlPage& page, const std::filesystem::path& folder, const Piece&
   }
   plot.series.push_back(line);
   for (const char* outcome : outcomes) {
-    Series points{std::string("rig, ") + outcome, {}, {}, Series::Style::points};
+    Series points{std::string("rig, ") + outcome, {}, {}, Series::Style::points, color::of_outcome(outcome)};
     for (const TrialResult& r : trials)
       if (r.outcome == outcome) {
         points.x.push_back(1e3 * r.trial.delay_s);
@@ -142,7 +149,7 @@ void add_sweep(HtmlPage& page, const std::filesystem::path& folder, const Piece&
   };
   mark(margin, "linear, near rest");
   mark(sliding_margin, "linear, sliding");
-  page.section("Delay sweep " + piece.label);
+  page.section(piece.label == "delay_sweep" ? "Delay sweep" : "Delay sweep " + piece.label);
   page.figure(plot,
               "The rig's runs (points) over a simulated sweep of the same loop (line). Vertical: the "
               "critical delay of the linear analysis.");
@@ -160,40 +167,129 @@ void add_sweep(HtmlPage& page, const std::filesystem::path& folder, const Piece&
                   " degree counts as stable."});
 }
 
+/// A name within the folder, so that a folder from somebody else leads nowhere else.
+bool is_within(const std::string& run_directory) {
+  return !run_directory.empty() && run_directory != "." && run_directory != ".." &&
+         std::filesystem::path(run_directory).filename() == run_directory;
+}
+
+/// Writes the report of each run and notes where it is.
+void write_run_reports(const std::filesystem::path& folder, Record& record) {
+  record.links.assign(record.trials.size(), "");
+  std::vector<std::string> problems(record.trials.size());
+  parallel_for(record.trials.size(), [&](std::size_t i) {
+    const std::string& run = record.trials[i].run_directory;
+    try {
+      if (!is_within(run)) throw ConfigError("its name leads out of the folder");
+      write_run_report(folder / run);
+      record.links[i] = link_to(std::filesystem::path(run) / "report.html");
+    } catch (const Error& error) {
+      problems[i] = run + " has no report: " + error.what();
+    }
+  });
+  for (const std::string& problem : problems)
+    if (!problem.empty()) record.problems.push_back(problem);
+}
+
+/// A run in small: what it was made to show.
+std::vector<Plot> small_plots(const RunData& run, const Piece& piece, const TrialResult& trial,
+                              const std::string& link) {
+  Plot first, second;
+  Series theta, cart, voltage;
+  voltage.style = Series::Style::steps;
+  for (const LogRecord& row : run.drawn) {
+    const double time_s = 1e-9 * static_cast<double>(row.time_ns);
+    for (Series* series : {&theta, &cart, &voltage}) series->x.push_back(time_s);
+    theta.y.push_back(per_degree * row.theta_rad);
+    cart.y.push_back(1e3 * row.cart_m);
+    voltage.y.push_back(row.voltage_v);
+  }
+  const bool is_sweep = piece.kind == PieceKind::delay_sweep;
+  theta.color = is_sweep ? color::of_outcome(trial.outcome) : color::angle;
+  cart.color = color::cart;
+  voltage.color = color::voltage;
+  first.title = is_sweep ? milliseconds(trial.trial.delay_s) + " ms: " + trial.outcome : trial.run_directory;
+  first.link = link;
+  first.x.label = second.x.label = "time [s]";
+  first.width_px = second.width_px = 450;
+  first.height_px = second.height_px = 190;
+  const bool hangs = piece.kind == PieceKind::free_decay;
+  first.y.label = balances(piece) || hangs ? "theta [deg]" : "x [mm]";
+  first.series = {balances(piece) || hangs ? theta : cart};
+  second.y.label = balances(piece) ? "x [mm]" : "V";
+  second.series = {balances(piece) ? cart : voltage};
+  if (is_sweep || hangs) return {first};
+  second.title = balances(piece) ? "its cart" : "its voltage";
+  std::vector<Plot> plots = {first, second};
+  align(plots);
+  return plots;
+}
+
+/// Each run of a piece, drawn small, with a link to its own report.
+void add_runs(HtmlPage& page, const std::filesystem::path& folder, const Record& record, std::size_t piece) {
+  std::vector<Plot> plots;
+  for (std::size_t i = 0; i < record.trials.size(); ++i) {
+    const TrialResult& trial = record.trials[i];
+    if (trial.trial.piece != piece || record.links[i].empty()) continue;
+    const RunData run = load_run_data(folder / trial.run_directory);
+    for (Plot& plot : small_plots(run, record.pieces[piece], trial, record.links[i]))
+      plots.push_back(std::move(plot));
+  }
+  if (plots.empty()) return;
+  const Piece& shown = record.pieces[piece];
+  if (shown.kind != PieceKind::delay_sweep) page.section(shown.label);
+  page.figures(plots, "The runs over time; each title leads to the run's own report.");
+}
+
+/// Controllers that took turns, round against round.
+void add_comparisons(HtmlPage& page, const std::filesystem::path& folder, const Record& record) {
+  if (std::none_of(record.pieces.begin(), record.pieces.end(), compares)) return;
+  for (const PieceComparison& piece : paired_comparisons(folder)) {
+    page.section(piece.label + ": controllers in turns");
+    for (const std::string& sentence : paired_sentences(piece)) page.paragraph(sentence);
+    add_paired_tables(page, piece);
+  }
+}
+
 }  // namespace
 
 bool is_experiment_folder(const std::filesystem::path& folder) {
-  std::error_code ignored;
-  return std::filesystem::exists(folder / "experiment.yaml", ignored) &&
-         std::filesystem::exists(folder / "trials.csv", ignored);
+  return holds_experiment(folder);
 }
 
 std::filesystem::path write_experiment_report(const std::filesystem::path& folder) {
-  const Record record = read_record(folder);
+  Record record = read_record(folder);
   if (record.trials.empty())
-    throw ConfigError("give the experiment command again: " + folder.string() + " holds no finished run");
+    throw ConfigError(folder.string() + " holds no finished run: give the experiment command again");
+  write_run_reports(folder, record);
   HtmlPage page("Experiment " + record.name, folder.string());
-  const bool complete = !next_trial(record.pieces, record.trials);
-  page.answer(complete ? Tone::good : Tone::warning, complete ? "Complete" : "Not complete",
-              std::to_string(record.trials.size()) + " runs.");
+  const bool all_made = !next_trial(record.pieces, record.trials);
+  const std::string missing = all_made ? missing_transitions(record.pieces, record.trials)
+                                       : "the experiment ended before its last run: give its command again";
+  page.answer(missing.empty() ? Tone::good : Tone::warning, missing.empty() ? "Complete" : "Not complete",
+              std::to_string(record.trials.size()) + " runs" + (missing.empty() ? "" : "; " + missing) + ".");
   for (std::size_t i = 0; i < record.pieces.size(); ++i) {
     std::vector<TrialResult> trials;
     for (const TrialResult& r : record.trials)
       if (r.trial.piece == i) trials.push_back(r);
     if (!trials.empty() && record.pieces[i].kind == PieceKind::delay_sweep)
       add_sweep(page, folder, record.pieces[i], trials);
+    add_runs(page, folder, record, i);
   }
+  add_comparisons(page, folder, record);
   page.section("Runs");
   HtmlTable table{{"run directory", "delay [ms]", "outcome", "start [degree]", "angle [degree]", "cart [mm]",
                    "frequency [Hz]"},
                   {},
-                  "Each replays and has a report of its own."};
+                  "Each leads to a report of its own."};
   for (const TrialResult& r : record.trials)
     table.rows.push_back(
         {r.run_directory, milliseconds(r.trial.delay_s), r.outcome, number_text(r.theta0_rad * per_degree, 3),
          number_text(r.theta_amplitude_rad * per_degree, 3), number_text(1e3 * r.cart_amplitude_m, 3),
          std::isfinite(r.frequency_hz) ? number_text(r.frequency_hz, 3) : "-"});
+  table.links = record.links;
   page.table(table);
+  for (const std::string& problem : record.problems) page.note(Tone::warning, problem + ".");
   const std::filesystem::path file = folder / "report.html";
   page.write(file);
   return file;

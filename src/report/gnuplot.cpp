@@ -25,7 +25,7 @@ namespace {
 class MemoryFile {
  public:
   explicit MemoryFile(const char* name) : descriptor_(memfd_create(name, MFD_CLOEXEC)) {
-    if (descriptor_ < 0) fail("close programs to free memory: cannot draw plots");
+    if (descriptor_ < 0) fail("there is no memory to draw plots in: close other programs");
   }
   ~MemoryFile() { close(descriptor_); }
   MemoryFile(const MemoryFile&) = delete;
@@ -37,7 +37,7 @@ class MemoryFile {
     while (!text.empty()) {
       const ssize_t written = ::write(descriptor_, text.data(), text.size());
       if (written < 0 && errno == EINTR) continue;
-      if (written <= 0) fail("close programs to free memory: cannot draw plots");
+      if (written <= 0) fail("there is no memory to draw plots in: close other programs");
       text.remove_prefix(static_cast<std::size_t>(written));
     }
     lseek(descriptor_, 0, SEEK_SET);
@@ -79,9 +79,10 @@ pid_t start(const MemoryFile& in, const MemoryFile& out, const MemoryFile& err) 
   pid_t child = 0;
   const int problem = posix_spawnp(&child, program.data(), &actions, nullptr, arguments.data(), environ);
   posix_spawn_file_actions_destroy(&actions);
-  if (problem == ENOENT) fail("install gnuplot (apt-get install gnuplot-nox): plots are drawn by it");
+  if (problem == ENOENT)
+    fail("gnuplot, which draws the plots, is not installed: apt-get install gnuplot-nox");
   if (problem != 0)
-    fail("check that gnuplot runs: it cannot be started (" + std::string(strerror(problem)) + ")");
+    fail("gnuplot cannot be started (" + std::string(strerror(problem)) + "): check that it runs");
   return child;
 }
 
@@ -101,8 +102,9 @@ std::string gnuplot_output(const std::string& script) {
   MemoryFile err("gnuplot-errors");
   in.write(script);
   const int exit_code = wait_for(start(in, out, err));
-  if (exit_code == 127) fail("install gnuplot (apt-get install gnuplot-nox): plots are drawn by it");
-  if (exit_code != 0) fail("check that gnuplot 5 works here: gnuplot failed: " + complaint_of(err.read()));
+  if (exit_code == 127) fail("gnuplot, which draws the plots, is not installed: apt-get install gnuplot-nox");
+  if (exit_code != 0)
+    fail("gnuplot failed (" + complaint_of(err.read()) + "): check that gnuplot 5 works here");
   return out.read();
 }
 

@@ -30,7 +30,8 @@ void save(const Plot& plot, const std::filesystem::path& file) {
   out << svg_file_of(plot);
   out.close();
   if (!out)
-    throw ConfigError("free some space or choose another folder with --out: cannot write " + file.string());
+    throw ConfigError("cannot write " + file.string() +
+                      ": free some space or choose another folder with --out");
 }
 
 /// The paper's Figure 3, over the data.
@@ -52,7 +53,7 @@ Plot friction_plot(const Identification& id) {
     breakaways.x.push_back(0.0);
     breakaways.y.push_back(b.force_n);
   }
-  Series model{"identified", {}, {}};
+  Series model{id.is_trustworthy() ? "identified" : "best fit, not to be used", {}, {}};
   constexpr int steps = 600;
   for (int i = -steps; i <= steps; ++i) {
     const double v = 1.1 * fastest * i / steps;
@@ -115,15 +116,35 @@ double steady_friction_n(const Plant& plant, double cart_mps) {
          value_or(plant, "viscous_friction", 0, 0.0) * cart_mps - value_or(plant, "constant_force", 0, 0.0);
 }
 
+namespace {
+
+void answer(HtmlPage& page, const Identification& id) {
+  const std::string gap = std::isfinite(id.gap_after)
+                              ? " A simulation of data that the fit did not see is " +
+                                    number_text(id.gap_after, 3) + " times as far off as noise makes it."
+                              : "";
+  if (id.is_trustworthy()) {
+    page.answer(Tone::good, std::to_string(id.parameters.size()) + " numbers identified",
+                "They account for the data." + gap);
+  } else if (id.verdict == Verdict::not_excited) {
+    page.answer(Tone::neutral, "Not excited", "The numbers are not the rig's: " + id.residual + "." + gap);
+  } else {
+    page.answer(Tone::bad, "Unexplained: the numbers are not the rig's",
+                "Something moves it that identify does not know, and the numbers make up for it: " +
+                    id.residual + "." + gap + " What is missing, upright diagnose says.");
+  }
+}
+
+}  // namespace
+
 void write_identification_report(const Identification& id, const std::vector<Measurement>& runs,
                                  const std::filesystem::path& file) {
   HtmlPage page("Identification", std::to_string(runs.size()) + " runs");
-  page.answer(Tone::neutral, std::to_string(id.parameters.size()) + " numbers identified",
-              "Innovations of the whole model are " + number_text(id.rms, 3) + " times the noise.");
+  answer(page, id);
   HtmlTable table{{"parameter", "value", "95 % from", "to", "unit", "shown by", "goodness"}, {}, ""};
   for (const IdentifiedParameter& p : id.parameters)
-    table.rows.push_back({p.name, number_text(p.value, 5), number_text(p.low, 5), number_text(p.high, 5),
-                          p.unit, p.source, p.goodness});
+    table.rows.push_back({p.name, number_within(p.value, p.low, p.high), number_within(p.low, p.low, p.high),
+                          number_within(p.high, p.low, p.high), p.unit, p.source, p.goodness});
   page.table(table);
   const std::filesystem::path folder = file.parent_path();
   const Plot friction = friction_plot(id);

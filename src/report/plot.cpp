@@ -4,9 +4,11 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <set>
 #include <string_view>
 
 #include "gnuplot.hpp"
+#include "ticks.hpp"
 #include "upright/model/error.hpp"
 #include "upright/model/yaml_reader.hpp"
 
@@ -14,10 +16,14 @@ namespace upright {
 
 namespace {
 
-// Okabe and Ito's palette, which colour-blind readers can tell apart.
-constexpr std::array<const char*, 7> palette = {"#0072b2", "#d55e00", "#009e73", "#cc79a7",
-                                                "#e69f00", "#56b4e9", "#555555"};
-constexpr std::array<const char*, 5> class_colors = {"#009e73", "#f0c000", "#c1272d", "#7a7a7a", "#56b4e9"};
+// Room around the axes, in heights of a text: half a tick's text at the right; ticks and label below; the
+// scale of a heat map of magnitudes; at least so much at the left, so that most plots of a page align.
+constexpr double line_heights = 1.5, right_heights = 2.0, bottom_heights = 4.0, scale_heights = 8.5,
+                 least_left_heights = 6.0;
+
+int heights(const Plot& plot, double count) {
+  return static_cast<int>(count * plot.text_px);
+}
 
 /// Text in gnuplot's single quotes. gnuplot passes numeric character references through, so every character
 /// that means something to gnuplot, to SVG or to `as_element` below goes in as one.
@@ -33,8 +39,12 @@ std::string quoted(const std::string& text) {
   return result + "'";
 }
 
+std::string quoted_color(std::string_view color) {
+  return "'" + std::string(color) + "'";
+}
+
 void require(bool good, const std::string& what) {
-  if (!good) throw Error(ExitCode::usage, "report this as a bug: a plot's " + what);
+  if (!good) throw Error(ExitCode::usage, "a plot's " + what + ": report this as a bug");
 }
 
 /// gnuplot's own arithmetic overflows near the ends of a double's range; no quantity of ours lives there.
@@ -51,6 +61,43 @@ std::string row(std::initializer_list<double> values) {
   return text;
 }
 
+/// The finite range of what is drawn along one axis.
+struct Extent {
+  double low = std::numeric_limits<double>::infinity();
+  double high = -std::numeric_limits<double>::infinity();
+  void include(const std::vector<double>& values, const Axis& axis) {
+    for (const double value : values) {
+      if (!drawable(value, axis)) continue;
+      low = std::min(low, value);
+      high = std::max(high, value);
+    }
+  }
+};
+
+constexpr std::size_t few_points = 2000;
+
+/// Of the points that fall into one pixel, the first: more cannot be seen.
+std::vector<std::size_t> seen_points(const Series& series, const Plot& plot) {
+  Extent x, y;
+  x.include(series.x, plot.x);
+  y.include(series.y, plot.y);
+  const auto cell = [](double value, const Axis& axis, const Extent& extent, int pixels) {
+    const auto on = [&](double v) { return axis.logarithmic ? std::log(v) : v; };
+    const double span = on(extent.high) - on(extent.low);
+    return span > 0.0 ? static_cast<int>(pixels * (on(value) - on(extent.low)) / span) : 0;
+  };
+  std::set<std::pair<int, int>> taken;
+  std::vector<std::size_t> seen;
+  for (std::size_t i = 0; i < series.x.size(); ++i)
+    if (drawable(series.x[i], plot.x) && drawable(series.y[i], plot.y) &&
+        taken
+            .emplace(cell(series.x[i], plot.x, x, plot.width_px),
+                     cell(series.y[i], plot.y, y, plot.height_px))
+            .second)
+      seen.push_back(i);
+  return seen;
+}
+
 std::string line_data(const Series& series, const Plot& plot) {
   std::string text;
   const auto append = [&](std::size_t i) {
@@ -61,6 +108,8 @@ std::string line_data(const Series& series, const Plot& plot) {
   if (joined && std::is_sorted(series.x.begin(), series.x.end())) {
     for (const std::size_t i : thinned(series.x, series.y, static_cast<std::size_t>(plot.width_px)))
       append(i);
+  } else if (series.style == Series::Style::points && series.x.size() > few_points) {
+    for (const std::size_t i : seen_points(series, plot)) append(i);
   } else {
     for (std::size_t i = 0; i < series.x.size(); ++i) append(i);
   }
@@ -93,19 +142,26 @@ void add_bands(const Plot& plot, Curves& curves) {
       data += drawable(band.low[i], plot.y) && drawable(band.high[i], plot.y)
                   ? row({band.x[i], band.low[i], band.high[i]})
                   : "\n";
-    curves.add(data, "using 1:2:3 with filledcurves lc rgb '#d6e6f2'", band.name);
+    curves.add(data, "using 1:2:3 with filledcurves lc rgb " + quoted_color(color::band), band.name);
   }
 }
 
+/// The colours of the series; on a map's colours only ink is seen everywhere.
+std::vector<std::string_view> colors_of(const Plot& plot) {
+  std::vector<std::string_view> colors;
+  std::size_t next = 0;
+  for (const Series& series : plot.series)
+    colors.push_back(plot.heat_map ? color::ink : series.color.empty() ? color::curve(next++) : series.color);
+  return colors;
+}
+
 void add_series(const Plot& plot, Curves& curves) {
-  int next_color = 0;
-  for (const Series& series : plot.series) {
+  const std::vector<std::string_view> colors = colors_of(plot);
+  for (std::size_t k = 0; k < plot.series.size(); ++k) {
+    const Series& series = plot.series[k];
     require(series.x.size() == series.y.size(), "series has unequal lengths");
-    const int chosen = series.color >= 0 ? series.color : next_color++;
-    // On a map's colours only black is seen everywhere.
-    const std::string color =
-        plot.heat_map ? "#000000" : palette[static_cast<std::size_t>(chosen) % palette.size()];
-    const std::string line = " lc rgb '" + color + "' lw 1.4" + (series.dashed ? " dt 2" : "");
+    const std::string color = " lc rgb " + quoted_color(colors[k]);
+    const std::string line = color + " lw 1.4" + (series.dashed ? " dt 2" : "");
     std::string how;
     switch (series.style) {
       case Series::Style::line:
@@ -116,11 +172,10 @@ void add_series(const Plot& plot, Curves& curves) {
         break;
       case Series::Style::points:
         // Few points are seen one by one; many are a cloud.
-        how = std::string("with points pt 7 ps ") + (series.x.size() < 200 ? "0.8" : "0.35") + " lc rgb '" +
-              color + "'";
+        how = std::string("with points pt 7 ps ") + (series.x.size() < 200 ? "0.8" : "0.35") + color;
         break;
       case Series::Style::bars:
-        how = "with boxes fs solid 1.0 noborder lc rgb '" + color + "'";
+        how = "with boxes fs solid 1.0 noborder" + color;
         break;
     }
     curves.add(line_data(series, plot), how, series.name);
@@ -170,13 +225,10 @@ std::string color_scale(const HeatMap& map) {
            quoted(map.label) + "\n";
   std::string text = "set palette maxcolors " + std::to_string(map.classes.size()) + " defined (";
   for (std::size_t k = 0; k < map.classes.size(); ++k)
-    text += (k == 0 ? "" : ", ") + std::to_string(k) + " '" + class_colors[k % class_colors.size()] + "'";
-  if (map.classes.size() == 1) text += std::string(", 1 '") + class_colors[0] + "'";
-  text +=
-      ")\nset cbrange [-0.5:" + exact_text(static_cast<double>(map.classes.size()) - 0.5) + "]\nset cbtics (";
-  for (std::size_t k = 0; k < map.classes.size(); ++k)
-    text += (k == 0 ? "" : ", ") + quoted(map.classes[k]) + " " + std::to_string(k);
-  return text + ") scale 0\nset cblabel " + quoted(map.label) + "\n";
+    text += (k == 0 ? "" : ", ") + std::to_string(k) + " " + quoted_color(color::of_outcome(map.classes[k]));
+  if (map.classes.size() == 1) text += ", 1 " + quoted_color(color::of_outcome(map.classes[0]));
+  return text + ")\nset cbrange [-0.5:" + exact_text(static_cast<double>(map.classes.size()) - 0.5) +
+         "]\nunset colorbox\n";
 }
 
 void add_heat_map(const Plot& plot, Curves& curves, std::string& settings) {
@@ -184,34 +236,16 @@ void add_heat_map(const Plot& plot, Curves& curves, std::string& settings) {
   const HeatMap& map = *plot.heat_map;
   require(!map.x.empty() && !map.y.empty() && map.values.size() == map.x.size() * map.y.size(),
           "heat map has the wrong number of values");
-  settings += color_scale(map);
+  settings += color_scale(map) + "set tics front\n";
   curves.add(cells_data(map, plot), "using 1:2:3:4:5:6:7 with boxxyerror fs solid noborder fc palette", "");
-  const std::vector<double> x_edges = edges_of(map.x, plot.x);
-  const std::vector<double> y_edges = edges_of(map.y, plot.y);
-  const auto range = [](const std::vector<double>& edges, const Axis& axis) {
-    return "range [" + exact_text(axis.low.value_or(edges.front())) + ":" +
-           exact_text(axis.high.value_or(edges.back())) + "]\n";
-  };
-  settings += "set x" + range(x_edges, plot.x) + "set y" + range(y_edges, plot.y);
 }
 
-/// The finite range of what is drawn along one axis.
-struct Extent {
-  double low = std::numeric_limits<double>::infinity();
-  double high = -std::numeric_limits<double>::infinity();
-  void include(const std::vector<double>& values, const Axis& axis) {
-    for (const double value : values) {
-      if (!drawable(value, axis)) continue;
-      low = std::min(low, value);
-      high = std::max(high, value);
-    }
-  }
+struct AxisRange {
+  double low = 0.0, high = 1.0;
 };
 
 /// A range for an axis. gnuplot complains of an empty one and rounds a given one; this leaves a small margin.
-std::string axis_settings(const std::string& name, const Axis& axis, const Extent& extent, double margin) {
-  std::string text = "set " + name + "label " + quoted(axis.label) + "\n";
-  if (axis.logarithmic) text += "set logscale " + name + "\n";
+AxisRange range_of(const Axis& axis, const Extent& extent, double margin) {
   double low = axis.low.value_or(extent.low);
   double high = axis.high.value_or(extent.high);
   if (!(low <= high)) {
@@ -222,6 +256,7 @@ std::string axis_settings(const std::string& name, const Axis& axis, const Exten
     const double room = std::max(std::pow(high / low, margin), margin > 0.0 || low == high ? 1.05 : 1.0);
     if (!axis.low) low /= room;
     if (!axis.high) high *= room;
+    if (low == high) high = 1.05 * low;
   } else {
     double room = margin * (high - low);
     if (high - low <= 1e-12 * std::max(std::abs(low), std::abs(high)) || high == low)
@@ -230,10 +265,20 @@ std::string axis_settings(const std::string& name, const Axis& axis, const Exten
     if (!axis.high) high += room;
     if (low == high) high = low + std::max(0.1 * std::abs(low), 1e-6);
   }
-  return text + "set " + name + "range [" + exact_text(low) + ":" + exact_text(high) + "]\n";
+  return {low, high};
 }
 
-std::string axes(const Plot& plot) {
+struct AxisRanges {
+  AxisRange x, y;
+};
+
+AxisRanges ranges_of(const Plot& plot) {
+  if (plot.heat_map) {
+    const std::vector<double> x_edges = edges_of(plot.heat_map->x, plot.x);
+    const std::vector<double> y_edges = edges_of(plot.heat_map->y, plot.y);
+    return {{plot.x.low.value_or(x_edges.front()), plot.x.high.value_or(x_edges.back())},
+            {plot.y.low.value_or(y_edges.front()), plot.y.high.value_or(y_edges.back())}};
+  }
   Extent x;
   Extent y;
   bool bars = false;
@@ -251,7 +296,80 @@ std::string axes(const Plot& plot) {
   }
   Axis y_axis = plot.y;
   if (bars && !y_axis.low && !y_axis.logarithmic) y_axis.low = 0.0;
-  return axis_settings("x", plot.x, x, room_beside ? 0.03 : 0.0) + axis_settings("y", y_axis, y, 0.06);
+  return {range_of(plot.x, x, room_beside ? 0.03 : 0.0), range_of(y_axis, y, 0.06)};
+}
+
+std::vector<const Mark*> drawn_marks(const Plot& plot) {
+  std::vector<const Mark*> marks;
+  for (const Mark& mark : plot.vertical_marks)
+    if (drawable(mark.at, plot.x)) marks.push_back(&mark);
+  return marks;
+}
+
+/// Room around the axes of a drawing [px].
+struct Margins {
+  int left = 0, right = 0, top = 0, bottom = 0;
+};
+
+/// The key's lines in a drawing that has it inside.
+int key_lines(const Plot& plot) {
+  const std::vector<KeyEntry> key = key_of(plot);
+  const double swatch_px = 5.0 * plot.text_px;  // gnuplot's sample and the room around it
+  double widest = 0.0;
+  for (const KeyEntry& entry : key)
+    widest = std::max(widest, text_width_px(entry.name, plot.text_px) + swatch_px);
+  const double room = plot.width_px - heights(plot, least_left_heights + right_heights);
+  const int columns = std::max(1, static_cast<int>(room / std::max(widest, 1.0)));
+  return (static_cast<int>(key.size()) + columns - 1) / columns;
+}
+
+Margins margins_of(const Plot& plot, bool with_title_and_key) {
+  Margins margins;
+  margins.left = plot.left_px.value_or(left_px_of(plot));
+  const bool has_scale = plot.heat_map && plot.heat_map->classes.empty();
+  margins.right = heights(plot, has_scale ? scale_heights : right_heights);
+  margins.bottom = heights(plot, bottom_heights);
+  double lines = 0.5 + static_cast<double>(drawn_marks(plot).size());
+  if (with_title_and_key) lines += (plot.title.empty() ? 0 : 1) + key_lines(plot);
+  margins.top = heights(plot, line_heights * lines);
+  return margins;
+}
+
+AxisSpan span_of(const Axis& axis, const AxisRange& range, double length_px, bool horizontal, int text_px) {
+  return {range.low, range.high, axis.logarithmic, axis.whole, length_px, horizontal, 1.0 * text_px};
+}
+
+std::string axis_settings(const std::string& name, const Axis& axis, const AxisSpan& span) {
+  std::string text = axis.logarithmic ? "set logscale " + name + "\n" : "";
+  std::string ticks;
+  for (const Tick& tick : ticks_of(span))
+    ticks += (ticks.empty() ? "" : ", ") + quoted(tick.text) + " " + exact_text(tick.at);
+  text += ticks.empty() ? "unset " + name + "tics\n" : "set " + name + "tics (" + ticks + ")\n";
+  return text + "set " + name + "range [" + exact_text(span.low) + ":" + exact_text(span.high) + "]\n";
+}
+
+/// The words of the axes, each at its place: gnuplot would move them with the widths of the ticks' texts.
+std::string axis_labels(const Plot& plot, const Margins& margins) {
+  constexpr double from_edge_heights = 0.9;
+  const double edge = from_edge_heights * plot.text_px;
+  const std::string ink = " textcolor rgb " + quoted_color(color::soft) + "\n";
+  const double middle = margins.bottom + 0.5 * (plot.height_px - margins.top - margins.bottom);
+  return "set label " + quoted(plot.x.label) + " at graph 0.5, screen " + exact_text(edge / plot.height_px) +
+         " center" + ink + "set label " + quoted(plot.y.label) + " at screen " +
+         exact_text(edge / plot.width_px) + ", screen " + exact_text(middle / plot.height_px) +
+         " center rotate by 90" + ink;
+}
+
+double height_inside(const Plot& plot, const Margins& margins) {
+  return std::max(40, plot.height_px - margins.top - margins.bottom);
+}
+
+std::string axes(const Plot& plot, const AxisRanges& ranges, const Margins& margins) {
+  const double width = std::max(40, plot.width_px - margins.left - margins.right);
+  return axis_labels(plot, margins) +
+         axis_settings("x", plot.x, span_of(plot.x, ranges.x, width, true, plot.text_px)) +
+         axis_settings("y", plot.y,
+                       span_of(plot.y, ranges.y, height_inside(plot, margins), false, plot.text_px));
 }
 
 /// Bars as wide as the closest two are apart: left to itself, gnuplot fills empty places with wide ones.
@@ -263,55 +381,76 @@ std::string bar_width(const Plot& plot) {
   return std::isfinite(width) && width > 0.0 ? "set boxwidth " + exact_text(width) + " absolute\n" : "";
 }
 
-std::string marks(const Plot& plot) {
+/// Where along an axis a value lies: 0 to 1.
+double part_of(const AxisRange& range, const Axis& axis, double value) {
+  const auto on = [&](double v) { return axis.logarithmic ? std::log(v) : v; };
+  return (on(value) - on(range.low)) / (on(range.high) - on(range.low));
+}
+
+/// Marks across, their words above the frame, each on a line of its own; then those along.
+std::string marks(const Plot& plot, const AxisRanges& ranges) {
   std::string text;
-  const std::string style = plot.heat_map ? " nohead lc rgb '#ffffff' lw 2 dt 3 front\n"
-                                          : " nohead lc rgb '#888888' lw 1 dt 3 front\n";
-  for (const Mark& mark : plot.vertical_marks) {
-    if (!drawable(mark.at, plot.x)) continue;
-    const std::string at = exact_text(mark.at);
+  const std::string style = " nohead lc rgb " + quoted_color(plot.heat_map ? color::ink : color::soft) +
+                            " lw " + (plot.heat_map ? "1.5" : "1") + " dt 3 front\n";
+  const std::string ink = " textcolor rgb " + quoted_color(color::soft) + " front\n";
+  int line = 0;
+  for (const Mark* mark : drawn_marks(plot)) {
+    const std::string at = exact_text(mark->at);
+    const double part = part_of(ranges.x, plot.x, mark->at);
     text += "set arrow from first " + at + ", graph 0 to first " + at + ", graph 1" + style;
-    text += "set label " + quoted(mark.label) + " at first " + at +
-            (plot.heat_map ? ", graph 1 center offset 0,0.7" : ", graph 0.95 offset 0.5,0") +
-            " textcolor rgb '#555555' front\n";
+    text += "set label " + quoted(mark->label) + " at first " + at + ", graph 1 " +
+            (part < 0.25   ? "left"
+             : part > 0.75 ? "right"
+                           : "center") +
+            " offset 0," + exact_text(0.6 + 1.2 * line++) + ink;
   }
   for (const Mark& mark : plot.horizontal_marks) {
     if (!drawable(mark.at, plot.y)) continue;
     const std::string at = exact_text(mark.at);
     text += "set arrow from graph 0, first " + at + " to graph 1, first " + at + style;
-    text += "set label " + quoted(mark.label) + " at graph 0.99, first " + at +
-            " right offset 0,0.5 textcolor rgb '#555555' front\n";
+    const bool above = part_of(ranges.y, plot.y, mark.at) < 0.85;
+    text += "set label " + quoted(mark.label) + " at graph 0.99, first " + at + " right offset 0," +
+            (above ? "0.6" : "-0.7") + ink;
   }
   return text;
 }
 
-/// Room for the key: two names stand beside each other, and two rows of them fit in the usual three.
-std::size_t rows_above(const Plot& plot) {
-  const auto named = static_cast<std::size_t>(
-      std::count_if(plot.series.begin(), plot.series.end(), [](const Series& s) { return !s.name.empty(); }));
-  return named > 4 ? 3 + (named - 3) / 2 : 3;
+std::string frame(const Plot& plot, const Margins& margins) {
+  const auto part = [](int px, int of) { return exact_text(static_cast<double>(px) / of); };
+  return "set terminal svg size " + std::to_string(plot.width_px) + "," + std::to_string(plot.height_px) +
+         " noenhanced font 'sans-serif," + std::to_string(plot.text_px) +
+         "' background '#ffffff'\n"
+         "set encoding utf8\n"
+         "set border 3 lc rgb " +
+         quoted_color(color::soft) + "\nset grid lc rgb " + quoted_color(color::grid) +
+         " lt 1\nset tics nomirror out scale 0.5\nset lmargin at screen " +
+         part(margins.left, plot.width_px) + "\nset rmargin at screen " +
+         part(plot.width_px - margins.right, plot.width_px) + "\nset tmargin at screen " +
+         part(plot.height_px - margins.top, plot.height_px) + "\nset bmargin at screen " +
+         part(margins.bottom, plot.height_px) + "\n";
 }
 
-std::string script_for(const Plot& plot) {
-  Curves curves;
-  std::string settings = "set terminal svg size " + std::to_string(plot.width_px) + "," +
-                         std::to_string(plot.height_px) +
-                         " noenhanced font 'sans-serif,12' background '#ffffff'\n"
-                         "set encoding utf8\n"
-                         "set border lc rgb '#555555'\n"
-                         "set grid lc rgb '#dddddd' lt 1\n"
-                         "set tics nomirror\n"
-                         "set format '%g'\n"
-                         "set key above right horizontal\n"
-                         "set tmargin " +
-                         std::to_string(rows_above(plot)) + "\n";
+std::string title_and_key(const Plot& plot) {
+  const double line = line_heights * plot.text_px / plot.height_px;  // part of the drawing
+  std::string text = "set key at graph 0, screen " +
+                     exact_text(1.0 - (plot.title.empty() ? 0.3 : 1.3) * line) +
+                     " left top horizontal Left reverse samplen 2\n";
   if (!plot.title.empty())
-    settings += "set label " + quoted(plot.title) + " at graph 0, graph 1 left offset 0,0.9 font ',14'\n";
-  settings += axes(plot) + bar_width(plot);
+    text += "set label " + quoted(plot.title) + " at graph 0, screen " + exact_text(1.0 - 0.7 * line) +
+            " left font '," + std::to_string(plot.text_px + 2) + "'\n";
+  return text;
+}
+
+std::string script_for(const Plot& plot, bool with_title_and_key) {
+  Curves curves;
+  const Margins margins = margins_of(plot, with_title_and_key);
+  const AxisRanges ranges = ranges_of(plot);
+  std::string settings = frame(plot, margins) + axes(plot, ranges, margins) + bar_width(plot);
+  settings += with_title_and_key ? title_and_key(plot) : "unset key\n";
   add_heat_map(plot, curves, settings);
   add_bands(plot, curves);
   add_series(plot, curves);
-  settings += marks(plot);
+  settings += marks(plot, ranges);
   if (curves.commands.empty()) {
     settings += "set label 'no data' at graph 0.5, graph 0.5 center\n";
     curves.commands = "plot NaN notitle";
@@ -339,10 +478,10 @@ std::string as_element(std::string svg, const std::string& id) {
     replace_all(svg, std::string("href=") + quote + "#", std::string("href=") + quote + "#" + id);
   }
   replace_all(svg, "url(#", "url(#" + id);
-  // gnuplot names each curve for the pointer to show: "gnuplot_plot_1" tells nobody anything.
-  for (std::size_t at = svg.find("<title>gnuplot_plot"); at != std::string::npos;
-       at = svg.find("<title>gnuplot_plot", at))
-    svg.erase(at, svg.find("</title>", at) + 8 - at);
+  // gnuplot names the drawing and each curve for the pointer to show: that tells nobody anything.
+  for (const std::string_view name : {"<title>Gnuplot", "<title>gnuplot_plot"})
+    for (std::size_t at = svg.find(name); at != std::string::npos; at = svg.find(name, at))
+      svg.erase(at, svg.find("</title>", at) + 8 - at);
   return svg;
 }
 
@@ -397,12 +536,61 @@ Series histogram(const std::vector<std::pair<double, std::uint64_t>>& values, st
   return series;
 }
 
+std::vector<KeyEntry> key_of(const Plot& plot) {
+  using Swatch = KeyEntry::Swatch;
+  std::vector<KeyEntry> key;
+  if (plot.heat_map)
+    for (const std::string& name : plot.heat_map->classes)
+      key.push_back({name, color::of_outcome(name), Swatch::area});
+  for (const Band& band : plot.bands)
+    if (!band.name.empty()) key.push_back({band.name, color::band, Swatch::area});
+  const std::vector<std::string_view> colors = colors_of(plot);
+  for (std::size_t k = 0; k < plot.series.size(); ++k) {
+    const Series& series = plot.series[k];
+    if (series.name.empty() || series.x.empty()) continue;
+    const Swatch swatch = series.style == Series::Style::points ? Swatch::point
+                          : series.style == Series::Style::bars ? Swatch::area
+                          : series.dashed                       ? Swatch::dashed
+                                                                : Swatch::line;
+    key.push_back({series.name, colors[k], swatch});
+  }
+  return key;
+}
+
+int left_px_of(const Plot& plot) {
+  double widest = 0.0;
+  const double height = plot.height_px - heights(plot, bottom_heights + line_heights);
+  for (const Tick& tick : ticks_of(span_of(plot.y, ranges_of(plot).y, height, false, plot.text_px)))
+    widest = std::max(widest, text_width_px(tick.text, plot.text_px));
+  constexpr double label_heights = 2.5;  // the axis's own label, and the tick
+  return std::max(heights(plot, least_left_heights), heights(plot, label_heights) + static_cast<int>(widest));
+}
+
+void align(std::vector<Plot>& plots) {
+  int left = 0;
+  double low = std::numeric_limits<double>::infinity(), high = -low;
+  for (const Plot& plot : plots) {
+    left = std::max(left, left_px_of(plot));
+    const AxisRange x = ranges_of(plot).x;
+    low = std::min(low, x.low);
+    high = std::max(high, x.high);
+  }
+  for (Plot& plot : plots) {
+    plot.left_px = left;
+    plot.x.low = low;
+    plot.x.high = high;
+  }
+}
+
 std::string svg_of(const Plot& plot, const std::string& id) {
-  return as_element(gnuplot_output(script_for(plot)), id);
+  return as_element(gnuplot_output(script_for(plot, false)), id);
 }
 
 std::string svg_file_of(const Plot& plot) {
-  return "<svg xmlns=\"http://www.w3.org/2000/svg\"" + svg_of(plot, "p").substr(4) + "\n";
+  Plot whole = plot;  // the axes keep their height; title and key come on top
+  whole.height_px += margins_of(plot, true).top - margins_of(plot, false).top;
+  const std::string element = as_element(gnuplot_output(script_for(whole, true)), "p");
+  return "<svg xmlns=\"http://www.w3.org/2000/svg\"" + element.substr(4) + "\n";
 }
 
 }  // namespace upright

@@ -2,10 +2,9 @@
 
 #include <array>
 #include <deque>
-#include <fstream>
-#include <iterator>
 
 #include "row_thinner.hpp"
+#include "upright/model/input_file.hpp"
 #include "upright/runtime/run_reader.hpp"
 
 namespace upright {
@@ -56,8 +55,17 @@ void tell_outcome(const RunRecord& record, RunData& data) {
     data.headline = "Stayed up for " + seconds(time_s);
   } else {
     data.tone = Tone::bad;
-    data.headline = (result == "fell" ? "Fell after " : "Stopped at zero volts after ") + seconds(time_s);
+    const bool at_zero = plain(record.outcome, "zero_volts") == "confirmed";
+    const char* stopped = at_zero ? "Stopped at zero volts after " : "Stopped after ";
+    data.headline = (result == "fell" ? "Fell after " : stopped) + seconds(time_s);
   }
+  const std::string zero = plain(record.outcome, "zero_volts_sentence");
+  const bool unconfirmed = plain(record.outcome, "zero_volts") == "not_confirmed" ||
+                           plain(record.outcome, "amplifier_disabled") == "false";
+  if (!zero.empty()) data.outcome_facts.emplace_back("at the end", zero);
+  if (!unconfirmed) return;
+  data.tone = Tone::bad;
+  data.reason = sentence(zero) + " " + data.reason;
 }
 
 /// Something that a row's flags tell, and how often they did.
@@ -93,15 +101,19 @@ void add_to_statistics(const LogRecord& row, RunData& data) {
 }
 
 /// Reads all rows once. Returns whether the last line was cut.
-bool gather_rows(const std::filesystem::path& samples, RunData& data) {
+bool gather_rows(const std::filesystem::path& samples, const ProgressCallback& progress, RunData& data) {
   SampleReader reader(samples);
   RowThinner thinner;
   std::deque<LogRecord> closing;
   Events seen = events();
   double first_s = 0.0;
+  constexpr std::uint64_t rows_between_reports = 16384;
+  constexpr double reading_share = 0.9;  // of a long run; the rest draws the plots
   for (LogRecord row; reader.next(row); row = {}) {
     if (data.rows == 0) first_s = seconds_of(row);
     add_to_statistics(row, data);
+    if (progress && data.rows % rows_between_reports == 0)
+      progress(reading_share * reader.share_read(), std::to_string(data.rows) + " rows");
     for (Event& event : seen) event.rows += (row.flags & event.flags) != 0 ? 1 : 0;
     thinner.add(row);
     closing.push_back(row);
@@ -151,22 +163,17 @@ void gather_provenance(const RunRecord& record, RunData& data) {
   for (const char* name : {"compiler", "host", "kernel", "machine"}) add(name, plain(provenance, name));
 }
 
-std::string read_text(const std::filesystem::path& file) {
-  std::ifstream in(file, std::ios::binary);
-  return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
-}
-
 }  // namespace
 
-RunData load_run_data(const std::filesystem::path& run_directory) {
+RunData load_run_data(const std::filesystem::path& run_directory, const ProgressCallback& progress) {
   const RunRecord record = read_run_without_samples(run_directory);
   RunData data;
   data.name = std::filesystem::absolute(run_directory / "").parent_path().filename().string();
   data.origin = "started " + record.started_utc + " on the " + backends_text(record.rig) + " rig";
   data.period_s = record.control.period_s();
   data.amplifier_limit_v = record.rig.amplifier.limit_v;
-  data.run_yaml = read_text(run_directory / "run.yaml");
-  const bool truncated = gather_rows(run_directory / "samples.csv", data);
+  data.run_yaml = whole_file(run_directory / "run.yaml");
+  const bool truncated = gather_rows(run_directory / "samples.csv", progress, data);
   tell_outcome(record, data);
   gather_warnings(record, truncated, data);
   gather_provenance(record, data);

@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "upright/model/progress.hpp"
 #include "upright/report/html.hpp"
 #include "upright/report/statistics.hpp"
 #include "upright/runtime/log_record.hpp"
@@ -38,6 +39,6 @@ struct RunData {
 inline constexpr double closing_s = 3.0;
 
 /// Needs the same memory however long the run was. Throws Error when the directory is not a run.
-RunData load_run_data(const std::filesystem::path& run_directory);
+RunData load_run_data(const std::filesystem::path& run_directory, const ProgressCallback& progress = {});
 
 }  // namespace upright

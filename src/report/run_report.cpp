@@ -40,15 +40,18 @@ Plot over_time(const RunData& run, const std::string& title, const std::string& 
   plot.x.label = "time [s]";
   plot.y.label = unit;
   if (!run.drawn.empty()) {
-    plot.x.low = s_per_ns * static_cast<double>(run.drawn.front().time_ns);
-    plot.x.high = s_per_ns * static_cast<double>(run.drawn.back().time_ns);
+    const double first_s = s_per_ns * static_cast<double>(run.drawn.front().time_ns);
+    const double last_s = s_per_ns * static_cast<double>(run.drawn.back().time_ns);
+    // From zero, where that costs no room; and to the end of the last period.
+    plot.x.low = first_s < 0.02 * last_s ? 0.0 : first_s;
+    plot.x.high = last_s + run.period_s.value_or(0.0);
   }
   return plot;
 }
 
-Series series(const RunData& run, const std::string& name, std::vector<double> values,
+Series series(const RunData& run, const std::string& name, std::vector<double> values, std::string_view color,
               Series::Style style = Series::Style::line) {
-  return {name, times_of(run.drawn), std::move(values), style, -1, false};
+  return {name, times_of(run.drawn), std::move(values), style, color, false};
 }
 
 void add_limits(Plot& plot, const std::optional<double>& limit, const std::string& name) {
@@ -60,15 +63,15 @@ void add_limits(Plot& plot, const std::optional<double>& limit, const std::strin
 void add_motion(HtmlPage& page, const RunData& run) {
   page.section("Motion");
   Plot theta = over_time(run, "pendulum angle (0 is upright)", "theta [deg]");
-  theta.series = {series(run, "", column_of(run.drawn, &LogRecord::theta_rad, degrees_per_radian))};
+  theta.series = {
+      series(run, "", column_of(run.drawn, &LogRecord::theta_rad, degrees_per_radian), color::angle)};
   Plot cart = over_time(run, "cart position", "x [mm]");
-  cart.series = {series(run, "", column_of(run.drawn, &LogRecord::cart_m, mm_per_m))};
+  cart.series = {series(run, "", column_of(run.drawn, &LogRecord::cart_m, mm_per_m), color::cart)};
   Plot voltage = over_time(run, "voltage", "V");
-  voltage.series = {
-      series(run, "requested", column_of(run.drawn, &LogRecord::voltage_requested_v), Series::Style::steps),
-      series(run, "applied", column_of(run.drawn, &LogRecord::voltage_v), Series::Style::steps)};
-  voltage.series.front().color = 5;
-  voltage.series.back().color = 0;
+  voltage.series = {series(run, "requested", column_of(run.drawn, &LogRecord::voltage_requested_v),
+                           color::requested, Series::Style::steps),
+                    series(run, "applied", column_of(run.drawn, &LogRecord::voltage_v), color::voltage,
+                           Series::Style::steps)};
   // A request far beyond the amplifier would flatten what was applied.
   add_limits(voltage, run.amplifier_limit_v, "amplifier limit");
   if (run.amplifier_limit_v) {
@@ -79,9 +82,8 @@ void add_motion(HtmlPage& page, const RunData& run) {
       voltage.y = {"V", false, {}, {}};
     }
   }
-  page.figure(theta, "");
-  page.figure(cart, "");
-  page.figure(voltage, "Long runs are drawn by the smallest and largest value of each pixel column.");
+  page.stack({theta, cart, voltage},
+             "Long runs are drawn by the smallest and largest value of each pixel column.");
 }
 
 void add_closing_seconds(HtmlPage& page, const RunData& run) {
@@ -91,14 +93,15 @@ void add_closing_seconds(HtmlPage& page, const RunData& run) {
   motion.x.low = *motion.x.high - closing_s;
   motion.width_px = 450;
   motion.height_px = 300;
-  motion.series = {{"", times_of(run.closing), theta}};
+  motion.series = {{"", times_of(run.closing), theta, Series::Style::line, color::angle}};
   Plot cycle;
   cycle.title = "cart against angle";
   cycle.x.label = "x [mm]";
   cycle.y.label = "theta [deg]";
   cycle.width_px = 450;
   cycle.height_px = 300;
-  cycle.series = {{"", column_of(run.closing, &LogRecord::cart_m, mm_per_m), theta}};
+  cycle.series = {
+      {"", column_of(run.closing, &LogRecord::cart_m, mm_per_m), theta, Series::Style::line, color::angle}};
   page.figures({motion, cycle}, "What the loop settles to: a closed curve on the right is a limit cycle.");
 }
 
@@ -129,7 +132,6 @@ void add_timing(HtmlPage& page, const RunData& run) {
   Plot plot = over_time(run, "time spent in each period", "microseconds");
   plot.y.logarithmic = true;
   std::vector<Plot> histograms;
-  int color = 0;
   bool anything = false;
   for (const TimingColumn& column : timing_of(run)) {
     const Spread spread = column.counts_ns.spread();
@@ -137,17 +139,19 @@ void add_timing(HtmlPage& page, const RunData& run) {
                           number_text(us_per_ns * spread.p99), number_text(us_per_ns * spread.p999),
                           number_text(us_per_ns * spread.largest)});
     anything = anything || spread.largest > 0.0;
-    plot.series.push_back(series(run, column.name, column_of(run.drawn, column.member, us_per_ns)));
+    const std::string_view color = color::curve(plot.series.size());
+    plot.series.push_back(series(run, column.name, column_of(run.drawn, column.member, us_per_ns), color));
     Plot counts;
     counts.title = column.name;
     counts.x.label = "microseconds";
     counts.y.label = "periods";
     counts.y.logarithmic = true;
     counts.y.low = 0.5;
+    counts.y.whole = true;
     counts.width_px = 450;
     counts.height_px = 220;
     counts.series = {histogram(in_us(column.counts_ns), 60, "")};
-    counts.series.front().color = color++;
+    counts.series.front().color = color;
     histograms.push_back(counts);
   }
   if (!anything) {
@@ -182,8 +186,9 @@ void add_numbers(HtmlPage& page, const RunData& run) {
 
 }  // namespace
 
-std::filesystem::path write_run_report(const std::filesystem::path& run_directory) {
-  const RunData run = load_run_data(run_directory);
+std::filesystem::path write_run_report(const std::filesystem::path& run_directory,
+                                       const ProgressCallback& progress) {
+  const RunData run = load_run_data(run_directory, progress);
   HtmlPage page("Run " + run.name, run.origin);
   page.answer(run.tone, run.headline, run.reason);
   for (const std::string& warning : run.warnings) page.note(Tone::warning, warning);

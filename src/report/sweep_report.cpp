@@ -3,7 +3,6 @@
 #include <array>
 #include <cmath>
 #include <cstdlib>
-#include <fstream>
 #include <limits>
 #include <map>
 #include <numbers>
@@ -12,6 +11,7 @@
 #include <vector>
 
 #include "upright/model/error.hpp"
+#include "upright/model/input_file.hpp"
 #include "upright/report/html.hpp"
 #include "upright/report/plot.hpp"
 
@@ -26,19 +26,19 @@ using Row = std::vector<std::string>;
 
 std::vector<Row> read_rows(const std::filesystem::path& file, const std::string& header,
                            std::size_t columns) {
-  std::ifstream in(file);
+  InputFile in(file);
   std::string line;
   if (!std::getline(in, line) || line != header)
-    throw ConfigError("name a folder that `upright sweep` finished: " + file.string() + " has no header " +
-                      header);
+    throw ConfigError(file.string() + " has no header " + header +
+                      ": name a folder that `upright sweep` finished");
   std::vector<Row> rows;
   while (std::getline(in, line)) {
     Row row;
     std::istringstream cells(line);
     for (std::string cell; std::getline(cells, cell, ',');) row.push_back(cell);
     if (row.size() != columns)
-      throw ConfigError("make the sweep anew: " + file.string() + ":" + std::to_string(rows.size() + 2) +
-                        ": has not " + std::to_string(columns) + " columns");
+      throw ConfigError(file.string() + ":" + std::to_string(rows.size() + 2) + ": has not " +
+                        std::to_string(columns) + " columns: make the sweep anew");
     rows.push_back(row);
   }
   return rows;
@@ -54,7 +54,7 @@ std::string milliseconds(double value_s) {
 
 std::string file_text(const std::filesystem::path& file) {
   std::ostringstream text;
-  text << std::ifstream(file).rdbuf();
+  text << InputFile(file).rdbuf();
   return text.str();
 }
 
@@ -74,8 +74,8 @@ Map read_map(const std::filesystem::path& folder) {
     std::size_t k = 0;
     while (k < outcomes.size() && outcomes[k] != row[2]) ++k;
     if (k == outcomes.size())
-      throw ConfigError("make the sweep anew: " + (folder / "sweep.csv").string() + " has the outcome " +
-                        row[2]);
+      throw ConfigError((folder / "sweep.csv").string() + " has the outcome " + row[2] +
+                        ": make the sweep anew");
     ++map.counts[k];
     map.outcome[{angle, delay}] = static_cast<int>(k);
     delays.insert(delay);
@@ -150,12 +150,12 @@ bool is_sweep_folder(const std::filesystem::path& folder) {
 std::filesystem::path write_sweep_report(const std::filesystem::path& folder) {
   std::error_code ignored;
   if (!std::filesystem::exists(folder / "sweep.csv", ignored))
-    throw ConfigError("give the sweep command again, it goes on from there: " + folder.string() +
-                      " holds an unfinished sweep");
+    throw ConfigError(folder.string() +
+                      " holds an unfinished sweep: give the sweep command again, it goes on from there");
   const Map map = read_map(folder);
   const std::vector<Row> transitions =
       read_rows(folder / "transitions.csv", "theta0_rad,oscillates_from_s,falls_from_s", 3);
-  if (map.outcome.empty()) throw ConfigError("make the sweep anew: " + folder.string() + " holds no runs");
+  if (map.outcome.empty()) throw ConfigError(folder.string() + " holds no runs: make the sweep anew");
 
   // Folders of before margins were written have none.
   std::vector<Row> margins;
@@ -175,7 +175,7 @@ std::filesystem::path write_sweep_report(const std::filesystem::path& folder) {
     page.answer(Tone::good, "No start falls within these delays", counts);
   page.section("Outcome over delay and initial angle");
   for (const Row& row : margins) page.paragraph(margin_sentence(row));
-  const std::string lines = margins.empty() ? "" : " White: the critical delay of the linear analysis.";
+  const std::string lines = margins.empty() ? "" : " Dotted: the critical delay of the linear analysis.";
   if (map.delays_s.size() > 3)
     page.figure(map_plot(map, transitions, margins, true), "The map, both axes logarithmic." + lines);
   page.figure(map_plot(map, transitions, margins, false), "The same, delay linear.");

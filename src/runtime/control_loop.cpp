@@ -2,8 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <csignal>
 #include <cstdio>
 #include <numbers>
+
+#include "upright/hal/modbus_exception.hpp"
 
 namespace upright {
 
@@ -43,6 +46,12 @@ const char* name_of(StopReason reason) noexcept {
 
 namespace {
 
+// A script whose cart begins beyond the track limit, or on its way there, brings it back.
+constexpr double longest_return_s = 10.0;   // several times the way at the script's speed
+constexpr double return_roll_s = 0.3;       // a braked cart rolls on for less than this times its velocity
+constexpr double return_slack_m = 0.05;     // what a swinging pendulum moves the cart against the motor
+constexpr double estimates_settle_s = 0.1;  // several time constants of a velocity filter
+
 /// What a fault means for the loop: nothing yet while it is one of the link, which may pass within the
 /// watchdog time.
 StopReason reason_for(RigFault fault) {
@@ -58,6 +67,7 @@ StopReason reason_for(RigFault fault) {
     case RigFault::device_restarted:
     case RigFault::counts_jumped:
     case RigFault::device_refused:
+    case RigFault::output_kept:
     case RigFault::line_failed:
     case RigFault::edges_lost:
     case RigFault::edges_too_fast:
@@ -65,6 +75,7 @@ StopReason reason_for(RigFault fault) {
     case RigFault::link_timeout:
     case RigFault::link_lost:
     case RigFault::corrupt_reply:
+    case RigFault::device_busy:
     case RigFault::out_of_range:
     case RigFault::none:
       break;
@@ -92,6 +103,10 @@ const char* words_for(RigFault fault) {
       return "the counts jumped by more than any motion explains";
     case RigFault::device_refused:
       return "the device refused the request";
+    case RigFault::device_busy:
+      return "the device answered that it is busy";
+    case RigFault::output_kept:
+      return "the device acknowledged zero volts and kept its voltage";
     case RigFault::not_finite:
       return "a voltage that is not a number";
     case RigFault::out_of_range:
@@ -114,7 +129,33 @@ const char* words_for(RigFault fault) {
   return "unknown fault";
 }
 
-/// What to do about a fault of the rig, before anything else.
+/// The same with the exception that the device answered with.
+std::string words_for(const LoopOutcome& o) {
+  if (o.exception == 0) return words_for(o.fault);
+  if (o.fault == RigFault::device_refused)
+    return "the device refused the request with " + exception_text(o.exception);
+  if (o.fault == RigFault::device_busy) return "the device answered with " + exception_text(o.exception);
+  return words_for(o.fault);
+}
+
+const char* name_of_signal(int number) {
+  switch (number) {
+    case SIGHUP:
+      return "SIGHUP";
+    case SIGINT:
+      return "SIGINT";
+    case SIGQUIT:
+      return "SIGQUIT";
+    case SIGTERM:
+      return "SIGTERM";
+    case SIGTSTP:
+      return "SIGTSTP";
+    default:
+      return "a signal";
+  }
+}
+
+/// What to do about a fault of the rig.
 const char* remedy_for(RigFault fault) {
   switch (fault) {
     case RigFault::line_failed:
@@ -129,12 +170,6 @@ const char* remedy_for(RigFault fault) {
   }
 }
 
-/// A run that ends as soon as it began has most often a sign wrong.
-std::string first_check(double time_s) {
-  constexpr double soon_s = 1.5;
-  return time_s < soon_s ? "check the signs of encoders and amplifier with the motor off, then " : "";
-}
-
 std::string went_on_after(const LinkCounts& link) {
   const std::string troubles = sentence_of(link);
   return troubles.empty() ? "" : " and went on after " + troubles;
@@ -146,60 +181,100 @@ std::string brief(double value) {
   return text;
 }
 
+/// Why a pendulum that was up fell, or ran the cart to the end: what is known of it, and what to do.
+std::string why_not_held(const LoopOutcome& o, const LoopLimits& limits) {
+  constexpr double soon_s = 1.5;  // a wrong sign ends a run as soon as it began
+  if (limits.delay_exceeded)
+    return "; its delay or its gains are beyond what the plant bears: see upright margin";
+  if (limits.signs_unproven && o.time_s < soon_s)
+    return " soon after the start, and nobody checked the signs of this rig: check the signs of encoders and "
+           "amplifier with the motor off, then lift the pendulum again";
+  return ": see in the report whether a push, the voltage's limit or late periods came before it";
+}
+
+std::string sentence_of_fall(const LoopOutcome& o, const LoopLimits& limits, const std::string& when) {
+  const std::string limit = brief(limits.fall_angle_rad * 180.0 / std::numbers::pi) + " degrees";
+  if (o.first_bad_tick == 0)
+    return "it fell before it began: the pendulum was beyond the limit of " + limit + " from upright" + when +
+           ": lift it upright, and hold it still until the motor takes over";
+  return "it fell, |theta| reached the limit of " + limit + when + why_not_held(o, limits);
+}
+
+std::string sentence_of_track(const LoopOutcome& o, const LoopLimits& limits, const std::string& when) {
+  const std::string back = ": bring the cart back to the middle";
+  if (is_limit_switch(o.fault)) return std::string(words_for(o.fault)) + when + back;
+  const std::string limit = "the track limit of " + brief(limits.track_limit_m) + " m";
+  const std::string at = ", at x = " + brief(o.last_cart_m) + " m";
+  if (o.first_bad_tick == 0) return "the cart was at " + limit + at + ", when the run began" + when + back;
+  return "the cart reached " + limit + ", or rolled towards it" + at + when + why_not_held(o, limits);
+}
+
+/// The part of the periods that took longest tells what to look at.
+std::string sentence_of_overrun(const LoopOutcome& o, const LoopLimits& limits, const std::string& when) {
+  const LoopCounts& c = o.counts;
+  const std::uint64_t link = c.overruns_read + c.overruns_write;
+  std::string cause = "the processor was busy: ",
+              remedy = "free it, see upright doctor, or lower sample_rate_hz";
+  if (link > c.overruns_wake + c.overruns_compute) {
+    cause = "reading and writing the rig took too long: ";
+    remedy = "check the link, or lower sample_rate_hz";
+  } else if (!o.realtime) {
+    cause = "the loop woke late and has no real-time scheduling: ";
+    remedy = "grant it, see upright doctor, free the processor, or lower sample_rate_hz";
+  }
+  return "more than " + std::to_string(limits.most_periods_late) + " periods in a row were late, first" +
+         when + "; " + cause + remedy;
+}
+
+/// Older counts than the watchdog allows, or none at all.
+std::string for_longer_than(const LoopLimits& limits) {
+  return " for more than the watchdog's " + brief(limits.watchdog_s * 1e3) + " ms";
+}
+
 }  // namespace
 
 std::string sentence_of(const LoopOutcome& o, const LoopLimits& limits) {
   const std::string when = " in cycle " + std::to_string(o.first_bad_tick) + " (" + brief(o.time_s) + " s)";
-  const double degrees = 180.0 / std::numbers::pi;
   switch (o.reason) {
     case StopReason::duration:
       return "the run lasted its whole time" + went_on_after(o.counts.link);
     case StopReason::signal:
-      return std::string("start again when ready: stopped by ") +
-             (o.signal == 2    ? "SIGINT"
-              : o.signal == 15 ? "SIGTERM"
-                               : "signal " + std::to_string(o.signal)) +
-             when;
+      return std::string("stopped by ") + name_of_signal(o.signal) + when + ": start again when ready";
     case StopReason::stop_button:
-      return "start again when ready: stopped from the live page" + when;
+      return "stopped from the live page" + when + ": start again when ready";
     case StopReason::not_finite:
-      return "check the gains and the sensors: a value was not a finite number" + when;
+      return "a value was not a finite number" + when + ": check the gains and the sensors";
     case StopReason::stale_encoder:
-      return "check the encoders' link: no new counts for more than the watchdog's " +
-             brief(limits.watchdog_s * 1e3) + " ms, first" + when;
+      return "no new counts came" + for_longer_than(limits) + ", first" + when + ": check the encoders' link";
     case StopReason::stuck_encoder:
-      return std::string("check the ") + (o.stuck == StuckEncoder::cart ? "cart's" : "pendulum's") +
-             " encoder and its cable, and that the amplifier is on and the cart free: it does not count "
-             "although the motor is balancing, first" +
-             when;
+      return (o.stuck == StuckEncoder::cart
+                  ? std::string(
+                        "the cart's encoder did not count although the applied voltages move the cart, "
+                        "first") +
+                        when +
+                        ": check this encoder and its cable, that the amplifier is on and the cart free"
+                  : std::string("the pendulum's encoder did not count although the cart's motion moves the "
+                                "pendulum, first") +
+                        when + ": check this encoder and its cable") +
+             "; if they are good, encoder_watch in the rig file assumes too little friction or lag";
     case StopReason::link_lost:
-      return "check cable, address and device: the link failed for more than the watchdog's " +
-             brief(limits.watchdog_s * 1e3) + " ms (" + words_for(o.fault) + "), first" + when;
+      return "the link failed" + for_longer_than(limits) + " (" + words_for(o) + "), first" + when +
+             ": check cable, address and device";
     case StopReason::rig_fault:
-      return std::string(remedy_for(o.fault)) + ": " + words_for(o.fault) + when;
+      return words_for(o) + when + ": " + remedy_for(o.fault);
     case StopReason::track_limit:
-      return is_limit_switch(o.fault)
-                 ? std::string("bring the cart back to the middle: ") + words_for(o.fault) + when
-                 : first_check(o.time_s) +
-                       "bring the cart back to the middle: it reached the track limit of " +
-                       brief(limits.track_limit_m) +
-                       " m, or rolled towards it, at x = " + brief(o.last_cart_m) + " m" + when;
+      return sentence_of_track(o, limits, when);
     case StopReason::fell:
-      return first_check(o.time_s) + "lift the pendulum again: it fell, |theta| reached the limit of " +
-             brief(limits.fall_angle_rad * degrees) + " degrees" + when;
+      return sentence_of_fall(o, limits, when);
     case StopReason::overrun:
-      return "free the processor, grant real-time scheduling or lower the sample rate: more than " +
-             std::to_string(limits.most_periods_late) + " periods in a row were late, first" + when;
+      return sentence_of_overrun(o, limits, when);
     case StopReason::emergency_stop:
-      return "release the emergency stop when it is safe: it was pressed" + when;
+      return "the emergency stop was pressed" + when + ": release it when it is safe";
     case StopReason::log_failed:
-      return "free space, or use a faster disk, where the run directory goes: the log could not keep every "
-             "row" +
-             when;
+      return "the log could not keep every row" + when;
     case StopReason::not_ready:
-      return "bring the rig to where the experiment starts (at rest, or held upright as it says): it waited "
-             "in vain" +
-             when;
+      return "the rig did not come to where the experiment starts" + when +
+             ": bring it there (at rest, or held upright as it says)";
   }
   return "unknown reason";
 }
@@ -213,12 +288,15 @@ ControlLoop::ControlLoop(Rig& rig, Clock& clock, Controller& controller, PoseSca
       log_(log),
       limits_(limits),
       signal_(signal),
-      live_(live) {}
+      live_(live),
+      watch_(limits.encoders, scaler.calibration().cart.per_count, scaler.calibration().pendulum.per_count) {}
 
 void ControlLoop::stop(LoopOutcome& outcome, StopReason reason, std::uint64_t first_bad) noexcept {
   rig_.stop();
   outcome.reason = reason;
   outcome.fault = last_fault_;
+  const bool by_exception = last_fault_ == RigFault::device_refused || last_fault_ == RigFault::device_busy;
+  outcome.exception = by_exception ? rig_.last_exception() : 0;
   outcome.first_bad_tick = first_bad;
   stopped_ = true;
 }
@@ -234,7 +312,7 @@ bool ControlLoop::accept(const RigReading& reading, const Wake& wake, LoopOutcom
     row_.sequence = reading.sequence;
     row_.time_ns = reading.time_ns - phase_.start_ns;
     last_fresh_ns_ = reading.time_ns;
-    held_ = false;
+    held_ = after_gap_ = false;
     return true;
   }
   if (!held_) first_held_tick_ = wake.tick;
@@ -253,7 +331,10 @@ bool ControlLoop::accept(const RigReading& reading, const Wake& wake, LoopOutcom
 
 void ControlLoop::compute(const Wake& wake, LoopOutcome& outcome) noexcept {
   Pose pose = scaler_.scale(row_.cart_counts, row_.pendulum_counts);
-  if (!begun_) pose = scaler_.nearest_turn();
+  if (!begun_) {
+    pose = scaler_.nearest_turn();
+    returning_ = scripted_;
+  }
   begun_ = true;
   const ControlOutput output = controller_.step({wake.tick, pose.cart_m, pose.theta_rad, 0.0});
   row_.cart_m = pose.cart_m;
@@ -275,7 +356,7 @@ void ControlLoop::compute(const Wake& wake, LoopOutcome& outcome) noexcept {
     stop(outcome, StopReason::not_finite, wake.tick);
   else if (balancing && std::abs(output.lean_rad) >= limits_.fall_angle_rad)
     stop(outcome, StopReason::fell, wake.tick);
-  else if (beyond_track(balancing))
+  else if (beyond_track(output.demand))
     stop(outcome, StopReason::track_limit, wake.tick);
   else if (output.demand.gave_up)
     stop(outcome, StopReason::not_ready, wake.tick);
@@ -286,11 +367,32 @@ void ControlLoop::compute(const Wake& wake, LoopOutcome& outcome) noexcept {
 }
 
 /// At the track limit; or, while it balances, where a cart without voltage would roll to it. A script's
-/// voltages are planned to end within the track.
-bool ControlLoop::beyond_track(bool balancing) const noexcept {
+/// voltages are planned to end within the track. A script may begin beyond the limit, or rolling there,
+/// where the run before left the cart: it is given the time to bring it back.
+bool ControlLoop::beyond_track(const Demand& demand) noexcept {
+  returning_ = returning_ && demand.homing;
+  if (returning_) return strays_on_return();
   const double outward_mps = std::copysign(1.0, row_.cart_m) * row_.cart_velocity_mps;
-  const double rolls_m = balancing ? limits_.coast_s * std::max(0.0, outward_mps) : 0.0;
+  const double rolls_m = demand.feedback ? limits_.coast_s * std::max(0.0, outward_mps) : 0.0;
   return std::abs(row_.cart_m) + rolls_m >= limits_.track_limit_m;
+}
+
+/// True where the cart, on its way back into the track, goes farther out than it rolls by itself, or takes
+/// too long.
+bool ControlLoop::strays_on_return() noexcept {
+  const double time_s = static_cast<double>(row_.time_ns) * 1e-9;
+  const double out_m = std::abs(row_.cart_m);
+  const double rolls_m =
+      return_roll_s * std::max(0.0, std::copysign(1.0, row_.cart_m) * row_.cart_velocity_mps);
+  const double reaches_m = std::max(out_m + rolls_m + return_slack_m, limits_.track_limit_m);
+  if (time_s <= estimates_settle_s) {
+    // The velocity estimates begin at rest: until they have settled the bound follows the cart.
+    return_bound_m_ = std::max(return_bound_m_, reaches_m);
+    return false;
+  }
+  return_bound_m_ = std::min(return_bound_m_, reaches_m);
+  if (out_m + rolls_m < limits_.track_limit_m) returning_ = false;
+  return out_m > return_bound_m_ || (out_m >= limits_.track_limit_m && time_s > longest_return_s);
 }
 
 void ControlLoop::watch_encoders(const Wake& wake, bool balancing, LoopOutcome& outcome) noexcept {
@@ -299,13 +401,14 @@ void ControlLoop::watch_encoders(const Wake& wake, bool balancing, LoopOutcome& 
     return;
   }
   outcome.stuck = watch_.step({wake.tick, static_cast<double>(row_.time_ns) * 1e-9, row_.cart_counts,
-                               row_.pendulum_counts, row_.cart_velocity_mps, row_.voltage_v});
+                               row_.pendulum_counts, row_.cart_m, row_.voltage_v});
   if (outcome.stuck != StuckEncoder::none)
     stop(outcome, StopReason::stuck_encoder, watch_.silent_since(outcome.stuck));
 }
 
 void ControlLoop::write(const Wake& wake, LoopOutcome& outcome) noexcept {
-  const RigFault fault = rig_.write(row_.voltage_v);
+  // A voltage from before a gap is not sent again: it was meant for a pose that has passed.
+  const RigFault fault = after_gap_ ? RigFault::link_timeout : rig_.write(row_.voltage_v);
   if (fault == RigFault::none) {
     last_write_ns_ = read_done_ns_;
     unwritten_ = false;
@@ -329,8 +432,10 @@ void ControlLoop::count_missed(const Wake& wake, LoopOutcome& outcome) noexcept 
   if (periods_late_ == 0) first_late_tick_ = wake.tick - wake.missed;
   periods_late_ += wake.missed;
   row_.flags |= row_flag::missed;
+  after_gap_ = true;
   outcome.counts.missed += wake.missed;
-  if (periods_late_ > limits_.most_periods_late) stop(outcome, StopReason::overrun, first_late_tick_);
+  if (periods_late_ > limits_.most_periods_late && !stopped_)
+    stop(outcome, StopReason::overrun, first_late_tick_);
 }
 
 /// Counts a cycle that ended after the next was due, on the part that took longest.
@@ -398,7 +503,8 @@ void ControlLoop::run_cycle(const Wake& wake, std::int64_t woke_ns, LoopOutcome&
   outcome.compute.add(row_.compute_ns);
   outcome.write.add(row_.write_ns);
   outcome.cycle.add(done.end_ns - woke_ns);
-  if (clock_.is_virtual())
+  // A log that has failed is not waited for.
+  if (clock_.is_virtual() && !log_.failed())
     log_.push_waiting(row_);
   else
     log_.push(row_);
@@ -411,6 +517,26 @@ void ControlLoop::show(const LoopOutcome& outcome) noexcept {
   live_.theta_rad.store(row_.theta_rad, relaxed);
   live_.voltage_v.store(row_.voltage_v, relaxed);
   live_.worst_late_us.store(outcome.wake_late.max_us(), relaxed);
+}
+
+/// Somebody, or the log, ends the run before this period's cycle.
+bool ControlLoop::asked_to_end(LoopOutcome& outcome) noexcept {
+  if (const int signal = signal_.load(std::memory_order_relaxed); signal != 0) {
+    const bool button = signal == stop_button_pressed;
+    stop(outcome, button ? StopReason::stop_button : StopReason::signal, phase_.next_tick);
+    if (!button) outcome.signal = signal;
+    return true;
+  }
+  if (!log_.failed()) return false;
+  stop(outcome, StopReason::log_failed, phase_.next_tick);
+  return true;
+}
+
+/// The row of a stop that came between two cycles: nothing was read, and the motor is at zero volts.
+void ControlLoop::log_stop(std::int64_t woke_ns, LoopOutcome& outcome) noexcept {
+  // Woken by the signal itself, the period may not be due yet.
+  const Wake wake = wake_at(phase_, std::max(woke_ns, phase_.due_ns(phase_.next_tick)));
+  run_cycle(wake, woke_ns, outcome);
 }
 
 void ControlLoop::run(LoopOutcome& outcome) noexcept {
@@ -427,14 +553,8 @@ void ControlLoop::run(LoopOutcome& outcome) noexcept {
   while (!stopped_ && !over_) {
     clock_.sleep_until(phase_.due_ns(phase_.next_tick));
     const std::int64_t woke_ns = clock_.now_ns();
-    if (const int signal = signal_.load(std::memory_order_relaxed); signal != 0) {
-      const bool button = signal == stop_button_pressed;
-      stop(outcome, button ? StopReason::stop_button : StopReason::signal, phase_.next_tick);
-      if (!button) outcome.signal = signal;
-      break;
-    }
-    if (log_.failed()) {
-      stop(outcome, StopReason::log_failed, phase_.next_tick);
+    if (asked_to_end(outcome)) {
+      log_stop(woke_ns, outcome);
       break;
     }
     // Woken by a signal meant for someone else.
@@ -445,7 +565,8 @@ void ControlLoop::run(LoopOutcome& outcome) noexcept {
     run_cycle(wake, woke_ns, outcome);
     show(outcome);
   }
-  rig_.stop();
+  outcome.stop = rig_.stop();
+  row_.voltage_v = 0.0;
   outcome.time_s = static_cast<double>(clock_.now_ns() - phase_.start_ns) / 1e9;
   show(outcome);
   live_.running.store(false, std::memory_order_relaxed);

@@ -3,14 +3,13 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <fstream>
-#include <iterator>
 #include <numbers>
 #include <set>
 
 #include "upright/control/delay_line.hpp"
 #include "upright/control/gain_file.hpp"
 #include "upright/model/error.hpp"
+#include "upright/model/input_file.hpp"
 #include "upright/runtime/provenance.hpp"
 
 namespace upright {
@@ -19,10 +18,16 @@ namespace {
 
 constexpr double pi = std::numbers::pi;
 constexpr double radians_per_degree = pi / 180.0;
-constexpr double longest_s = 3600.0;
+constexpr double longest_s = 3600.0;              // of a piece
+constexpr double longest_experiment_s = 86400.0;  // longer ones are a slip of the pen
+constexpr double shortest_period_s = 0.01, lowest_frequency_hz = 1e-3;
+constexpr double finest_bisection_s = 1e-5;  // a fraction of the shortest period
+constexpr double shortest_travel_m = 0.03;   // the cart comes to rest within about 1 cm of where it should
 constexpr double highest_voltage_v = 100.0;
 constexpr double longest_travel_m = 10.0;
 constexpr std::size_t most_list = 1000;
+constexpr std::size_t most_controllers = 8, longest_controller_name = 20;  // a table that can be read
+constexpr std::size_t longest_label = 60;
 
 constexpr std::array kinds = {"constant_voltage", "ramp",        "coast",      "square_wave",
                               "multisine",        "slow_sine",   "free_decay", "observe",
@@ -59,18 +64,53 @@ std::vector<double> delays(const YamlMap& map, const std::string& key) {
   return values;
 }
 
+bool is_plain_name(const std::string& name, std::size_t longest) {
+  return !name.empty() && name.size() <= longest &&
+         name.find_first_not_of("abcdefghijklmnopqrstuvwxyz0123456789-_") == std::string::npos;
+}
+
+/// Controllers that take turns, by name, and how often.
+void read_controllers(const YamlMap& map, Piece& piece) {
+  if (!map.has("gains")) return;
+  const YamlMap files = map.map("gains");
+  for (const std::string& name : files.keys()) {
+    if (!is_plain_name(name, longest_controller_name))
+      files.fail(name, "is no name for a controller",
+                 "use at most " + std::to_string(longest_controller_name) +
+                     " lower-case letters, digits, '-' and '_', it names folders");
+    piece.controllers.push_back({name, files.path(name)});
+  }
+  files.finish();
+  if (piece.controllers.size() < 2 || piece.controllers.size() > most_controllers)
+    map.fail("gains", "has " + std::to_string(piece.controllers.size()) + " controllers",
+             "give it 2 to " + std::to_string(most_controllers) + ", as {name: gain file, name: gain file}");
+  piece.repeats = small(map, "repeats", 5, 1, 100);
+}
+
+/// Where the hand of a simulated rig lets go: one angle, or one for each round in turn.
+void read_release(const YamlMap& map, Piece& piece) {
+  const Range degrees = Range::within(-8.0, 8.0);
+  if (!compares(piece) || !map.has("theta0_deg") || !map.is_list("theta0_deg")) {
+    piece.theta0_rad = map.number_or("theta0_deg", 2.0, degrees) * radians_per_degree;
+    return;
+  }
+  for (const double angle_deg : list(map, "theta0_deg", degrees))
+    piece.starts_rad.push_back(angle_deg * radians_per_degree);
+}
+
 void read_start(const YamlMap& map, Piece& piece) {
   piece.start = map.has("start") && map.choice("start", {"hand", "swing_up"}) == "swing_up"
                     ? StartBy::swing_up
                     : StartBy::hand;
-  piece.theta0_rad = map.number_or("theta0_deg", 2.0, Range::within(-8.0, 8.0)) * radians_per_degree;
+  read_release(map, piece);
   piece.patience_s = map.number_or("patience_s", 60.0, Range{0.0, longest_s, true});
 }
 
 void read_fields(const YamlMap& map, Piece& piece) {
   const Range voltage{0.0, highest_voltage_v, true};
   const Range seconds{0.0, longest_s, true};
-  const Range hertz{0.0, 1000.0, true};
+  const Range periods = Range::within(shortest_period_s, longest_s);
+  const Range hertz = Range::within(lowest_frequency_hz, 1000.0);
   switch (piece.kind) {
     case PieceKind::constant_voltage:
       piece.voltages_v = list(map, "voltages_v", voltage);
@@ -88,7 +128,7 @@ void read_fields(const YamlMap& map, Piece& piece) {
       break;
     case PieceKind::square_wave:
       piece.amplitude_v = map.number("amplitude_v", voltage);
-      piece.period_s = map.number("period_s", seconds);
+      piece.period_s = map.number("period_s", periods);
       piece.duration_s = map.number("duration_s", seconds);
       break;
     case PieceKind::multisine:
@@ -102,7 +142,7 @@ void read_fields(const YamlMap& map, Piece& piece) {
       break;
     case PieceKind::slow_sine:
       piece.amplitude_m = map.number("amplitude_m", Range{0.0, longest_travel_m, true});
-      piece.period_s = map.number("period_s", seconds);
+      piece.period_s = map.number("period_s", periods);
       piece.duration_s = map.number("duration_s", seconds);
       break;
     case PieceKind::free_decay:
@@ -118,6 +158,7 @@ void read_fields(const YamlMap& map, Piece& piece) {
       piece.set_points_m = list(map, "set_points_m", Range::within(-longest_travel_m, longest_travel_m));
       piece.hold_s = map.number("hold_s", seconds);
       piece.delay_s = map.number_or("delay_s", 0.0, Range::within(0.0, DelayLine::longest_delay_s));
+      read_controllers(map, piece);
       read_start(map, piece);
       break;
     case PieceKind::delay_sweep:
@@ -125,6 +166,9 @@ void read_fields(const YamlMap& map, Piece& piece) {
       piece.duration_s = map.number("duration_s", seconds);
       piece.repeats = small(map, "repeats", 1, 1, 100);
       piece.bisect_to_s = map.number_or("bisect_to_s", 0.0, Range::within(0.0, 1.0));
+      if (piece.bisect_to_s > 0.0 && piece.bisect_to_s < finest_bisection_s)
+        map.fail("bisect_to_s", "is " + exact_text(piece.bisect_to_s),
+                 "give 0 or a number from " + exact_text(finest_bisection_s));
       piece.stable_below_rad = map.number_or("stable_below_rad", 0.0061, Range{0.0, 1.0, true});
       read_start(map, piece);
       break;
@@ -133,6 +177,57 @@ void read_fields(const YamlMap& map, Piece& piece) {
       piece.patience_s = map.number_or("patience_s", 60.0, seconds);
       break;
   }
+}
+
+/// What a piece takes at least, or where the plant decides, at most; the ways between its stretches not
+/// counted.
+double time_of(const Piece& piece) {
+  constexpr double stretch_s = 1.0;  // of one voltage in one direction
+  const double stretches = 2.0 * piece.repeats * static_cast<double>(piece.voltages_v.size());
+  switch (piece.kind) {
+    case PieceKind::constant_voltage:
+      return stretch_s * stretches;
+    case PieceKind::coast:
+      return piece.push_s * stretches;
+    case PieceKind::ramp:
+      return 2.0 * piece.repeats * piece.largest_v / piece.rate_v_per_s;
+    case PieceKind::closed_loop:
+      return piece.hold_s * static_cast<double>(piece.set_points_m.size());
+    default:
+      return piece.duration_s;
+  }
+}
+
+/// The key that makes a piece long.
+const char* key_of_time(const Piece& piece) {
+  switch (piece.kind) {
+    case PieceKind::constant_voltage:
+    case PieceKind::coast:
+      return "voltages_v";
+    case PieceKind::ramp:
+      return "rate_v_per_s";
+    case PieceKind::closed_loop:
+      return "hold_s";
+    default:
+      return "duration_s";
+  }
+}
+
+/// Refuses what nobody can have meant. `total_s`: of the pieces before; this one's time is added.
+void refuse_long_times(const YamlMap& item, const Piece& piece, double& total_s) {
+  const double time_s = time_of(piece);
+  if (time_s > longest_s)
+    item.fail(key_of_time(piece), "makes the piece last " + exact_text(std::ceil(time_s)) + " s",
+              "make the piece shorter than " + exact_text(longest_s) + " s");
+  double runs = 1.0;
+  if (piece.kind == PieceKind::delay_sweep)
+    runs = static_cast<double>(piece.repeats) * static_cast<double>(piece.delays_s.size());
+  else if (compares(piece))
+    runs = static_cast<double>(piece.repeats) * static_cast<double>(piece.controllers.size());
+  total_s += runs * time_s;
+  if (total_s > longest_experiment_s)
+    item.fail(key_of_time(piece), "makes the experiment last more than a day",
+              "make it shorter, or split the file");
 }
 
 bool may_fit(PieceKind kind) {
@@ -144,8 +239,7 @@ Experiment read(const YamlMap& document, std::string text) {
   const YamlMap map = document.map("experiment");
   Experiment experiment;
   experiment.name = map.text("name");
-  if (experiment.name.empty() || experiment.name.size() > 60 ||
-      experiment.name.find_first_not_of("abcdefghijklmnopqrstuvwxyz0123456789-_") != std::string::npos)
+  if (!is_plain_name(experiment.name, longest_label))
     map.fail("name", "is '" + experiment.name.substr(0, 60) + "'",
              "use at most 60 lower-case letters, digits, '-' and '_', it names folders");
   experiment.why = map.text("why");
@@ -154,12 +248,13 @@ Experiment read(const YamlMap& document, std::string text) {
   if (map.has("sample_rate_hz"))
     experiment.sample_rate_hz =
         map.number("sample_rate_hz", Range::within(lowest_sample_rate_hz, highest_sample_rate_hz));
-  experiment.travel_m = map.number("travel_m", Range{0.0, longest_travel_m, true});
+  experiment.travel_m = map.number("travel_m", Range::within(shortest_travel_m, longest_travel_m));
   experiment.voltage_limit_v = map.number("voltage_limit_v", Range{0.0, highest_voltage_v, true});
   std::set<std::string> labels;
+  double total_s = 0.0;
   for (const YamlMap& item : map.maps("pieces")) {
     Piece piece = read_piece(item);
-    if (balances(piece) && experiment.gains.empty())
+    if (balances(piece) && !compares(piece) && experiment.gains.empty())
       item.fail("kind", "is one that balances, and the experiment names no gains",
                 "add gains: a gain file to the experiment");
     const std::string label = piece.label;
@@ -179,6 +274,7 @@ Experiment read(const YamlMap& document, std::string text) {
                   "bring the set-points nearer to the middle");
     if (piece.amplitude_m >= experiment.travel_m)
       item.fail("amplitude_m", "is not below travel_m", "lower it");
+    refuse_long_times(item, piece, total_s);
     experiment.pieces.push_back(std::move(piece));
   }
   if (experiment.pieces.empty() || experiment.pieces.size() > 100)
@@ -187,6 +283,7 @@ Experiment read(const YamlMap& document, std::string text) {
   map.finish();
   document.finish();
   experiment.text = std::move(text);
+  experiment.source = map;
   return experiment;
 }
 
@@ -218,13 +315,16 @@ bool balances(const Piece& piece) noexcept {
   return piece.kind == PieceKind::closed_loop || piece.kind == PieceKind::delay_sweep;
 }
 
+bool compares(const Piece& piece) noexcept {
+  return !piece.controllers.empty();
+}
+
 Piece read_piece(const YamlMap& map) {
   Piece piece;
   const std::string word = map.choice("kind", {kinds.begin(), kinds.end()});
   piece.kind = static_cast<PieceKind>(std::find(kinds.begin(), kinds.end(), word) - kinds.begin());
   piece.label = map.text_or("label", word);
-  if (piece.label.empty() || piece.label.size() > 60 ||
-      piece.label.find_first_not_of("abcdefghijklmnopqrstuvwxyz0123456789-_") != std::string::npos)
+  if (!is_plain_name(piece.label, longest_label))
     map.fail("label", "is '" + piece.label.substr(0, 60) + "'",
              "use at most 60 lower-case letters, digits, '-' and '_', it names folders");
   piece.operator_does = map.text_or("operator", "");
@@ -236,8 +336,29 @@ Piece read_piece(const YamlMap& map) {
     map.fail(piece.turned ? "turned" : "amplifier_off", "needs somebody's hands",
              "say under operator what to do");
   map.finish();
+  piece.source = map;
   return piece;
 }
+
+namespace {
+
+std::string controllers_text(const std::vector<NamedGains>& controllers) {
+  std::string text = "{";
+  for (const NamedGains& c : controllers)
+    text += (text.size() > 1 ? ", " : "") + c.name + ": " +
+            yaml_quoted(std::filesystem::absolute(c.file).lexically_normal().string());
+  return text + "}";
+}
+
+std::string release_text(const Piece& piece) {
+  if (piece.starts_rad.empty()) return degrees_text(piece.theta0_rad);
+  std::string text = "[";
+  for (const double start_rad : piece.starts_rad)
+    text += (text.size() > 1 ? ", " : "") + degrees_text(start_rad);
+  return text + "]";
+}
+
+}  // namespace
 
 std::string piece_text(const Piece& p) {
   std::string text = std::string("{kind: ") + name_of(p.kind) + ", label: " + p.label;
@@ -249,7 +370,7 @@ std::string piece_text(const Piece& p) {
   };
   const auto start = [&] {
     text += std::string(", start: ") + (p.start == StartBy::swing_up ? "swing_up" : "hand") +
-            ", theta0_deg: " + degrees_text(p.theta0_rad);
+            ", theta0_deg: " + release_text(p);
     number("patience_s", p.patience_s);
   };
   if (!p.operator_does.empty()) text += ", operator: " + yaml_quoted(p.operator_does);
@@ -299,6 +420,10 @@ std::string piece_text(const Piece& p) {
       text += ", set_points_m: " + numbers_text(p.set_points_m);
       number("hold_s", p.hold_s);
       number("delay_s", p.delay_s);
+      if (compares(p)) {
+        text += ", gains: " + controllers_text(p.controllers);
+        integer("repeats", p.repeats);
+      }
       start();
       break;
     case PieceKind::delay_sweep:
@@ -324,9 +449,8 @@ Experiment read_experiment_text(const std::string& text, const std::filesystem::
 }
 
 Experiment read_experiment_file(const std::filesystem::path& file) {
-  const YamlMap document = YamlMap::from_file(file);
-  std::ifstream in(file, std::ios::binary);
-  return read(document, std::string((std::istreambuf_iterator<char>(in)), std::istreambuf_iterator<char>()));
+  // Read once: what was checked is what is kept.
+  return read_experiment_text(whole_file(file), file);
 }
 
 }  // namespace upright

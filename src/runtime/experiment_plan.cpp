@@ -4,7 +4,8 @@
 #include <cstdio>
 #include <numbers>
 
-#include "upright/control/predictor.hpp"
+#include "upright/control/filter_model.hpp"
+#include "upright/control/model_parts.hpp"
 #include "upright/model/error.hpp"
 #include "upright/model/plant_file.hpp"
 #include "upright/runtime/experiment.hpp"
@@ -18,7 +19,8 @@ constexpr double default_rate_hz = 1000.0;
 constexpr double room_to_limit_m = 0.02;
 /// How far a rehearsal may go beyond the travel: the guard acts on estimates.
 constexpr double guard_slack_m = 0.01;
-constexpr double longest_rehearsal_s = 3600.0;
+/// Control periods and integration steps of a whole plan: some 10 s of computing, however stiff the plant is.
+constexpr std::uint64_t most_rehearsed_steps = 16'000'000;
 constexpr double steady_s = 0.15;  // at constant speed, to be worth measuring
 
 std::string brief(double value) {
@@ -35,28 +37,37 @@ ControlConfig without_feedback(double rate_hz) {
   return control;
 }
 
-std::string about(const Piece& piece) {
-  return ": the piece " + piece.label;
+/// Refuses a piece at the key of its file that is to blame. `problem` goes on from "the piece LABEL".
+[[noreturn]] void refuse(const Piece& piece, const char* key, const std::string& problem,
+                         const std::string& remedy) {
+  const std::string sentence = "the piece " + piece.label + " " + problem;
+  if (piece.source) piece.source->fail(key, "(" + sentence + ")", remedy);
+  throw ConfigError(sentence + ": " + remedy);
+}
+
+const char* voltage_key(const Piece& piece) {
+  return !piece.voltages_v.empty() ? "voltages_v" : piece.amplitude_v > 0.0 ? "amplitude_v" : "largest_v";
 }
 
 void refuse_beyond_limits(const ExperimentSetup& setup, double amplifier_limit_v) {
   const Experiment& e = setup.experiment;
   const double widest = setup.rig.track_limit_m - room_to_limit_m;
-  if (e.travel_m > widest)
-    throw ConfigError("lower travel_m to " + brief(widest) + " or less: the rig stops at " +
-                      brief(setup.rig.track_limit_m) + " m, and " + e.name + " plans to " +
-                      brief(e.travel_m) + " m");
+  if (e.travel_m > widest) {
+    const std::string cause = "the rig stops at " + brief(setup.rig.track_limit_m) + " m, and " + e.name +
+                              " plans to " + brief(e.travel_m) + " m";
+    const std::string remedy = "lower travel_m to " + brief(widest) + " or less";
+    if (e.source) e.source->fail("travel_m", "(" + cause + ")", remedy);
+    throw ConfigError(cause + ": " + remedy);
+  }
   for (const Piece& piece : e.pieces) {
     double most = std::max(piece.amplitude_v, piece.largest_v);
     for (const double v : piece.voltages_v) most = std::max(most, v);
     if (most > amplifier_limit_v)
-      throw ConfigError("lower its voltage to the amplifier's " + brief(amplifier_limit_v) + " V" +
-                        about(piece) + " asks for " + brief(most) + " V");
+      refuse(piece, voltage_key(piece), "asks for " + brief(most) + " V",
+             "lower its voltage to the amplifier's " + brief(amplifier_limit_v) + " V");
     if (!setup.plant.pendulum && (balances(piece) || piece.kind == PieceKind::free_decay))
-      throw ConfigError("use a plant with a pendulum, or leave it out" + about(piece) + " needs one");
-    ControlConfig control = setup.control;
-    for (const double delay : piece.delays_s) DelayLine(delay, control.period_s());
-    DelayLine(piece.delay_s, control.period_s());
+      refuse(piece, "kind", "needs a pendulum, and the plant has none",
+             "use a plant with a pendulum, or leave the piece out");
   }
 }
 
@@ -77,15 +88,15 @@ void refuse_short_travel(const Piece& piece, const ExperimentSetup& setup) {
   };
   for (const double v : piece.voltages_v) {
     if (m.force_per_volt_n * v <= 1.05 * m.sliding_n)
-      throw ConfigError("raise the voltage above " + brief(1.05 * m.sliding_n / m.force_per_volt_n) + " V" +
-                        about(piece) + " would not keep the cart moving at " + brief(v) + " V");
+      refuse(piece, "voltages_v", "would not keep the cart moving at " + brief(v) + " V",
+             "raise the voltage above " + brief(1.05 * m.sliding_n / m.force_per_volt_n) + " V");
     if (needed(v) <= room) continue;
     double fits = v;
     while (fits > 0.05 && needed(fits) > room) fits *= 0.98;
-    throw ConfigError("lower the voltage to " + brief(fits) + " V or give travel_m " +
-                      brief(0.5 * needed(v)) + about(piece) + " needs " + brief(needed(v)) +
-                      " m to reach its speed at " + brief(v) + " V and to stop, and has " + brief(room) +
-                      " m");
+    refuse(piece, "voltages_v",
+           "needs " + brief(needed(v)) + " m to reach its speed at " + brief(v) + " V and to stop, and has " +
+               brief(room) + " m",
+           "lower the voltage to " + brief(fits) + " V or give travel_m " + brief(0.5 * needed(v)));
   }
 }
 
@@ -103,43 +114,207 @@ Piece first_trial_of(Piece piece) {
   return piece;
 }
 
-Piece planned(Piece piece, const ExperimentSetup& setup) {
-  const double travel = setup.experiment.travel_m;
-  if (piece.kind == PieceKind::constant_voltage && !piece.fit_to_travel) refuse_short_travel(piece, setup);
-  for (int attempt = 0;; ++attempt) {
-    const Rehearsal r = rehearse(first_trial_of(piece), setup);
-    const bool within = r.farthest_m <= travel + guard_slack_m && r.cut_short == 0;
-    if (within && r.outcome.reason == StopReason::duration) return piece;
-    constexpr int most_attempts = 16;
-    if (!within && piece.fit_to_travel && attempt < most_attempts) {
-      scale(piece, 0.8);
-      continue;
+struct RehearsalOptions {
+  std::uint64_t most_steps = 0;
+  bool judges = false;  ///< ends where the piece has failed, and keeps no rows
+};
+
+/// Sees the rows of a rehearsal go by, and ends it where it has taken too many steps, or has failed.
+class RehearsalSink final : public RowSink {
+ public:
+  RehearsalSink(const ExperimentScript& script, const SimulatedRigWithHand& rig, double farthest_m,
+                const RehearsalOptions& options)
+      : script_(script), rig_(rig), farthest_m_(farthest_m), options_(options) {}
+
+  bool push(const LogRecord& row) noexcept override {
+    most_v_ = std::max(most_v_, std::abs(row.voltage_v));
+    ++periods_;
+    if (!options_.judges) rows_.push_back(row);
+    const bool failed = options_.judges && (script_.cut_short() > 0 || std::abs(row.cart_m) > farthest_m_);
+    if (failed || too_long()) enough_.store(stop_button_pressed, std::memory_order_relaxed);
+    return true;
+  }
+  void push_waiting(const LogRecord& row) noexcept override { push(row); }
+  bool failed() const noexcept override { return false; }
+
+  const SignalFlag& enough() const noexcept { return enough_; }
+  std::uint64_t steps() const noexcept { return periods_ + rig_.steps_taken(); }
+  bool too_long() const noexcept { return steps() >= options_.most_steps; }
+  double most_v() const noexcept { return most_v_; }
+  std::vector<LogRecord> take_rows() noexcept { return std::move(rows_); }
+
+ private:
+  const ExperimentScript& script_;
+  const SimulatedRigWithHand& rig_;
+  double farthest_m_;
+  RehearsalOptions options_;
+  std::uint64_t periods_ = 0;
+  double most_v_ = 0.0;
+  std::vector<LogRecord> rows_;
+  SignalFlag enough_{0};
+};
+
+Rehearsal rehearse(const Piece& piece, const ExperimentSetup& setup, const Plant& real,
+                   const RehearsalOptions& options) {
+  RigFile rig = setup.rig;
+  rig.cart_encoder = rig.pendulum_encoder = rig.output = Backend::simulated;
+  rig.calibration.zero_at_start = false;
+  rig.simulated = SimulatedRig{};
+  rig.simulated->initial = {0.0, std::numbers::pi};
+  VirtualClock clock;
+  const auto simulated = make_simulated_rig(rig, real, clock, {});
+  simulated->open();
+  simulated->handle(hand_for(piece));
+  ControlConfig control = setup.control;
+  control.delay_s = piece.delay_s;
+  Controller controller(control, rig.amplifier.limit_v, make_model_parts(control));
+  ExperimentScript script(piece, {control.period_s(), setup.experiment.travel_m, rig.amplifier.limit_v,
+                                  servo_model(setup.plant), control.gains});
+  controller.follow(&script);
+  PoseScaler scaler(calibration_in_use(rig));
+  LoopLimits limits = rig_limits(rig, real);
+  limits.periods = options.most_steps;
+  limits.watchdog_s = 1.0;
+  limits.most_periods_late = 1;
+  RehearsalSink sink(script, *simulated, setup.experiment.travel_m + guard_slack_m, options);
+  LiveStatus live;
+  ControlLoop loop(*simulated, clock, controller, scaler, sink, limits, sink.enough(), live);
+  Rehearsal rehearsal;
+  loop.run(rehearsal.outcome);
+  rehearsal.rows = sink.take_rows();
+  rehearsal.farthest_m = rehearsal.outcome.worst_cart_m;
+  rehearsal.most_v = sink.most_v();
+  rehearsal.cut_short = script.cut_short();
+  rehearsal.script_over = script.phase() == ScriptPhase::over;
+  rehearsal.steps = sink.steps();
+  rehearsal.too_long = sink.too_long();
+  return rehearsal;
+}
+
+/// Plans piece after piece, within a number of steps for all of them.
+class Planner {
+ public:
+  explicit Planner(const ExperimentSetup& setup, std::uint64_t most_steps = most_rehearsed_steps)
+      : setup_(setup), steps_left_(most_steps) {}
+
+  PlannedPiece plan(const Piece& piece) { return compares(piece) ? plan_comparison(piece) : plan_one(piece); }
+
+ private:
+  /// Every controller from every start.
+  PlannedPiece plan_comparison(const Piece& piece) {
+    PlannedPiece whole{piece};
+    const auto rounds =
+        std::min(static_cast<std::size_t>(piece.repeats), std::max<std::size_t>(1, piece.starts_rad.size()));
+    ExperimentSetup with = setup_;
+    for (std::size_t k = 0; k < piece.controllers.size(); ++k) {
+      with.control = control_of(setup_, piece, k);
+      for (std::size_t round = 0; round < rounds; ++round) {
+        Piece one = piece_of({0, static_cast<int>(round), piece.delay_s, k}, piece);
+        one.label += " with the gains " + piece.controllers[k].name;
+        Planner planner(with, steps_left_);
+        const PlannedPiece planned = planner.plan_one(one);
+        steps_left_ = planner.steps_left_;
+        whole.duration_s = std::max(whole.duration_s, planned.duration_s);
+        whole.farthest_m = std::max(whole.farthest_m, planned.farthest_m);
+        whole.most_v = std::max(whole.most_v, planned.most_v);
+      }
     }
+    return whole;
+  }
+
+  PlannedPiece plan_one(Piece piece) {
+    if (piece.kind == PieceKind::constant_voltage && !piece.fit_to_travel) refuse_short_travel(piece, setup_);
+    constexpr int most_attempts = 16;
+    for (int attempt = 0;; ++attempt) {
+      const Rehearsal r = rehearsed(piece);
+      const bool within = stays_within(r);
+      if (within && r.outcome.reason == StopReason::duration)
+        return {piece, r.outcome.time_s, r.farthest_m, r.most_v};
+      if (within || !piece.fit_to_travel || attempt == most_attempts) refuse_for(piece, r);
+      scale(piece, 0.8);
+    }
+  }
+
+  bool stays_within(const Rehearsal& r) const {
+    return r.farthest_m <= setup_.experiment.travel_m + guard_slack_m && r.cut_short == 0;
+  }
+
+  Rehearsal rehearsed(const Piece& piece) {
+    Rehearsal r = rehearse(first_trial_of(piece), setup_, setup_.plant, {steps_left_, true});
+    steps_left_ -= std::min(steps_left_, r.steps);
+    if (r.too_long && !r.script_over)
+      refuse(piece, "kind", "is too long to be rehearsed, with those before it",
+             "make the pieces shorter, lower the sample rate, or split the file; or check the plant file for "
+             "a stiffness or damping that is far too large");
+    return r;
+  }
+
+  [[noreturn]] void refuse_for(const Piece& piece, const Rehearsal& r) {
+    const std::string travel = "+-" + brief(setup_.experiment.travel_m) + " m";
+    const std::string when = " after " + brief(r.outcome.time_s) + " s by the plan";
     if (r.outcome.reason == StopReason::not_ready)
-      throw ConfigError("check the plant file and travel_m" + about(piece) +
-                        " would not come to rest where it starts");
-    if (r.outcome.reason == StopReason::fell)
-      throw ConfigError("use shorter delays, smaller steps or other gains" + about(piece) +
-                        " would fall after " + brief(r.outcome.time_s) + " s by the plan");
-    if (piece.amplitude_v > 0.0) {
+      refuse(piece, "kind", "would not come to rest where it starts", "check the plant file and travel_m");
+    if (r.outcome.reason == StopReason::not_finite)
+      refuse(piece, "kind", "would ask for a voltage that is not a number" + when,
+             "check the gains, the plant file and the piece");
+    if (balances(piece))
+      refuse(piece, "kind", "would fall, or leave the travel of " + travel + "," + when,
+             "use shorter delays, smaller steps or other gains");
+    if (piece.amplitude_v > 0.0 && !stays_within(r)) {
       Piece smaller = piece;
-      double fits = piece.amplitude_v;
       for (int i = 0; i < 12; ++i) {
         scale(smaller, 0.85);
-        fits = smaller.amplitude_v;
-        const Rehearsal again = rehearse(smaller, setup);
-        if (again.cut_short == 0 && again.farthest_m <= travel + guard_slack_m) break;
+        if (stays_within(rehearsed(smaller))) break;
       }
-      throw ConfigError("lower amplitude_v to " + brief(fits) + " or set fit_to_travel: true" + about(piece) +
-                        " would leave the travel of +-" + brief(travel) + " m at " +
-                        brief(piece.amplitude_v) + " V");
+      refuse(piece, "amplitude_v",
+             "would leave the travel of " + travel + " at " + brief(piece.amplitude_v) + " V",
+             "lower amplitude_v to " + brief(smaller.amplitude_v) + " or set fit_to_travel: true");
     }
-    throw ConfigError("enlarge travel_m or make the piece smaller" + about(piece) + " would go to " +
-                      brief(r.farthest_m) + " m of the allowed " + brief(travel) + " m");
+    refuse(piece, "kind", "would leave the travel of " + travel + when,
+           "enlarge travel_m or make the piece smaller");
   }
+
+  const ExperimentSetup& setup_;
+  std::uint64_t steps_left_;
+};
+
+}  // namespace
+
+namespace {
+
+/// As an experiment uses it: at its rate, each trial with a delay of its own.
+ControlConfig on_rig(ControlConfig control, std::optional<double> sample_rate_hz, const RigFile& rig) {
+  if (sample_rate_hz) control.sample_rate_hz = *sample_rate_hz;
+  control.delay_s = 0.0;
+  return with_encoders(control, rig.calibration.cart.per_count, rig.calibration.pendulum.per_count);
+}
+
+/// Of an experiment whose only gain files are compared.
+double first_rate_hz(const Experiment& experiment) {
+  for (const Piece& piece : experiment.pieces)
+    if (compares(piece)) return read_gain_file(piece.controllers.front().file).sample_rate_hz;
+  return default_rate_hz;
 }
 
 }  // namespace
+
+void read_controllers(ExperimentSetup& setup, std::optional<double> sample_rate_hz) {
+  const double rate_hz = setup.control.sample_rate_hz;
+  for (const Piece& piece : setup.experiment.pieces)
+    for (const NamedGains& controller : piece.controllers) {
+      const ControlConfig control = on_rig(read_gain_file(controller.file), sample_rate_hz, setup.rig);
+      if (control.sample_rate_hz != rate_hz)
+        refuse(piece, "gains",
+               "has the gains " + controller.name + " at " + brief(control.sample_rate_hz) +
+                   " Hz, and the experiment runs at " + brief(rate_hz) + " Hz",
+               "use gain files of one rate, or give sample_rate_hz");
+      setup.controllers[controller.file] = control;
+    }
+}
+
+const ControlConfig& control_of(const ExperimentSetup& setup, const Piece& piece, std::size_t controller) {
+  return compares(piece) ? setup.controllers.at(piece.controllers[controller].file) : setup.control;
+}
 
 ExperimentSetup resolve_experiment(const std::filesystem::path& file, const std::filesystem::path& rig,
                                    const std::filesystem::path& plant, std::optional<double> sample_rate_hz) {
@@ -156,16 +331,17 @@ ExperimentSetup resolve_experiment(const std::filesystem::path& file, const std:
   else if (!e.plant.empty())
     setup.plant = read_plant_file(e.plant);
   else
-    throw ConfigError("name what to plan with, --plant PLANT or plant in " + file.string() +
-                      ": the rig is not simulated");
+    throw ConfigError(
+        "there is no plant to plan with, for the rig is not simulated: name one with --plant, or as plant "
+        "in " +
+        file.string());
+  if (!sample_rate_hz && e.sample_rate_hz > 0.0) sample_rate_hz = e.sample_rate_hz;
   if (!e.gains.empty())
-    setup.control = read_gain_file(e.gains);
+    setup.control = on_rig(read_gain_file(e.gains), sample_rate_hz, setup.rig);
   else
-    setup.control = without_feedback(default_rate_hz);
-  if (e.sample_rate_hz > 0.0) setup.control.sample_rate_hz = e.sample_rate_hz;
-  if (sample_rate_hz) setup.control.sample_rate_hz = *sample_rate_hz;
-  if (e.gains.empty()) setup.control = without_feedback(setup.control.sample_rate_hz);
-  setup.control.delay_s = 0.0;
+    setup.control =
+        on_rig(without_feedback(sample_rate_hz.value_or(first_rate_hz(e))), sample_rate_hz, setup.rig);
+  read_controllers(setup, sample_rate_hz);
   const double amplifier_limit_v = setup.rig.amplifier.limit_v;
   setup.rig.amplifier.limit_v = std::min(amplifier_limit_v, e.voltage_limit_v);
   refuse_beyond_limits(setup, amplifier_limit_v);
@@ -177,43 +353,23 @@ Rehearsal rehearse(const Piece& piece, const ExperimentSetup& setup) {
 }
 
 Rehearsal rehearse(const Piece& piece, const ExperimentSetup& setup, const Plant& real) {
-  RigFile rig = setup.rig;
-  rig.cart_encoder = rig.pendulum_encoder = rig.output = Backend::simulated;
-  rig.calibration.zero_at_start = false;
-  rig.simulated = SimulatedRig{};
-  rig.simulated->initial = {0.0, std::numbers::pi};
-  VirtualClock clock;
-  const auto simulated = make_simulated_rig(rig, real, clock, {});
-  simulated->open();
-  simulated->handle(hand_for(piece));
-  ControlConfig control = setup.control;
-  control.delay_s = piece.delay_s;
-  Controller controller(control, rig.amplifier.limit_v, make_compensator(control));
-  ExperimentScript script(piece, {control.period_s(), setup.experiment.travel_m, rig.amplifier.limit_v,
-                                  servo_model(setup.plant), control.gains});
-  controller.follow(&script);
-  PoseScaler scaler(calibration_in_use(rig));
-  LoopLimits limits;
-  limits.periods = static_cast<std::uint64_t>(longest_rehearsal_s * control.sample_rate_hz);
-  limits.track_limit_m = rig.track_limit_m;
-  limits.fall_angle_rad = rig.fall_angle_rad;
-  limits.watchdog_s = 1.0;
-  limits.most_periods_late = 1;
-  RowMemory memory;
-  const SignalFlag no_signal{0};
-  LiveStatus live;
-  ControlLoop loop(*simulated, clock, controller, scaler, memory, limits, no_signal, live);
-  Rehearsal rehearsal;
-  loop.run(rehearsal.outcome);
-  rehearsal.rows = memory.take();
-  rehearsal.farthest_m = rehearsal.outcome.worst_cart_m;
-  rehearsal.cut_short = script.cut_short();
-  return rehearsal;
+  return rehearse(piece, setup, real, {most_rehearsed_steps, false});
 }
 
-std::vector<Piece> plan_pieces(const ExperimentSetup& setup) {
+std::vector<PlannedPiece> rehearse_all(const ExperimentSetup& setup, const ProgressCallback& progress) {
+  Planner planner(setup);
+  std::vector<PlannedPiece> planned;
+  const auto all = static_cast<double>(setup.experiment.pieces.size());
+  for (const Piece& piece : setup.experiment.pieces) {
+    if (progress) progress(static_cast<double>(planned.size()) / all, piece.label);
+    planned.push_back(planner.plan(piece));
+  }
+  return planned;
+}
+
+std::vector<Piece> plan_pieces(const ExperimentSetup& setup, const ProgressCallback& progress) {
   std::vector<Piece> pieces;
-  for (const Piece& piece : setup.experiment.pieces) pieces.push_back(planned(piece, setup));
+  for (PlannedPiece& planned : rehearse_all(setup, progress)) pieces.push_back(std::move(planned.piece));
   return pieces;
 }
 

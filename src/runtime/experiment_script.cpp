@@ -4,8 +4,6 @@
 #include <cmath>
 #include <numbers>
 
-#include "upright/model/error.hpp"
-
 namespace upright {
 
 namespace {
@@ -73,48 +71,6 @@ double wrapped(double angle_rad) {
 }
 
 }  // namespace
-
-ServoModel servo_model(const Plant& plant) {
-  ServoModel model;
-  model.mass_kg = plant.cart_mass_kg;
-  model.gravity_mps2 = plant.gravity_mps2;
-  model.force_per_volt_n = plant.motor.force_per_volt_n;
-  model.damping_n_per_mps = plant.motor.back_emf_n_per_mps;
-  if (plant.pendulum) {
-    const double moment = plant.pendulum->mass_kg * plant.pendulum->length_to_com_m;
-    model.mass_kg += plant.pendulum->mass_kg;
-    model.pendulum_m = plant.pendulum->inertia_about_pivot_kgm2() / moment;
-    model.reaction_m = moment / model.mass_kg;
-  }
-  if (const PlantEffect* viscous = plant.find("viscous_friction"))
-    model.damping_n_per_mps += viscous->values[0];
-  if (const PlantEffect* coulomb = plant.find("coulomb_friction")) model.sliding_n = coulomb->values[0];
-  model.breakaway_n = model.sliding_n;
-  if (const PlantEffect* stribeck = plant.find("stribeck_friction")) model.breakaway_n += stribeck->values[0];
-  return model;
-}
-
-std::string servo_text(const ServoModel& m) {
-  return "{mass_kg: " + exact_text(m.mass_kg) + ", force_per_volt_n: " + exact_text(m.force_per_volt_n) +
-         ", damping_n_per_mps: " + exact_text(m.damping_n_per_mps) +
-         ", sliding_n: " + exact_text(m.sliding_n) + ", breakaway_n: " + exact_text(m.breakaway_n) +
-         ", pendulum_m: " + exact_text(m.pendulum_m) + ", reaction_m: " + exact_text(m.reaction_m) +
-         ", gravity_mps2: " + exact_text(m.gravity_mps2) + "}";
-}
-
-ServoModel read_servo(const YamlMap& map) {
-  ServoModel m;
-  m.mass_kg = map.number("mass_kg", Range::positive());
-  m.force_per_volt_n = map.number("force_per_volt_n", Range::positive());
-  m.damping_n_per_mps = map.number("damping_n_per_mps");
-  m.sliding_n = map.number("sliding_n");
-  m.breakaway_n = map.number("breakaway_n");
-  m.pendulum_m = map.number("pendulum_m", Range::not_negative());
-  m.reaction_m = map.number("reaction_m", Range::not_negative());
-  m.gravity_mps2 = map.number("gravity_mps2");
-  map.finish();
-  return m;
-}
 
 const char* words_for(ScriptPhase phase) noexcept {
   switch (phase) {
@@ -184,9 +140,12 @@ void ExperimentScript::plan_strokes() {
       strokes_.push_back({Kind::balance, 0.0, 0.0, piece_.duration_s});
       break;
     case PieceKind::sign_check:
-      for (double v = 2.0 * pulse_step_v; v < piece_.largest_v + 0.5 * pulse_step_v; v += pulse_step_v)
-        for (const double s : {1.0, -1.0})
-          strokes_.push_back({Kind::pulse, 0.0, s * std::min(v, piece_.largest_v), pulse_s});
+      // From low to the largest voltage; a largest one below the first step is the only one.
+      for (double v = std::min(2.0 * pulse_step_v, piece_.largest_v);;
+           v = std::min(v + pulse_step_v, piece_.largest_v)) {
+        for (const double s : {1.0, -1.0}) strokes_.push_back({Kind::pulse, 0.0, s * v, pulse_s});
+        if (v >= piece_.largest_v) break;
+      }
       break;
   }
 }
@@ -283,7 +242,12 @@ Demand ExperimentScript::settle(const ControlState& now) noexcept {
     speed -= 2.0 * swing_damping * std::sqrt(m.gravity_mps2 * m.pendulum_m) * std::sin(hanging_lean(now));
   speed = std::clamp(speed, -fastest_approach_mps, fastest_approach_mps);
   if (leaves_travel(now)) speed = 0.0;
-  return put(servo(speed, now));
+  const double voltage = servo(speed, now);
+  // Beyond its travel, where a fall may have left it, nothing pushes the cart farther out.
+  const bool pushes_out = std::abs(now.cart_m) > context_.travel_m && voltage * now.cart_m > 0.0;
+  Demand demand = put(pushes_out ? 0.0 : voltage);
+  demand.homing = true;
+  return demand;
 }
 
 Demand ExperimentScript::wait(const ControlState& now) noexcept {
@@ -556,8 +520,10 @@ Demand ExperimentScript::next(std::uint64_t tick, const ControlState& now) noexc
         enter(ScriptPhase::waiting);
         break;
       case Kind::balance:
-        // Upright already: nothing to settle.
-        if (piece_.start == StartBy::swing_up)
+        // Upright already, within the travel: nothing to settle.
+        if (std::abs(now.cart_m) > context_.travel_m)
+          enter(ScriptPhase::settling);
+        else if (piece_.start == StartBy::swing_up)
           enter(can_catch(now) ? ScriptPhase::swinging_up : ScriptPhase::settling);
         else
           enter(std::abs(wrapped(now.theta_rad)) < 2.0 * held_lean_rad ? ScriptPhase::waiting

@@ -2,12 +2,17 @@
 #include "experiment_trials.hpp"
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
 #include <fstream>
 #include <limits>
 #include <sstream>
+#include <stdexcept>
 
 #include "upright/model/error.hpp"
+#include "upright/model/input_file.hpp"
+#include "upright/model/plant_file.hpp"
+#include "upright/runtime/provenance.hpp"
 
 namespace upright {
 
@@ -57,12 +62,25 @@ std::optional<double> next_bisected(const Piece& piece, const std::vector<TrialR
   return std::nullopt;
 }
 
+/// Round after round, each controller once.
+std::optional<ExperimentTrial> next_of_comparison(std::size_t index, const Piece& piece,
+                                                  const std::vector<TrialResult>& done) {
+  for (int repeat = 0; repeat < piece.repeats; ++repeat)
+    for (std::size_t controller = 0; controller < piece.controllers.size(); ++controller) {
+      const bool is_done = std::any_of(done.begin(), done.end(), [&](const TrialResult& r) {
+        return r.trial.piece == index && r.trial.repeat == repeat && r.trial.controller == controller;
+      });
+      if (!is_done) return ExperimentTrial{index, repeat, piece.delay_s, controller};
+    }
+  return std::nullopt;
+}
+
 std::optional<ExperimentTrial> next_of_sweep(std::size_t index, const Piece& piece,
                                              const std::vector<TrialResult>& done) {
   const auto over_repeats = [&](const auto& next) -> std::optional<ExperimentTrial> {
     for (int repeat = 0; repeat < piece.repeats; ++repeat)
       if (const auto delay = next(of_repeat(done, index, repeat)))
-        return ExperimentTrial{index, repeat, *delay};
+        return ExperimentTrial{index, repeat, *delay, 0};
     return std::nullopt;
   };
   // All repeats of a delay before the next one.
@@ -70,7 +88,7 @@ std::optional<ExperimentTrial> next_of_sweep(std::size_t index, const Piece& pie
   for (int repeat = 0; repeat < piece.repeats; ++repeat)
     if (const auto delay = next_listed(piece, of_repeat(done, index, repeat));
         delay && (!first || *delay < first->delay_s))
-      first = ExperimentTrial{index, repeat, *delay};
+      first = ExperimentTrial{index, repeat, *delay, 0};
   if (first) return first;
   for (const int from : {1, 2})
     if (const auto trial = over_repeats(
@@ -82,13 +100,51 @@ std::optional<ExperimentTrial> next_of_sweep(std::size_t index, const Piece& pie
 constexpr const char* journal_name = "trials.csv";
 constexpr const char* journal_columns =
     "piece,label,repeat,delay_s,run_directory,reason,outcome,theta0_rad,theta_amplitude_rad,cart_amplitude_m,"
-    "fall_time_s,frequency_hz";
+    "fall_time_s,frequency_hz,controller,gains";
+constexpr std::size_t journal_cells = 14;
+constexpr std::size_t journal_cells_before = 12;  // without controller and gains
+constexpr const char* nothing_there = "-";
 
 std::vector<std::string> cells_of(const std::string& line) {
   std::vector<std::string> cells;
   std::stringstream in(line);
   for (std::string cell; std::getline(in, cell, ',');) cells.push_back(cell);
   return cells;
+}
+
+template <class Number>
+bool parse(const std::string& text, Number& value) {
+  const auto result = std::from_chars(text.data(), text.data() + text.size(), value);
+  return result.ec == std::errc{} && result.ptr == text.data() + text.size();
+}
+
+/// False: not a line of the journal.
+bool read_line(const std::string& line, TrialResult& r) {
+  const std::vector<std::string> cells = cells_of(line);
+  if (cells.size() != journal_cells && cells.size() != journal_cells_before) return false;
+  if (cells.size() == journal_cells) {
+    if (cells[12] != nothing_there) r.controller = cells[12];
+    if (cells[13] != nothing_there) r.gains = cells[13];
+  }
+  r.run_directory = cells[4];
+  r.reason = cells[5];
+  r.outcome = cells[6];
+  return parse(cells[0], r.trial.piece) && parse(cells[2], r.trial.repeat) && r.trial.repeat >= 0 &&
+         parse(cells[3], r.trial.delay_s) && std::isfinite(r.trial.delay_s) &&
+         parse(cells[7], r.theta0_rad) && parse(cells[8], r.theta_amplitude_rad) &&
+         parse(cells[9], r.cart_amplitude_m) && parse(cells[10], r.fall_time_s) &&
+         parse(cells[11], r.frequency_hz);
+}
+
+[[noreturn]] void refuse_line(const std::filesystem::path& file, std::size_t number) {
+  throw ConfigError(
+      file.string() + ":" + std::to_string(number) +
+      ": not a trial of this experiment: restore the line from a copy, or choose another folder "
+      "with --out");
+}
+
+bool is_sweep_outcome(const std::string& outcome) {
+  return outcome == "stable" || outcome == "oscillating" || outcome == "fell";
 }
 
 void write_whole(const std::filesystem::path& file, const std::string& text) {
@@ -99,7 +155,24 @@ void write_whole(const std::filesystem::path& file, const std::string& text) {
   std::error_code problem;
   if (out) std::filesystem::rename(partial, file, problem);
   if (!out || problem)
-    throw Error(ExitCode::stopped, "free space where the experiment goes: cannot write " + file.string());
+    throw Error(ExitCode::stopped,
+                "cannot write " + file.string() + ": free space where the experiment goes");
+}
+
+/// What trials.csv lists is there: data that somebody removed are not passed over.
+void refuse_lost_runs(const std::filesystem::path& folder, const std::vector<TrialResult>& results) {
+  std::error_code ignored;
+  const std::string remedy =
+      ": restore it, or choose another folder with --out, and leave that alone until the experiment has "
+      "ended";
+  if (!std::filesystem::exists(folder / "experiment.yaml", ignored))
+    throw Error(ExitCode::stopped,
+                folder.string() + " was removed or moved while the experiment went on" + remedy);
+  for (const TrialResult& r : results)
+    if (!std::filesystem::exists(folder / r.run_directory / "samples.csv", ignored))
+      throw Error(ExitCode::stopped, (folder / r.run_directory).string() +
+                                         " was removed or moved, so a run of this experiment is lost" +
+                                         remedy);
 }
 
 using RowIterator = std::vector<LogRecord>::const_iterator;
@@ -134,6 +207,19 @@ double first_delay(const std::vector<TrialResult>& results, int from) {
 
 }  // namespace
 
+Piece piece_of(const ExperimentTrial& trial, const Piece& piece) {
+  Piece one = piece;
+  one.delay_s = trial.delay_s;
+  if (piece.kind == PieceKind::delay_sweep) one.delays_s = {trial.delay_s};
+  if (!compares(piece)) return one;
+  if (!piece.starts_rad.empty())
+    one.theta0_rad = piece.starts_rad[static_cast<std::size_t>(trial.repeat) % piece.starts_rad.size()];
+  one.controllers.clear();
+  one.starts_rad.clear();
+  one.repeats = 1;
+  return one;
+}
+
 std::optional<ExperimentTrial> next_trial(const std::vector<Piece>& pieces,
                                           const std::vector<TrialResult>& done) {
   for (std::size_t i = 0; i < pieces.size(); ++i) {
@@ -141,11 +227,30 @@ std::optional<ExperimentTrial> next_trial(const std::vector<Piece>& pieces,
       if (const auto trial = next_of_sweep(i, pieces[i], done)) return trial;
       continue;
     }
+    if (compares(pieces[i])) {
+      if (const auto trial = next_of_comparison(i, pieces[i], done)) return trial;
+      continue;
+    }
     const bool is_done =
         std::any_of(done.begin(), done.end(), [&](const TrialResult& r) { return r.trial.piece == i; });
-    if (!is_done) return ExperimentTrial{i, 0, pieces[i].delay_s};
+    if (!is_done) return ExperimentTrial{i, 0, pieces[i].delay_s, 0};
   }
   return std::nullopt;
+}
+
+std::string missing_transitions(const std::vector<Piece>& pieces, const std::vector<TrialResult>& done) {
+  for (std::size_t i = 0; i < pieces.size(); ++i) {
+    if (pieces[i].kind != PieceKind::delay_sweep) continue;
+    for (int repeat = 0; repeat < pieces[i].repeats; ++repeat) {
+      const std::vector<TrialResult> results = of_repeat(done, i, repeat);
+      if (!std::isnan(first_delay(results, 2))) continue;
+      return "the delay sweep " + pieces[i].label + " is not complete: in repeat " +
+             std::to_string(repeat + 1) + " nothing fell up to " +
+             exact_text(pieces[i].delays_s.back() * 1e3) +
+             " ms, so that it is not known from which delay on it falls: add longer delays to delay_s";
+    }
+  }
+  return "";
 }
 
 TrialResult judge_trial(const ExperimentTrial& trial, const Piece& piece, const std::vector<LogRecord>& rows,
@@ -153,14 +258,15 @@ TrialResult judge_trial(const ExperimentTrial& trial, const Piece& piece, const 
   TrialResult result;
   result.trial = trial;
   result.reason = name_of(reason);
-  result.outcome = "done";
   result.fall_time_s = result.frequency_hz = not_a_number;
   const auto balanced = [](const LogRecord& row) { return (row.flags & row_flag::feedback) != 0; };
   const auto first = std::find_if(rows.begin(), rows.end(), balanced);
+  if (!balances(piece) && reason == StopReason::duration) result.outcome = "done";
   if (!balances(piece) || first == rows.end()) return result;
   auto last = first;
   for (auto at = first; at != rows.end(); ++at)
     if (balanced(*at)) last = at;
+  if (last == first) return result;
   const double turn = 2.0 * 3.14159265358979323846;
   const double upright = turn * std::round(first->theta_rad / turn);
   result.theta0_rad = first->theta_rad - upright;
@@ -178,8 +284,10 @@ TrialResult judge_trial(const ExperimentTrial& trial, const Piece& piece, const 
   result.theta_amplitude_rad = fell ? std::max(-theta_low, theta_high) : 0.5 * (theta_high - theta_low);
   result.cart_amplitude_m = fell ? std::max(-cart_low, cart_high) : 0.5 * (cart_high - cart_low);
   if (fell) result.fall_time_s = static_cast<double>(last->time_ns - first->time_ns) / 1e9;
-  if (piece.kind == PieceKind::delay_sweep)
-    result.outcome = fell                                                  ? "fell"
+  if ((piece.kind == PieceKind::delay_sweep || compares(piece)) && fell)
+    result.outcome = "fell";
+  else if (reason == StopReason::duration)
+    result.outcome = piece.kind != PieceKind::delay_sweep                  ? "done"
                      : result.theta_amplitude_rad < piece.stable_below_rad ? "stable"
                                                                            : "oscillating";
   if (result.outcome == "oscillating")
@@ -188,45 +296,80 @@ TrialResult judge_trial(const ExperimentTrial& trial, const Piece& piece, const 
   return result;
 }
 
+namespace {
+
+/// A controller with the plants it reckons with, not where they are: one that was changed since is another.
+std::string controller_text(ControlConfig control) {
+  std::string text;
+  if (control.has_state_estimator()) text += plant_text(read_plant_file(control.state_estimator.plant));
+  if (control.compensation.kind == CompensationKind::predictor)
+    text += plant_text(read_plant_file(control.compensation.plant));
+  control.state_estimator.plant = control.compensation.plant = "-";
+  return gain_text(control) + text;
+}
+
+}  // namespace
+
 std::string experiment_record(const ExperimentSetup& setup, const std::vector<Piece>& pieces) {
   std::string text =
       "# The experiment as it is run; trials.csv says how far it is.\nname: " + setup.experiment.name +
       "\nrig: " + std::filesystem::absolute(setup.rig.file).string() + "\npieces:\n";
   for (const Piece& piece : pieces) text += "  - " + piece_text(piece) + "\n";
+  if (!setup.controllers.empty()) text += "controllers:\n";
+  for (const auto& [file, control] : setup.controllers)
+    text += "  - " + yaml_quoted(controller_text(control)) + "\n";
   return text;
+}
+
+std::string csv_name(const std::filesystem::path& file) {
+  std::string name = file.string();
+  for (char& c : name)
+    if (c == ',' || c == '"' || static_cast<unsigned char>(c) < 0x20) c = '_';
+  return name;
 }
 
 std::vector<TrialResult> read_trials(const std::filesystem::path& folder, const ExperimentSetup& setup,
                                      const std::vector<Piece>& pieces) {
-  std::ifstream record(folder / "experiment.yaml", std::ios::binary);
+  const std::unique_ptr<InputFile> record = InputFile::if_there(folder / "experiment.yaml");
   if (!record) return {};
   std::stringstream text;
-  text << record.rdbuf();
+  text << record->rdbuf();
   if (text.str() != experiment_record(setup, pieces))
-    throw ConfigError("choose another folder with --out: " + folder.string() +
-                      " holds another experiment, or another rig's");
-  return read_trials(folder);
+    throw ConfigError(folder.string() +
+                      " holds another experiment, or another rig's: choose another folder with --out");
+  return read_trials(folder, pieces);
+}
+
+std::vector<TrialResult> read_trials(const std::filesystem::path& folder, const std::vector<Piece>& pieces) {
+  std::vector<TrialResult> results = read_trials(folder);
+  for (std::size_t i = 0; i < results.size(); ++i) {
+    TrialResult& r = results[i];
+    if (r.trial.piece >= pieces.size()) refuse_line(folder / journal_name, i + 2);
+    const std::vector<NamedGains>& controllers = pieces[r.trial.piece].controllers;
+    if (controllers.empty()) continue;
+    const auto at = std::find_if(controllers.begin(), controllers.end(),
+                                 [&](const NamedGains& c) { return c.name == r.controller; });
+    if (at == controllers.end()) refuse_line(folder / journal_name, i + 2);
+    r.trial.controller = static_cast<std::size_t>(at - controllers.begin());
+  }
+  std::erase_if(results, [&](const TrialResult& r) {
+    return pieces[r.trial.piece].kind == PieceKind::delay_sweep && !is_sweep_outcome(r.outcome);
+  });
+  return results;
 }
 
 std::vector<TrialResult> read_trials(const std::filesystem::path& folder) {
   std::vector<TrialResult> results;
-  std::ifstream in(folder / journal_name, std::ios::binary);
+  const std::filesystem::path file = folder / journal_name;
+  const std::unique_ptr<InputFile> in = InputFile::if_there(file);
+  if (!in) return results;
   std::string line;
-  std::getline(in, line);
-  while (std::getline(in, line)) {
-    const std::vector<std::string> cells = cells_of(line);
+  std::getline(*in, line);
+  for (std::size_t number = 2; std::getline(*in, line); ++number) {
     // A line that was being written when the power went has no end.
-    if (in.eof() || cells.size() != 12) break;
+    if (in->eof()) break;
     TrialResult r;
-    r.trial = {static_cast<std::size_t>(std::stoul(cells[0])), std::stoi(cells[2]), std::stod(cells[3])};
-    r.run_directory = cells[4];
-    r.reason = cells[5];
-    r.outcome = cells[6];
-    r.theta0_rad = std::stod(cells[7]);
-    r.theta_amplitude_rad = std::stod(cells[8]);
-    r.cart_amplitude_m = std::stod(cells[9]);
-    r.fall_time_s = std::stod(cells[10]);
-    r.frequency_hz = std::stod(cells[11]);
+    if (!read_line(line, r)) refuse_line(file, number);
     results.push_back(std::move(r));
   }
   return results;
@@ -261,13 +404,16 @@ void write_sweep_tables(const std::filesystem::path& folder, const std::vector<P
 
 void write_trials(const std::filesystem::path& folder, const std::vector<Piece>& pieces,
                   const std::vector<TrialResult>& results) {
+  refuse_lost_runs(folder, results);
   std::string text = std::string(journal_columns) + "\n";
   for (const TrialResult& r : results)
     text += std::to_string(r.trial.piece) + "," + pieces[r.trial.piece].label + "," +
             std::to_string(r.trial.repeat) + "," + exact_text(r.trial.delay_s) + "," + r.run_directory + "," +
             r.reason + "," + r.outcome + "," + exact_text(r.theta0_rad) + "," +
             exact_text(r.theta_amplitude_rad) + "," + exact_text(r.cart_amplitude_m) + "," +
-            exact_text(r.fall_time_s) + "," + exact_text(r.frequency_hz) + "\n";
+            exact_text(r.fall_time_s) + "," + exact_text(r.frequency_hz) + "," +
+            (r.controller.empty() ? nothing_there : r.controller) + "," +
+            (r.gains.empty() ? nothing_there : r.gains) + "\n";
   write_whole(folder / journal_name, text);
 }
 

@@ -8,6 +8,9 @@ namespace upright {
 /// What experiment.yaml holds: tells one experiment from another.
 std::string experiment_record(const ExperimentSetup& setup, const std::vector<Piece>& pieces);
 
+/// A file name as a cell of trials.csv: what a CSV file would misread becomes an underscore.
+std::string csv_name(const std::filesystem::path& file);
+
 /// Replaces trials.csv as a whole, so that it is never half written.
 void write_trials(const std::filesystem::path& folder, const std::vector<Piece>& pieces,
                   const std::vector<TrialResult>& results);

@@ -17,6 +17,7 @@ LinkTrouble trouble_of(const RigReading& reading) noexcept {
     case RigFault::out_of_range:
       return LinkTrouble::wrong_reply;
     case RigFault::device_refused:
+    case RigFault::device_busy:
       return LinkTrouble::refused;
     default:
       return LinkTrouble::other;

@@ -82,7 +82,9 @@ Finding priority_limit() {
   if (::geteuid() == 0) return {"rtprio", Health::good, "root needs no limit", ""};
   if (limit.rlim_cur >= wanted) return {"rtprio", Health::good, amount(limit.rlim_cur), ""};
   return {"rtprio", Health::poor, "limited to " + amount(limit.rlim_cur),
-          "put '@upright - rtprio 90' into /etc/security/limits.d/upright.conf and log in again"};
+          "join the group upright (groupadd --system upright; usermod --append --groups upright USER), put "
+          "'@upright - "
+          "rtprio 90' into /etc/security/limits.d/upright.conf and log in again"};
 }
 
 Finding memory_limit() {
@@ -91,7 +93,9 @@ Finding memory_limit() {
   if (::geteuid() == 0) return {"memlock", Health::good, "root needs no limit", ""};
   if (limit.rlim_cur == RLIM_INFINITY) return {"memlock", Health::good, "unlimited", ""};
   return {"memlock", Health::poor, "limited to " + amount(limit.rlim_cur) + " bytes",
-          "put '@upright - memlock unlimited' into /etc/security/limits.d/upright.conf and log in again"};
+          "join the group upright (groupadd --system upright; usermod --append --groups upright USER), put "
+          "'@upright - "
+          "memlock unlimited' into /etc/security/limits.d/upright.conf and log in again"};
 }
 
 }  // namespace

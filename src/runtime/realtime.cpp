@@ -82,10 +82,9 @@ RealtimeGrant enter_realtime(const RealtimeRequest& request) {
   if (policy == SCHED_FIFO)
     grant.note = "SCHED_FIFO priority " + std::to_string(grant.priority) + " granted";
   else
-    grant.note =
-        "give the program CAP_SYS_NICE or an rtprio limit for real-time scheduling: SCHED_FIFO was not "
-        "granted (" +
-        std::string(std::strerror(refused)) + "), " + grant.policy + " wakes up to milliseconds late";
+    grant.note = "SCHED_FIFO was not granted (" + std::string(std::strerror(refused)) +
+                 "; give the program CAP_SYS_NICE or an rtprio limit), and " + grant.policy +
+                 " wakes up to milliseconds late";
   grant.note += locked ? ", memory locked"
                        : ", memory not locked (" + std::string(std::strerror(lock_error)) +
                              "; give it CAP_IPC_LOCK or a memlock limit)";

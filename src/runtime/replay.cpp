@@ -2,6 +2,7 @@
 
 #include <bit>
 #include <cmath>
+#include <string>
 #include <utility>
 
 namespace upright {
@@ -17,8 +18,8 @@ bool same(double a, double b) {
 /// Takes rows in their order.
 class Replayer {
  public:
-  Replayer(const RunRecord& run, std::unique_ptr<DelayCompensator> compensator, CommandSource* source)
-      : controller_(run.control, run.rig.amplifier.limit_v, std::move(compensator)),
+  Replayer(const RunRecord& run, ModelParts parts, CommandSource* source)
+      : controller_(run.control, run.rig.amplifier.limit_v, std::move(parts)),
         scaler_(calibration_in_use(run.rig)) {
     controller_.follow(source);
   }
@@ -58,18 +59,21 @@ class Replayer {
 
 }  // namespace
 
-ReplayResult replay(const RunRecord& run, std::unique_ptr<DelayCompensator> compensator,
-                    CommandSource* source) {
-  Replayer replayer(run, std::move(compensator), source);
+ReplayResult replay(const RunRecord& run, ModelParts parts, CommandSource* source) {
+  Replayer replayer(run, std::move(parts), source);
   for (const LogRecord& row : run.samples.rows)
     if (!replayer.take(row)) break;
   return replayer.result();
 }
 
-ReplayResult replay(const RunRecord& run, SampleReader& rows, std::unique_ptr<DelayCompensator> compensator,
-                    CommandSource* source) {
-  Replayer replayer(run, std::move(compensator), source);
+ReplayResult replay(const RunRecord& run, SampleReader& rows, ModelParts parts, CommandSource* source,
+                    const ProgressCallback& progress) {
+  constexpr std::uint64_t rows_between_reports = 16384;
+  Replayer replayer(run, std::move(parts), source);
   for (LogRecord row; rows.next(row) && replayer.take(row); row = {}) {
+    const std::uint64_t done = replayer.result().rows;
+    if (progress && done % rows_between_reports == 0)
+      progress(rows.share_read(), std::to_string(done) + " rows");
   }
   return replayer.result();
 }

@@ -1,6 +1,7 @@
 #include "upright/runtime/run_directory.hpp"
 
 #include <fcntl.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -11,6 +12,7 @@
 #include "upright/model/error.hpp"
 #include "upright/model/plant_file.hpp"
 #include "upright/runtime/provenance.hpp"
+#include "upright/runtime/zero_volts.hpp"
 
 namespace upright {
 
@@ -74,6 +76,7 @@ std::string loop_text(const RunSetup& setup) {
          "\n  fall_angle_rad: " + exact_text(limits.fall_angle_rad) +
          "\n  watchdog_s: " + exact_text(limits.watchdog_s) +
          "\n  most_periods_late: " + std::to_string(limits.most_periods_late) +
+         "\n  encoder_watch: " + encoder_assumptions_text(limits.encoders) +
          "\n  delay_is_exact: " + yes(delay.exact()) + "  # false: linear between samples\n" +
          "  delay_periods: " + exact_text(static_cast<double>(delay.whole_periods()) + delay.fraction()) +
          "\n";
@@ -127,12 +130,16 @@ std::string link_text(const LinkCounts& link) {
 std::string outcome_text(const LoopOutcome& o, const LoopLimits& limits, const LogSummary& log) {
   const LoopCounts& c = o.counts;
   std::string text = "outcome:\n  result: " + std::string(result_of(o)) + "\n  reason: " + name_of(o.reason) +
-                     "\n  sentence: " + yaml_quoted(sentence_of(o, limits)) +
+                     "\n  sentence: " + yaml_quoted(sentence_of(o, limits, log)) +
                      "\n  time_s: " + exact_text(o.time_s) +
                      "\n  started_monotonic_s: " + exact_text(static_cast<double>(o.start_ns) * 1e-9) +
                      "\n  tick: " + std::to_string(o.first_bad_tick) +
                      "\n  worst_theta_rad: " + exact_text(o.worst_theta_rad) +
                      "\n  worst_cart_m: " + exact_text(o.worst_cart_m) + "\n";
+  text += std::string("  zero_volts: ") + name_of_zero(o.stop) +
+          "\n  zero_volts_read_back: " + yes(o.stop.read_back) +
+          "\n  amplifier_disabled: " + yes(o.stop.disabled) +
+          "\n  zero_volts_sentence: " + yaml_quoted(sentence_of(o.stop)) + "\n";
   text += "  rows_written: " + std::to_string(log.rows_written) +
           "\n  rows_dropped: " + std::to_string(log.rows_dropped) + "\n";
   if (!log.failure.empty()) text += "  log_failure: " + yaml_quoted(log.failure) + "\n";
@@ -151,9 +158,9 @@ std::string outcome_text(const LoopOutcome& o, const LoopLimits& limits, const L
   return text;
 }
 
-/// Writes a whole file over whatever room it has already, and syncs it.
-bool write_file(const std::filesystem::path& file, const std::string& text, std::size_t room) {
-  const int fd = ::open(file.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0644);
+/// Writes a whole file of a folder over whatever room it has already, and syncs it.
+bool write_file(int folder, const char* name, const std::string& text, std::size_t room) {
+  const int fd = ::openat(folder, name, O_WRONLY | O_CREAT | O_CLOEXEC, 0644);
   if (fd < 0) return false;
   std::size_t done = 0;
   while (done < text.size()) {
@@ -171,13 +178,6 @@ bool write_file(const std::filesystem::path& file, const std::string& text, std:
   return ::close(fd) == 0 && good;
 }
 
-void sync_folder(const std::filesystem::path& folder) {
-  const int fd = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  if (fd < 0) return;
-  ::fsync(fd);
-  ::close(fd);
-}
-
 }  // namespace
 
 const char* result_of(const LoopOutcome& outcome) noexcept {
@@ -185,24 +185,62 @@ const char* result_of(const LoopOutcome& outcome) noexcept {
   return outcome.reason == StopReason::fell ? "fell" : "stopped";
 }
 
+std::string sentence_of(const LoopOutcome& outcome, const LoopLimits& limits, const LogSummary& log) {
+  const std::string sentence = sentence_of(outcome, limits);
+  if (outcome.reason != StopReason::log_failed || log.failure.empty()) return sentence;
+  return sentence + ": " + log.failure;
+}
+
 RunDirectory::RunDirectory(const std::filesystem::path& parent, const std::string& label) {
   if (!is_plain(label))
-    throw ConfigError("use letters, digits, '.', '_' and '-' in --label: '" + label + "' has something else");
+    throw ConfigError(
+        "the label '" + label +
+        "' has a character that folders should not have: use letters, digits, '.', '_' and '-' in --label");
   std::error_code problem;
   std::filesystem::create_directories(parent, problem);
   if (problem)
-    throw ConfigError("name a folder that can be made and written: " + parent.string() + " cannot (" +
-                      problem.message() + ")");
+    throw ConfigError("the folder " + parent.string() + " cannot be made or written (" + problem.message() +
+                      "): name another with --out");
   started_utc_ = utc_now("%Y-%m-%dT%H:%M:%SZ");
   const std::string name = utc_now("%Y%m%dT%H%M%SZ") + "-" + label;
   constexpr int most_tries = 10000;
   for (int i = 1; i <= most_tries; ++i) {
     path_ = parent / (i == 1 ? name : name + "-" + std::to_string(i));
-    if (std::filesystem::create_directory(path_, problem)) return;
+    if (std::filesystem::create_directory(path_, problem)) {
+      hold();
+      return;
+    }
     if (problem) break;
   }
-  throw ConfigError("name a folder that can be written: cannot make " + path_.string() + " (" +
-                    problem.message() + ")");
+  throw ConfigError("cannot make " + path_.string() + " (" + problem.message() +
+                    "): name a folder that can be written");
+}
+
+RunDirectory::~RunDirectory() {
+  if (descriptor_ >= 0) ::close(descriptor_);
+}
+
+void RunDirectory::hold() {
+  descriptor_ = ::open(path_.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (descriptor_ < 0)
+    throw ConfigError("cannot open " + path_.string() + " (" + std::strerror(errno) +
+                      "): name a folder that can be written");
+}
+
+std::filesystem::path RunDirectory::path_now() const {
+  struct stat held {
+  }, named{};
+  if (::fstat(descriptor_, &held) != 0) return {};
+  if (::stat(path_.c_str(), &named) == 0 && named.st_ino == held.st_ino && named.st_dev == held.st_dev)
+    return path_;
+  // The kernel's own name for it; one that was removed no longer leads there.
+  std::error_code problem;
+  std::filesystem::path now =
+      std::filesystem::read_symlink("/proc/self/fd/" + std::to_string(descriptor_), problem);
+  if (problem || ::stat(now.c_str(), &named) != 0 || named.st_ino != held.st_ino ||
+      named.st_dev != held.st_dev)
+    return {};
+  return now;
 }
 
 void RunDirectory::write_start(const RunSetup& setup) {
@@ -219,19 +257,20 @@ void RunDirectory::write_start(const RunSetup& setup) {
   text += setup.experiment_text;
   text += flags_text();
   start_text_ = text;
-  if (!write_file(path_ / "run.yaml", text, 0) || !write_file(path_ / completed_name, "", room_for_outcome))
-    throw ConfigError("free space where the run directory goes: cannot write " +
-                      (path_ / "run.yaml").string());
-  sync_folder(path_);
+  if (!write_file(descriptor_, "run.yaml", text, 0) ||
+      !write_file(descriptor_, completed_name, "", room_for_outcome))
+    throw ConfigError("cannot write " + (path_ / "run.yaml").string() +
+                      ": free space where the run directory goes");
+  ::fsync(descriptor_);
 }
 
 bool RunDirectory::write_outcome(const LoopOutcome& outcome, const LoopLimits& limits,
                                  const LogSummary& log) noexcept {
   try {
-    const std::filesystem::path completed = path_ / completed_name;
-    if (!write_file(completed, start_text_ + outcome_text(outcome, limits, log), 0)) return false;
-    std::filesystem::rename(completed, path_ / "run.yaml");
-    sync_folder(path_);
+    if (!write_file(descriptor_, completed_name, start_text_ + outcome_text(outcome, limits, log), 0) ||
+        ::renameat(descriptor_, completed_name, descriptor_, "run.yaml") != 0)
+      return false;
+    ::fsync(descriptor_);
     return true;
   } catch (const std::exception&) {
     return false;

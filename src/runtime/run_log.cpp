@@ -3,6 +3,7 @@
 #include <fcntl.h>
 #include <pthread.h>
 #include <sched.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -22,7 +23,7 @@ namespace {
 using namespace std::chrono_literals;
 
 constexpr auto writer_pause = 10ms;
-constexpr auto sync_pause = 50ms;
+constexpr auto keep_pause = 50ms;
 // Of a loop in virtual time: nothing but a simulation waits for a slow disk, only a dead writer ends it.
 constexpr auto full_queue_patience = 60s;
 constexpr std::size_t buffer_bytes = 64 * 1024;
@@ -89,19 +90,22 @@ RunLog::RunLog(const std::filesystem::path& file, const Options& options)
     : file_(file), options_(options), queue_(options.queue_rows), buffer_(buffer_bytes) {
   fd_ = ::open(file.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0644);
   if (fd_ < 0)
-    throw Error(ExitCode::usage, "check the folder and its free space: cannot create " + file.string() +
-                                     " (" + std::strerror(errno) + ")");
+    throw Error(ExitCode::usage, "cannot create " + file.string() + " (" + std::strerror(errno) +
+                                     "): check the folder and its free space");
+  // By the folder's descriptor the file is found where somebody moves the whole folder.
+  folder_fd_ = ::open((file.parent_path() / ".").c_str(), O_PATH | O_DIRECTORY | O_CLOEXEC);
   const std::string header = std::string(sample_columns) + "\n";
   if (!write_all(header.data(), header.size())) {
-    ::close(fd_);
-    throw Error(ExitCode::usage, failure());
+    const std::string why = failure();
+    close();
+    throw Error(ExitCode::usage, why);
   }
   try {
     writer_ = std::thread([this] { write_loop(); });
-    if (options_.sync_while_running) syncer_ = std::thread([this] { sync_loop(); });
+    keeper_ = std::thread([this] { keep_loop(); });
   } catch (const std::exception&) {
     close();
-    throw Error(ExitCode::device, "raise the limit on threads (ulimit -u): the log's writer could not start");
+    throw Error(ExitCode::device, "the log's writer could not start: raise the limit on threads (ulimit -u)");
   }
 }
 
@@ -144,6 +148,12 @@ void RunLog::push_waiting(const LogRecord& record) noexcept {
 }
 
 bool RunLog::write_all(const char* text, std::size_t size) noexcept {
+  // Here, since what is written next would bring a file that was cut back to its length.
+  struct stat held {};
+  if (::fstat(fd_, &held) == 0 && held.st_size < size_.load(std::memory_order_relaxed)) {
+    file_state_.store(LogFileState::cut, std::memory_order_relaxed);
+    return false;
+  }
   std::size_t done = 0;
   while (done < size) {
     const ssize_t written = ::write(fd_, text + done, size - done);
@@ -156,12 +166,12 @@ bool RunLog::write_all(const char* text, std::size_t size) noexcept {
     break;
   }
   if (done == size) {
-    size_ += static_cast<std::int64_t>(size);
+    size_.fetch_add(static_cast<std::int64_t>(size), std::memory_order_release);
     return true;
   }
   // What arrived stays, up to its last whole row.
   while (done > 0 && text[done - 1] != '\n') --done;
-  size_ += static_cast<std::int64_t>(done);
+  size_.fetch_add(static_cast<std::int64_t>(done), std::memory_order_release);
   rows_.fetch_add(static_cast<std::uint64_t>(std::count(text, text + done, '\n')), std::memory_order_relaxed);
   if (::ftruncate(fd_, size_) != 0) return false;
   return false;
@@ -209,11 +219,31 @@ void RunLog::write_loop() noexcept {
   }
 }
 
-void RunLog::sync_loop() noexcept {
+void RunLog::look_after_file() noexcept {
+  if (file_state_.load(std::memory_order_relaxed) != LogFileState::in_place) return;
+  // Before the file is asked: the writer may go on meanwhile.
+  const std::int64_t written = size_.load(std::memory_order_acquire);
+  struct stat held {
+  }, named{};
+  if (::fstat(fd_, &held) != 0) return;
+  LogFileState state = LogFileState::in_place;
+  if (held.st_nlink == 0)
+    state = LogFileState::removed;
+  else if (::fstatat(folder_fd_, file_.filename().c_str(), &named, AT_SYMLINK_NOFOLLOW) != 0
+               ? errno == ENOENT
+               : named.st_ino != held.st_ino || named.st_dev != held.st_dev)
+    state = LogFileState::moved;
+  else if (held.st_size < written)
+    state = LogFileState::cut;
+  file_state_.store(state, std::memory_order_relaxed);
+}
+
+void RunLog::keep_loop() noexcept {
   while (!closing_.load(std::memory_order_acquire)) {
-    if (unsynced_.exchange(false) && ::fdatasync(fd_) != 0 && errno != EINVAL)
+    look_after_file();
+    if (options_.sync_while_running && unsynced_.exchange(false) && ::fdatasync(fd_) != 0 && errno != EINVAL)
       error_.store(errno, std::memory_order_relaxed);
-    std::this_thread::sleep_for(sync_pause);
+    std::this_thread::sleep_for(keep_pause);
   }
 }
 
@@ -222,22 +252,44 @@ void RunLog::close() noexcept {
   closing_.store(true, std::memory_order_release);
   if (writer_.joinable()) writer_.join();
   drain();  // what a writer that ended early left behind
-  if (syncer_.joinable()) syncer_.join();
+  if (keeper_.joinable()) keeper_.join();
+  look_after_file();
   if (::fdatasync(fd_) != 0 && errno != EINVAL && !cannot_write())
     error_.store(errno, std::memory_order_relaxed);
   ::close(fd_);
-  fd_ = -1;
+  if (folder_fd_ >= 0) ::close(folder_fd_);
+  fd_ = folder_fd_ = -1;
 }
 
 std::string RunLog::failure() const {
   if (!failed()) return {};
+  const std::string file = file_.string();
+  switch (file_state_.load(std::memory_order_relaxed)) {
+    case LogFileState::in_place:
+      break;
+    case LogFileState::removed: {
+      std::error_code ignored;
+      const bool folder_left = std::filesystem::exists(file_.parent_path(), ignored);
+      return (folder_left ? file : "the run directory " + file_.parent_path().string()) +
+             " was removed while the run went on, so its rows are lost: leave it alone until the run has "
+             "ended";
+    }
+    case LogFileState::moved:
+      return file +
+             " was moved away or replaced while the run went on: leave the run directory alone until the run "
+             "has ended";
+    case LogFileState::cut:
+      return file +
+             " was cut short by another program while the run went on, so rows are lost: leave the run "
+             "directory alone until the run has ended";
+  }
   if (!cannot_write() && rows_dropped() == 0)
-    return "use a faster disk for --out: it held up " + file_.string() + " for longer than the log waits";
+    return "the disk held up " + file + " for longer than the log waits: use a faster disk for --out";
   if (!cannot_write())
-    return "use a faster disk for --out: it held up " + file_.string() + " until " +
-           std::to_string(rows_dropped()) + " rows were lost";
-  return "free space where the run directory goes: " + file_.string() + " could not be written (" +
-         std::strerror(error_.load(std::memory_order_relaxed)) + ")";
+    return "the disk held up " + file + " until " + std::to_string(rows_dropped()) +
+           " rows were lost: use a faster disk for --out";
+  return file + " could not be written (" + std::strerror(error_.load(std::memory_order_relaxed)) +
+         "): free space where the run directory goes";
 }
 
 }  // namespace upright

@@ -3,12 +3,12 @@
 #include <array>
 #include <charconv>
 #include <cmath>
-#include <fstream>
 #include <optional>
 #include <string>
 #include <string_view>
 
 #include "upright/model/error.hpp"
+#include "upright/model/input_file.hpp"
 #include "upright/model/plant_file.hpp"
 
 namespace upright {
@@ -71,8 +71,8 @@ class Header {
       for (std::size_t j = 0; j < present.size(); ++j)
         if (present[j] == known[i]) place_[i] = j;
       if (place_[i] == nowhere && i != sequence)
-        throw ConfigError("restore the header line: " + file.string() + ":1: the column " +
-                          std::string(known[i]) + " is missing");
+        throw ConfigError(file.string() + ":1: the column " + std::string(known[i]) +
+                          " is missing: restore the header line");
     }
   }
 
@@ -112,9 +112,7 @@ bool is_waste(std::string_view text) {
 /// A file line by line, through a buffer that only a longer line makes grow.
 class Lines {
  public:
-  explicit Lines(const std::filesystem::path& file) : in_(file, std::ios::binary) {
-    if (!in_) throw ConfigError("name a run directory: cannot read " + file.string());
-  }
+  explicit Lines(const std::filesystem::path& file) : in_(file) {}
 
   /// Without its end; false when no further line is complete.
   bool next(std::string_view& line) {
@@ -136,6 +134,11 @@ class Lines {
   /// What follows the last complete line holds something, be it a cut line.
   bool has_rest() const { return begin_ < text_.size(); }
 
+  /// Of the file's bytes, those that were taken from it.
+  double share_read() const {
+    return in_.bytes() > 0 ? static_cast<double>(taken_) / static_cast<double>(in_.bytes()) : 1.0;
+  }
+
   /// Everything from here on is waste.
   bool rest_is_waste() {
     do {
@@ -156,12 +159,15 @@ class Lines {
     text_.resize(kept + part_bytes);
     in_.read(text_.data() + kept, part_bytes);
     text_.resize(kept + static_cast<std::size_t>(in_.gcount()));
+    in_.check();
+    taken_ += static_cast<std::uintmax_t>(in_.gcount());
     return text_.size() > kept;
   }
 
-  std::ifstream in_;
+  InputFile in_;
   std::string text_;
   std::size_t begin_ = 0;
+  std::uintmax_t taken_ = 0;
 };
 
 }  // namespace
@@ -187,13 +193,14 @@ class SampleReader::Implementation {
     ++line_number_;
     if (complete && header_->read(line, cells_, row)) return true;
     if (!lines_.rest_is_waste())
-      throw ConfigError("restore the line from a copy: " + file_.string() + ":" +
-                        std::to_string(line_number_) + ": not a row of samples");
+      throw ConfigError(file_.string() + ":" + std::to_string(line_number_) +
+                        ": not a row of samples: restore the line from a copy");
     truncated_ = true;
     return false;
   }
 
   bool truncated() const noexcept { return truncated_; }
+  double share_read() const noexcept { return lines_.share_read(); }
 
  private:
   std::filesystem::path file_;
@@ -217,6 +224,10 @@ bool SampleReader::truncated() const noexcept {
   return implementation_->truncated();
 }
 
+double SampleReader::share_read() const noexcept {
+  return implementation_->share_read();
+}
+
 Samples read_samples(const std::filesystem::path& file) {
   SampleReader reader(file);
   Samples samples;
@@ -228,9 +239,9 @@ Samples read_samples(const std::filesystem::path& file) {
 RunRecord read_run_without_samples(const std::filesystem::path& directory) {
   std::error_code problem;
   if (!std::filesystem::is_directory(directory, problem))
-    throw ConfigError("name a run directory: " + directory.string() + " is none");
+    throw ConfigError(directory.string() + " is no folder: name a run directory");
   if (!std::filesystem::exists(directory / "run.yaml", problem))
-    throw ConfigError("name a run directory: " + directory.string() + " has no run.yaml");
+    throw ConfigError(directory.string() + " has no run.yaml: name a run directory");
   const YamlMap document = YamlMap::from_file(directory / "run.yaml");
   const YamlMap run = document.map("run");
   RunRecord record{directory,

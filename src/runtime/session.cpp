@@ -10,6 +10,7 @@
 #include "upright/model/error.hpp"
 #include "upright/model/plant_file.hpp"
 #include "upright/runtime/cpu_latency.hpp"
+#include "upright/runtime/sign_check.hpp"
 
 namespace upright {
 
@@ -19,24 +20,34 @@ using namespace std::chrono_literals;
 
 constexpr double log_patience_s = 2.0;  // ordinary disks stand still for a second now and then
 
-/// Whatever happens, the motor ends at zero volts.
-class StopAtEnd {
- public:
-  explicit StopAtEnd(Rig& rig) : rig_(rig) {}
-  ~StopAtEnd() { rig_.stop(); }
-  StopAtEnd(const StopAtEnd&) = delete;
-  StopAtEnd& operator=(const StopAtEnd&) = delete;
+/// Puts the controller's plant files beside the log, so that the run replays wherever it is taken.
+void keep_plants(const RunDirectory& directory, ControlConfig& control) {
+  const auto keep = [&](std::filesystem::path& plant, const char* name) {
+    write_plant_file(read_plant_file(plant), directory.path() / name);
+    plant = name;
+  };
+  if (control.compensation.kind == CompensationKind::predictor)
+    keep(control.compensation.plant, "prediction_plant.yaml");
+  if (control.has_state_estimator()) keep(control.state_estimator.plant, "estimation_plant.yaml");
+}
 
- private:
-  Rig& rig_;
-};
-
-/// Puts the predictor's plant file beside the log, so that the run replays wherever it is taken.
-void keep_prediction_plant(const RunDirectory& directory, ControlConfig& control) {
-  if (control.compensation.kind != CompensationKind::predictor) return;
-  const std::filesystem::path name = "prediction_plant.yaml";
-  write_plant_file(read_plant_file(control.compensation.plant), directory.path() / name);
-  control.compensation.plant = name;
+/// Writes the outcome. A run whose rows or outcome were not kept is not a completed one.
+void complete(RunDirectory& directory, const LoopLimits& limits, SessionResult& result) {
+  StopReason& reason = result.outcome.reason;
+  if (!result.log.failure.empty() && reason == StopReason::duration) reason = StopReason::log_failed;
+  result.outcome_written = directory.write_outcome(result.outcome, limits, result.log);
+  result.made_at = directory.path();
+  result.directory = directory.path_now();
+  if (result.outcome_written && !result.directory.empty()) return;
+  if (reason == StopReason::duration) reason = StopReason::log_failed;
+  if (result.log.failure.empty())
+    result.log.failure = result.directory.empty()
+                             ? "the run directory " + directory.path().string() +
+                                   " was removed while the run went on, so its rows are lost: leave it alone "
+                                   "until the run has ended"
+                             : (result.directory / "run.yaml").string() +
+                                   " could not be completed: free space where the run directory goes";
+  if (result.directory.empty()) result.directory = directory.path();
 }
 
 }  // namespace
@@ -45,6 +56,21 @@ std::uint64_t default_periods_late(double period_s) {
   constexpr double tolerated_s = 0.05;
   constexpr std::uint64_t at_least = 3;
   return std::max(at_least, static_cast<std::uint64_t>(std::ceil(tolerated_s / period_s)));
+}
+
+LoopLimits rig_limits(const RigFile& rig, const std::optional<Plant>& plant) {
+  LoopLimits limits;
+  limits.track_limit_m = rig.track_limit_m;
+  limits.fall_angle_rad = rig.fall_angle_rad;
+  limits.watchdog_s = rig.watchdog_s;
+  limits.coast_s = rig.coast_s;
+  limits.signs_unproven = !is_simulated(rig) && !signs_are_checked(rig);
+  if (rig.encoder_watch) limits.encoders = *rig.encoder_watch;
+  if (plant) {
+    const EncoderAssumptions implied = encoder_assumptions(*plant, rig.track_limit_m, rig.amplifier.limit_v);
+    limits.encoders = rig.encoder_watch ? either(implied, *rig.encoder_watch) : implied;
+  }
+  return limits;
 }
 
 void find_zero(Rig& rig, Clock& clock, RigFile& file, double patience_s) {
@@ -71,22 +97,24 @@ void find_zero(Rig& rig, Clock& clock, RigFile& file, double patience_s) {
     clock.sleep_until(now_ns + pause_ns);
   }
   if (is_emergency_stop(last_fault))
-    throw DeviceError("release the emergency stop when it is safe: it is pressed, or its wire is cut");
+    throw DeviceError("the emergency stop is pressed, or its wire is cut: release it when it is safe");
   if (is_limit_switch(last_fault))
-    throw DeviceError("bring the cart to the middle: a limit switch is active, or its wire is cut");
-  throw DeviceError("check the encoders' link: no fresh counts came to take the zero from");
+    throw DeviceError("a limit switch is active, or its wire is cut: bring the cart to the middle");
+  throw DeviceError("no fresh counts came to take the zero from: check the encoders' link");
 }
 
-SessionResult run_session(RunSetup setup, Rig& rig, Clock& clock, const SignalFlag& signal,
-                          SessionOptions options) {
-  const StopAtEnd stop_at_end(rig);
+namespace {
+
+/// Everything but the rig's stop where it throws.
+SessionResult run_to_its_stop(RunSetup setup, Rig& rig, Clock& clock, const SignalFlag& signal,
+                              SessionOptions options) {
   std::optional<CpuLatencyHold> awake;
   if (!clock.is_virtual()) awake.emplace();
-  Controller controller(setup.control, setup.rig.amplifier.limit_v, std::move(options.compensator));
+  Controller controller(setup.control, setup.rig.amplifier.limit_v, std::move(options.parts));
   controller.follow(options.source);
   PoseScaler scaler(calibration_in_use(setup.rig));
   RunDirectory directory(options.out, setup.label);
-  keep_prediction_plant(directory, setup.control);
+  keep_plants(directory, setup.control);
   RunLog::Options log_options;
   log_options.sync_while_running = !clock.is_virtual();
   log_options.queue_rows = options.log_queue_rows;
@@ -105,6 +133,7 @@ SessionResult run_session(RunSetup setup, Rig& rig, Clock& clock, const SignalFl
   std::thread thread([&] {
     try {
       if (!clock.is_virtual()) setup.scheduling = enter_realtime(options.realtime);
+      result.outcome.realtime = setup.scheduling.policy == "SCHED_FIFO";
       if (awake && awake->held()) setup.scheduling.note += ", processors kept out of deep sleep";
       directory.write_start(setup);
       const std::uint64_t faults_before = page_faults();
@@ -119,14 +148,27 @@ SessionResult run_session(RunSetup setup, Rig& rig, Clock& clock, const SignalFl
     if (options.show) options.show(live);
   thread.join();
   over.get();
+  if (!result.outcome.stop.done()) result.outcome.stop = stop_and_wait(rig, clock, options.stop);
   log.close();
   result.elapsed_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - started).count();
   result.scheduling = setup.scheduling;
   result.log = {log.rows_written(), log.rows_dropped(), log.failure()};
-  if (log.failed() && result.outcome.reason == StopReason::duration)
-    result.outcome.reason = StopReason::log_failed;
-  result.outcome_written = directory.write_outcome(result.outcome, setup.limits, result.log);
+  complete(directory, setup.limits, result);
   return result;
+}
+
+}  // namespace
+
+SessionResult run_session(RunSetup setup, Rig& rig, Clock& clock, const SignalFlag& signal,
+                          SessionOptions options) {
+  const StopWatcher watcher = options.stop;
+  try {
+    return run_to_its_stop(std::move(setup), rig, clock, signal, std::move(options));
+  } catch (const std::exception& problem) {
+    const StopReport report = stop_and_wait(rig, clock, watcher);
+    if (report.done()) throw;
+    throw DeviceError(sentence_of(report) + "; before that: " + problem.what());
+  }
 }
 
 }  // namespace upright

@@ -3,9 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <fstream>
-#include <iterator>
 
 #include "upright/model/error.hpp"
+#include "upright/model/input_file.hpp"
+#include "upright/model/yaml_reader.hpp"
 
 namespace upright {
 
@@ -55,20 +56,20 @@ SignFinding judge_signs(const std::vector<LogRecord>& rows, bool has_pendulum) {
     if (std::abs(pulse.lean_rad) > felt_rad) ++(pulse.lean_rad * pulse.cart_m > 0.0 ? lag : lead);
   }
   if (cart_with + cart_against < 2)
-    return {false, "check amplifier, cable and largest_v: the cart hardly moved"};
+    return {false, "the cart hardly moved: check amplifier, cable and largest_v"};
   if (cart_with > 0 && cart_against > 0)
-    return {false, "check the cart's encoder: the cart moved both ways under the same voltage"};
+    return {false, "the cart moved both ways under the same voltage: check the cart's encoder"};
   if (cart_against > 0)
-    return {
-        false,
-        "turn amplifier.sign, or calibration.cart.sign where +x is the other side: positive voltage moved "
-        "the cart toward -x"};
+    return {false,
+            "positive voltage moved the cart toward -x: turn amplifier.sign, or calibration.cart.sign where "
+            "+x is "
+            "the other side"};
   if (has_pendulum && lag + lead < 2)
-    return {false, "check the pendulum's encoder: it hardly moved when the cart did"};
+    return {false, "the pendulum hardly moved when the cart did: check its encoder"};
   if (has_pendulum && lag > 0 && lead > 0)
-    return {false, "let it hang still and repeat the check: the pendulum swung on its own"};
+    return {false, "the pendulum swung on its own: let it hang still and repeat the check"};
   if (has_pendulum && lead > 0)
-    return {false, "turn calibration.pendulum.sign: the pendulum leaned ahead of the cart"};
+    return {false, "the pendulum leaned ahead of the cart: turn calibration.pendulum.sign"};
   return {true, "positive voltage moves the cart toward +x" +
                     std::string(has_pendulum ? ", and the hanging pendulum lags behind it" : "")};
 }
@@ -78,10 +79,19 @@ std::filesystem::path sign_record_of(const RigFile& rig) {
 }
 
 bool signs_are_checked(const RigFile& rig) {
-  std::ifstream in(sign_record_of(rig), std::ios::binary);
-  const std::string text((std::istreambuf_iterator<char>(in)), std::istreambuf_iterator<char>());
+  if (const auto in = InputFile::if_there(sign_record_of(rig)); !in) return false;
+  const std::string text = whole_file(sign_record_of(rig));
   const std::size_t body = text.find('\n');
   return body != std::string::npos && text.substr(body + 1) == wiring_of(rig);
+}
+
+void require_checked_signs(const RigFile& rig, const std::string& otherwise) {
+  if (is_simulated(rig) || signs_are_checked(rig)) return;
+  throw ConfigError("no sign check was done on this rig as it is wired (there is no matching " +
+                    sign_record_of(rig).string() +
+                    "), and with a wrong sign the loop drives the cart into the end stop: run upright "
+                    "experiment config/experiments/sign-check.yaml --rig " +
+                    rig.file.string() + " first" + otherwise);
 }
 
 void write_sign_record(const RigFile& rig, const std::string& sentence) {
@@ -89,7 +99,7 @@ void write_sign_record(const RigFile& rig, const std::string& sentence) {
   std::ofstream out(file, std::ios::binary);
   out << "# Signs checked: " << sentence << ". Of this wiring:\n" << wiring_of(rig);
   out.close();
-  if (!out) throw ConfigError("make the folder of the rig file writable: cannot write " + file.string());
+  if (!out) throw ConfigError("cannot write " + file.string() + ": make the folder of the rig file writable");
 }
 
 }  // namespace upright

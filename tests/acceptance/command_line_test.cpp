@@ -24,8 +24,29 @@ TEST(CommandLine, UnknownWordsAreAnsweredWithTheNearestKnownOne) {
   expect_one_sentence(run_upright("effects --jsn=3"), "did you mean --json?");
   expect_one_sentence(run_upright("zzzzzzzz"), "no command zzzzzzzz");
   expect_one_sentence(run_upright("effects more"), "'more'");
-  expect_one_sentence(run_upright(""), "name a command");
+  expect_one_sentence(run_upright(""), "no command was given: name one");
   expect_one_sentence(run_upright("check"), "files is required");
+}
+
+TEST(CommandLine, NumbersMustBeFiniteAndFit) {
+  const std::string config = UPRIGHT_SOURCE_DIR "/config/";
+  const std::string rig = "virtual-rig --rig " + config + "rigs/modbus-tcp.yaml --tcp 127.0.0.1:0 ";
+  const std::string run =
+      "run --rig " + config + "rigs/simulated.yaml --gains " + config + "gains/viscous.yaml --fast ";
+  expect_one_sentence(run_upright(rig + "--theta0-deg nan"),
+                      "--theta0-deg: it needs a finite number, and is nan");
+  expect_one_sentence(run_upright(rig + "--hang nan"), "--hang: it needs a finite number, and is nan");
+  expect_one_sentence(run_upright(rig + "--duration inf"),
+                      "--duration: it needs a finite number, and is inf");
+  expect_one_sentence(run_upright(rig + "--inject-late-ms nan"),
+                      "--inject-late-ms: it needs a finite number, and is nan");
+  expect_one_sentence(run_upright(rig + "--inject-seed 18446744073709551616"),
+                      "--inject-seed: it needs a whole number from 0 to");
+  expect_one_sentence(run_upright(run + "--cpu 1023"), "--cpu: this process may not run on processor 1023");
+  expect_one_sentence(run_upright(run + "--seed 18446744073709551616"),
+                      "--seed: it needs a whole number from 0 to");
+  expect_one_sentence(run_upright("design " + config + "plants/viscous.yaml --q 5000,nan,20,20 --r 1"),
+                      "a finite number, and is nan");
 }
 
 TEST(CommandLine, HelpShowsAnExampleForEveryCommand) {
@@ -91,9 +112,10 @@ TEST(CommandLine, ACardThatIsNotThereIsADeviceErrorWithItsRemedy) {
   const std::string nowhere = (folder.path() / "card").string();
   const auto file =
       folder.write("rig.yaml", std::string(rig).replace(rig.find(device), device.size(), nowhere));
-  const CommandResult result = run_upright("run --rig " + shell_quoted(file.string()) + " --gains " +
-                                           shell_quoted(UPRIGHT_SOURCE_DIR "/config/gains/exponential.yaml") +
-                                           " --out " + shell_quoted(folder.path() / "runs"));
+  const CommandResult result =
+      run_upright("run --unchecked --rig " + shell_quoted(file.string()) + " --gains " +
+                  shell_quoted(UPRIGHT_SOURCE_DIR "/config/gains/exponential.yaml") + " --out " +
+                  shell_quoted(folder.path() / "runs"));
   EXPECT_EQ(result.exit_code, 4);
   EXPECT_NE(result.err.find("load the card's driver"), std::string::npos) << result.err;
   EXPECT_NE(result.err.find(nowhere), std::string::npos) << result.err;

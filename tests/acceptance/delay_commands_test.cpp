@@ -109,6 +109,35 @@ TEST(Margin, GivesThePapersCriticalDelays) {
   EXPECT_TRUE(dynamic["roots"]["confirmed"].get<bool>());
 }
 
+TEST(Margin, VerdictComesFirst) {
+  const CommandResult plain = run_upright("margin " + plant("exponential") + " " + gains("exponential"));
+  EXPECT_EQ(plain.out.find("Verdict: on the rig the loop bears 14.2 ms"), 0u) << plain.out;
+  const Json document = json_from("margin " + plant("exponential") + " " + gains("exponential") + " --json");
+  EXPECT_NEAR(document["verdict"]["bears_delay_s"].get<double>(), 0.01415, 5e-5);
+  EXPECT_EQ(document["verdict"]["bears_delay_s"], document["sampled_sliding"]["critical_delay_s"]);
+}
+
+TEST(Margin, OfAPredictorDoesNotContradictItsVerdict) {
+  const CommandResult late = run_upright("margin " + plant("exponential") + " " + gains("compensated"));
+  EXPECT_EQ(late.out.find("Verdict: on the rig the loop bears 121 ms"), 0u) << late.out;
+  EXPECT_EQ(late.out.find("continuous loop\n"), std::string::npos) << "of what, it must say";
+  EXPECT_NE(late.out.find("without their predictor"), std::string::npos) << late.out;
+  EXPECT_NE(late.out.find("it sticks and slips"), std::string::npos) << late.out;
+  const std::string sampled = late.out.substr(0, late.out.find("continuous loop"));
+  EXPECT_EQ(sampled.find("without any delay"), std::string::npos) << late.out;
+}
+
+TEST(Margin, OfALoopThatIsBeyondItSaysSoFirst) {
+  const TemporaryFolder folder;
+  std::string text = read_text(config_folder + "gains/exponential.yaml");
+  text.replace(text.find("delay_s: 0.0"), 12, "delay_s: 0.05");
+  const std::string late = shell_quoted(folder.write("late.yaml", text).string());
+  EXPECT_EQ(run_upright("margin " + plant("exponential") + " " + late).out.find("Verdict: THE LOOP WILL"),
+            0u);
+  EXPECT_EQ(json_from("margin " + plant("exponential") + " " + late + " --json")["verdict"]["will_hold"],
+            false);
+}
+
 TEST(Margin, OfTheDynamicModelWithTheWholeGainOnTheCart) {
   const TemporaryFolder folder;
   const std::string whole = (folder.path() / "whole.yaml").string();
@@ -153,6 +182,26 @@ TEST(Run, StaysUpLateWithThePredictorAndReplaysBitForBitAnywhere) {
   EXPECT_EQ(replayed.exit_code, 0) << replayed.out << replayed.err;
   EXPECT_NE(replayed.out.find("bit for bit"), std::string::npos);
   EXPECT_EQ(run_upright(run_line("exponential", folder, "--duration 20 --delay 0.15")).exit_code, 3);
+}
+
+TEST(Design, MakesAnExtendedKalmanFilterThatRunsAndReplaysBitForBit) {
+  const TemporaryFolder folder;
+  const std::string made = (folder.path() / "quieter.yaml").string();
+  const Json design = json_from("design " + plant("exponential") + " --estimator extended_kalman --out " +
+                                shell_quoted(made) + " --json");
+  EXPECT_EQ(design["trials"]["fell"].get<int>(), 0);
+  EXPECT_LT(design["trials"]["hunting_m"].get<double>(), 0.003);
+  const Json margin = json_from("margin " + plant("exponential") + " " + shell_quoted(made) + " --json");
+  EXPECT_GE(margin["sampled_sliding_unmodelled"]["critical_delay_s"].get<double>(), 0.005);
+  EXPECT_EQ(margin["notes"].size(), 1u);
+  const CommandResult run = run_upright(
+      "run --rig " + shell_quoted(config_folder + "rigs/simulated.yaml") + " --gains " + shell_quoted(made) +
+      " --fast --theta0-deg 3 --duration 10 --json --out " + shell_quoted(folder.path().string()));
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  const auto directory = Json::parse(run.out)["run_directory"].get<std::string>();
+  const CommandResult replayed = run_upright("replay " + shell_quoted(directory));
+  EXPECT_EQ(replayed.exit_code, 0) << replayed.out << replayed.err;
+  EXPECT_NE(replayed.out.find("bit for bit"), std::string::npos);
 }
 
 TEST(Run, SaysAtItsStartWhatTheGainsTolerate) {

@@ -99,6 +99,73 @@ TEST(ExperimentCommand, ADelaySweepFindsWhereItOscillatesAndFalls) {
   }
 }
 
+TEST(ExperimentCommand, TheUnattendedSweepOfTheConfigurationFindsItsTransitions) {
+  const TemporaryFolder folder;
+  const fs::path out = folder.path() / "out";
+  const CommandResult result = run_upright("experiment " + config + "experiments/delay-sweep-swing-up.yaml" +
+                                           rig + " --fast --json --out " + out.string());
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  int falls = 0;
+  const Json document = Json::parse(result.out);
+  for (const Json& trial : document.at("trials")) {
+    EXPECT_NE(trial.at("outcome"), "done");
+    EXPECT_GT(trial.at("theta_amplitude_rad").get<double>(), 0.0);
+    falls += trial.at("outcome") == "fell" ? 1 : 0;
+  }
+  EXPECT_GE(falls, 2);  // at least one in each repeat
+  EXPECT_EQ(read_text(out / "transitions.csv").find("nan"), std::string::npos);
+}
+
+TEST(ExperimentCommand, ASweepInWhichNothingFallsIsNotComplete) {
+  const TemporaryFolder folder;
+  const fs::path file = folder.write(
+      "test.yaml",
+      experiment("    - {kind: delay_sweep, delay_s: [0, 0.002], duration_s: 2, start: hand}\n", "0.34"));
+  const fs::path out = folder.path() / "out";
+  const std::string command = "experiment " + file.string() + rig + " --fast --json --out " + out.string();
+  const CommandResult result = run_upright(command);
+  EXPECT_EQ(result.exit_code, 3) << result.err;
+  EXPECT_NE(result.err.find("nothing fell up to 2"), std::string::npos) << result.err;
+  EXPECT_FALSE(Json::parse(result.out).at("complete"));
+  EXPECT_EQ(run_upright("report " + out.string()).exit_code, 0);
+  EXPECT_NE(read_text(out / "report.html").find("Not complete"), std::string::npos);
+  // There is nothing to go on with.
+  const CommandResult again = run_upright(command);
+  EXPECT_EQ(again.exit_code, 2);
+  EXPECT_NE(again.err.find("nothing fell"), std::string::npos) << again.err;
+}
+
+TEST(ExperimentCommand, ARunOfASweepWithoutAnOutcomeIsMadeAgain) {
+  const TemporaryFolder folder;
+  const fs::path file = folder.write(
+      "test.yaml",
+      experiment("    - {kind: delay_sweep, delay_s: [0, 0.06], duration_s: 3, start: hand}\n", "0.34"));
+  const fs::path out = folder.path() / "out";
+  const std::string command = "experiment " + file.string() + rig + " --fast --json --out " + out.string();
+  ASSERT_EQ(run_upright(command).exit_code, 0);
+  std::string journal = read_text(out / "trials.csv");
+  const std::size_t fell = journal.find(",fell,");
+  ASSERT_NE(fell, std::string::npos);
+  // As earlier versions recorded a run that ended in cycle 0.
+  std::ofstream(out / "trials.csv", std::ios::binary) << journal.replace(fell, 6, ",done,");
+  EXPECT_EQ(run_upright("report " + out.string()).exit_code, 0);
+  EXPECT_NE(read_text(out / "report.html").find("Not complete"), std::string::npos);
+  const CommandResult again = run_upright(command);
+  ASSERT_EQ(again.exit_code, 0) << again.err;
+  EXPECT_EQ(Json::parse(again.out).at("made"), 1);
+  EXPECT_EQ(Json::parse(again.out).at("trials").back().at("outcome"), "fell");
+}
+
+TEST(ExperimentCommand, ALowSignCheckIsMadeAndSaysThatNothingMoved) {
+  const TemporaryFolder folder;
+  const fs::path file = folder.write("test.yaml", experiment("    - {kind: sign_check, largest_v: 0.4}\n"));
+  const fs::path out = folder.path() / "out";
+  const CommandResult result =
+      run_upright("experiment " + file.string() + rig + " --fast --out " + out.string());
+  EXPECT_EQ(result.exit_code, 3) << result.err;
+  EXPECT_NE(result.err.find("hardly moved"), std::string::npos) << result.err;
+}
+
 struct Refusal {
   const char* name;
   std::string pieces, travel, rig;

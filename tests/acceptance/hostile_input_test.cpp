@@ -122,7 +122,8 @@ TEST(HostileSweep, IsRefusedWithAHeaderOfItsOwn) {
 TEST(HostileExperiment, IsShownAsText) {
   const TemporaryFolder folder;
   const std::filesystem::path experiment = hostile_folder(folder);
-  std::ofstream(experiment / "experiment.yaml") << "name: " << in_yaml << "\npieces: []\n";
+  std::ofstream(experiment / "experiment.yaml")
+      << "name: " << in_yaml << "\npieces:\n  - {kind: observe, duration_s: 1}\n";
   std::ofstream(experiment / "trials.csv")
       << "piece,label,repeat,delay_s,run_directory,reason,outcome,theta0_rad,theta_amplitude_rad,cart_"
          "amplitude_m,"
@@ -170,7 +171,8 @@ TEST(HostileYaml, IsRefusedAtOnce) {
   expect_refused_at_once(folder, "deep.yaml", "plant: " + std::string(100'000, '['), "nest less deeply");
   expect_refused_at_once(folder, "deep-map.yaml", "plant: " + std::string(100'000, '{'), "nest less deeply");
   expect_refused_at_once(folder, "large.yaml", "# " + std::string((16 << 20) + 1, 'x'), "larger than 16 MiB");
-  expect_refused_at_once(folder, "several.yaml", "plant: {}\n---\nplant: {}\n", "a second one begins here");
+  expect_refused_at_once(folder, "several.yaml", "plant: {}\n---\nplant: {}\n",
+                         "a second document begins here");
 }
 
 /// Nobody else may change what a run left behind, and a umask that keeps others from reading is kept to.

@@ -55,6 +55,9 @@ void expect_identified(const TemporaryFolder& folder, const std::string& plant,
                                            "plants/viscous.yaml --out " + out.string() + " --json");
   ASSERT_EQ(result.exit_code, 0) << result.err;
   const Json document = Json::parse(result.out);
+  EXPECT_EQ(document.at("verdict"), "explained") << document.at("residual");
+  EXPECT_LT(document.at("gap").at("after"), 1.1);
+  EXPECT_GT(document.at("gap").at("before"), 5.0);
   for (const Json& p : document.at("parameters")) {
     const auto at = truth.find(p.at("name").get<std::string>());
     if (at == truth.end()) continue;
@@ -96,6 +99,49 @@ TEST(IdentifyCommand, FindsTables2And3AndThePivot) {
   truth["pivot_coulomb_friction.torque_nm"] = 0.0015;
   truth["pendulum.length_to_com_m"] = 0.305;
   expect_identified(folder, tables + bristles + pivot, {"friction", "pivot"}, truth);
+}
+
+/// Some 40 s of experiments at 250 Hz on the paper's cart with `effects` on top, and what is identified.
+Json short_identification(const TemporaryFolder& folder, const std::string& effects) {
+  const fs::path plant = folder.write("plant.yaml", tables + effects);
+  const fs::path rig = folder.write("rig.yaml", replaced(read_text(config + "rigs/simulated.yaml"),
+                                                         "../plants/exponential.yaml", plant.string()));
+  const fs::path pieces = folder.write(
+      "short.yaml",
+      "experiment:\n  name: short\n  why: a test\n  plant: " + config +
+          "plants/exponential.yaml\n  travel_m: 0.3\n  voltage_limit_v: 10\n  pieces:\n"
+          "    - {kind: constant_voltage, voltages_v: [0.8, 3]}\n"
+          "    - {kind: coast, voltages_v: [2], push_s: 0.4}\n"
+          "    - {kind: multisine, amplitude_v: 4, lowest_hz: 0.3, highest_hz: 8, lines: 10, duration_s: 6, "
+          "fit_to_travel: true}\n"
+          "    - {kind: multisine, amplitude_v: 3, lowest_hz: 0.5, highest_hz: 10, lines: 8, duration_s: 5, "
+          "fit_to_travel: true}\n");
+  const std::string data = (folder.path() / "data").string(), out = (folder.path() / "identified").string();
+  const CommandResult made = run_upright("experiment " + pieces.string() + " --rig " + rig.string() +
+                                         " --fast --rate 250 --out " + data);
+  EXPECT_EQ(made.exit_code, 0) << made.err;
+  const CommandResult result = run_upright("identify --data " + data + " --plant " + config +
+                                           "plants/viscous.yaml --json --out " + out);
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  return Json::parse(result.out);
+}
+
+TEST(IdentifyCommand, SaysWhenItsNumbersDoNotExplainTheData) {
+  for (const char* effect : {"cogging_force, amplitude_n: 0.4, pitch_m: 0.025, phase_rad: 0.4",
+                             "voltage_dead_zone, half_width_v: 0.3", "motor_lag, time_constant_s: 0.02"}) {
+    const TemporaryFolder folder;
+    const Json document = short_identification(folder, std::string("    - {kind: ") + effect + "}\n");
+    EXPECT_EQ(document.at("verdict"), "unexplained") << effect;
+    EXPECT_GT(document.at("gap").at("after"), 1.5) << effect;
+    EXPECT_EQ(document.at("trustworthy"), false);
+    for (const Json& p : document.at("parameters")) EXPECT_EQ(p.at("trustworthy"), false);
+    EXPECT_NE(document.at("next_command").get<std::string>().find("upright diagnose --model"),
+              std::string::npos);
+    EXPECT_FALSE(fs::exists(folder.path() / "identified" / "plant.yaml"));
+    const std::string page = read_text(folder.path() / "identified" / "report.html");
+    EXPECT_EQ(page.find("numbers identified"), std::string::npos);
+    EXPECT_NE(page.find("Unexplained"), std::string::npos);
+  }
 }
 
 TEST(IdentifyCommand, ComesWithinThreePercentOfThePublishedValuesOfEmps) {

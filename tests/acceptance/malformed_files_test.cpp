@@ -413,7 +413,10 @@ TEST_P(MalformedFile, IsRefusedWithRemedyFileLineAndKey) {
   EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
   const std::size_t at = result.err.find(where);
   ASSERT_NE(at, std::string::npos) << "expected " << where << "\n" << result.err;
-  EXPECT_NE(result.err.substr(0, at).find(malformed.remedy), std::string::npos) << result.err;
+  // The cause comes first: file, line and key, and then the remedy.
+  const std::size_t remedy = result.err.rfind(malformed.remedy);
+  ASSERT_NE(remedy, std::string::npos) << result.err;
+  EXPECT_GT(remedy, at) << result.err;
   EXPECT_NE(result.err.find(malformed.key, at), std::string::npos) << result.err;
 }
 

@@ -102,6 +102,37 @@ TEST(Report, RefusesWhatIsNotARunWithOneSentence) {
   }
 }
 
+TEST(Report, TakesSeveralRunsAndPrintsALineForEach) {
+  const TemporaryFolder folder;
+  const std::filesystem::path first = fast_run(folder, "--duration 1"),
+                              second = fast_run(folder, "--duration 1");
+  const CommandResult both = run_upright("report " + shell_quoted(folder.path().string()) + "/*-run*");
+  EXPECT_EQ(both.exit_code, 0) << both.err;
+  EXPECT_EQ(both.out, (first / "report.html").string() + "\n" + (second / "report.html").string() + "\n");
+  // What is no run costs the others nothing, and is said.
+  std::filesystem::remove(second / "report.html");
+  const CommandResult mixed =
+      run_upright("report " + (folder.path() / "none").string() + " " + second.string());
+  EXPECT_EQ(mixed.exit_code, 2);
+  EXPECT_EQ(mixed.out, (second / "report.html").string() + "\n");
+  EXPECT_NE(mixed.err.find("there is no " + (folder.path() / "none").string()), std::string::npos)
+      << mixed.err;
+}
+
+TEST(Report, LatestIsTheRunThatBeganLast) {
+  const TemporaryFolder folder;
+  const std::string latest = "report --latest --out " + shell_quoted(folder.path().string());
+  const CommandResult nothing = run_upright(latest);
+  EXPECT_EQ(nothing.exit_code, 2);
+  EXPECT_NE(nothing.err.find("holds no run"), std::string::npos) << nothing.err;
+  const std::filesystem::path old = fast_run(folder, "--duration 1 --label zz");
+  const std::filesystem::path newer = fast_run(folder, "--duration 1 --label aa");
+  EXPECT_EQ(run_upright(latest).out, (newer / "report.html").string() + "\n");
+  // The name tells when it began, also of a run that was copied later.
+  std::filesystem::rename(newer, folder.path() / "20200101T000000Z-aa");
+  EXPECT_EQ(run_upright(latest).out, (old / "report.html").string() + "\n");
+}
+
 TEST(Report, WithoutGnuplotNamesTheRemedy) {
   const TemporaryFolder folder;
   const std::filesystem::path run = fast_run(folder, "--duration 1");

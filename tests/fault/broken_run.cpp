@@ -35,7 +35,7 @@ std::optional<BrokenRun> broken_run(const std::filesystem::path& rig_file,
   SessionOptions options;
   options.out = runs;
   std::atomic<double> began_s{0.0};
-  options.compensator = std::make_unique<BrokenCompensator>(bad_cycle, began_s);
+  options.parts = std::make_unique<BrokenCompensator>(bad_cycle, began_s);
   const SessionResult result = run_session(setup, *rig, clock, signal, std::move(options));
   if (began_s == 0.0) return std::nullopt;
   return BrokenRun{result.directory, began_s};

@@ -69,8 +69,7 @@ void judge_log(const Evidence& evidence, const std::string& reason) {
     const auto missed =
         static_cast<std::uint64_t>(run.outcome->map("counts").integer("missed", 0, 1'000'000));
     EXPECT_EQ(rows.size() + missed, rows.back().tick + 1) << "every row is there";
-    const bool in_a_cycle = reason != "duration" && reason != "signal" && reason != "log_failed";
-    EXPECT_EQ((rows.back().flags & row_flag::stopped) != 0, in_a_cycle);
+    EXPECT_EQ((rows.back().flags & row_flag::stopped) != 0, reason != "duration");
   }
   if (evidence.replays) {
     EXPECT_FALSE(replay(run).first_mismatch.has_value());

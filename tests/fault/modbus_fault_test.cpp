@@ -121,7 +121,7 @@ class Setting {
   std::vector<std::string> command(double duration_s) const {
     return {UPRIGHT_BINARY, "run",       "--rig",      rig_file(),
             "--gains",      gain_file(), "--duration", std::to_string(duration_s),
-            "--out",        runs(),      "--json"};
+            "--out",        runs(),      "--json",     "--unchecked"};
   }
   ProcessFiles files(double duration_s) const {
     return {command(duration_s), rig_file(), runs(), folder_ / "struck"};

@@ -18,6 +18,7 @@
 #include "shim.hpp"
 #include "upright/hal/guarded_rig.hpp"
 #include "upright/hal/simulated_rig.hpp"
+#include "upright/model/plant_file.hpp"
 #include "upright/runtime/session.hpp"
 
 namespace upright::test {
@@ -51,10 +52,10 @@ class RecordedRig final : public Rig {
     note();
     return rig_->write(voltage_v);
   }
-  void stop() noexcept override {
+  StopReport stop() noexcept override {
     voltage_v_ = 0.0;
     note();
-    rig_->stop();
+    return rig_->stop();
   }
   const std::vector<PlantRow>& rows() const { return rows_; }
 
@@ -113,7 +114,7 @@ class TamperedRig final : public Rig {
     return reading;
   }
   RigFault write(double voltage_v) noexcept override { return plant_->write(sign_ * voltage_v); }
-  void stop() noexcept override { plant_->stop(); }
+  StopReport stop() noexcept override { return plant_->stop(); }
   const RecordedRig& plant() const { return *plant_; }
   double bad_s() const { return bad_s_; }
 
@@ -362,6 +363,7 @@ RunSetup setup_for(const Case& c, bool fast) {
                   setup.rig.watchdog_s,
                   default_periods_late(setup.control.period_s()),
                   setup.rig.coast_s};
+  setup.limits.encoders = rig_limits(setup.rig, read_plant_file(setup.rig.simulated->plant)).encoders;
   return setup;
 }
 
@@ -396,7 +398,7 @@ std::optional<Evidence> evidence_of(const On& on, const Folder& folder) {
   SessionOptions options;
   options.out = folder / "runs";
   std::atomic<double> broken_since_s{0.0};
-  if (c.broken_controller) options.compensator = std::make_unique<BrokenCompensator>(bad, broken_since_s);
+  if (c.broken_controller) options.parts = std::make_unique<BrokenCompensator>(bad, broken_since_s);
   if (c.before) c.before();
   const SessionResult result = run_session(setup, *rig, clock, signal, std::move(options));
   const bool never_struck = c.begins == Begins::when_the_shim_strikes && struck_s() == 0.0;

@@ -42,6 +42,16 @@ class ExperimentOverModbus : public ::testing::TestWithParam<Link> {
     said.exit_code = client.wait();
     return said;
   }
+  /// Exit code of `upright run` with the pendulum hanging: 2 refused, 3 looked and stopped at once.
+  int run() {
+    std::ofstream(folder_ / "gains.yaml")
+        << replaced(text_of(config + "gains/exponential.yaml"), "sample_rate_hz: 1000",
+                    "sample_rate_hz: " + GetParam().rate_hz);
+    Process client({UPRIGHT_BINARY, "run", "--rig", folder_ / "rig.yaml", "--gains", folder_ / "gains.yaml",
+                    "--wait", "0", "--out", folder_ / "runs"});
+    client.rest();
+    return client.wait();
+  }
   std::string ramp() {
     const std::string file = folder_ / "ramp.yaml";
     std::ofstream(file) << "experiment:\n  name: ramp\n  why: a test\n  plant: " << config
@@ -58,10 +68,12 @@ class ExperimentOverModbus : public ::testing::TestWithParam<Link> {
 TEST_P(ExperimentOverModbus, AsksForASignCheckOnceAndThenRuns) {
   EXPECT_EQ(experiment(ramp(), "rig.yaml", "out").exit_code, 2);
   EXPECT_FALSE(std::filesystem::exists(folder_ / "out"));
+  EXPECT_EQ(run(), 2);
   const Said check = experiment(config + "experiments/sign-check.yaml", "rig.yaml", "signs");
   EXPECT_EQ(check.exit_code, 0) << check.out;
   EXPECT_NE(check.out.find("signs agree"), std::string::npos);
   EXPECT_TRUE(std::filesystem::exists(folder_ / "rig.yaml.signs"));
+  EXPECT_EQ(run(), 3);
   const Said ramps = experiment(ramp(), "rig.yaml", "out");
   EXPECT_EQ(ramps.exit_code, 0) << ramps.out;
   double farthest = 0.0;
@@ -70,6 +82,7 @@ TEST_P(ExperimentOverModbus, AsksForASignCheckOnceAndThenRuns) {
   // A sign that was turned after the check is a rig that nobody checked.
   std::ofstream(folder_ / "rig.yaml") << replaced(rig_text_, "sign: 1", "sign: -1");
   EXPECT_EQ(experiment(ramp(), "rig.yaml", "out2").exit_code, 2);
+  EXPECT_EQ(run(), 2);
 }
 
 TEST_P(ExperimentOverModbus, ASignCheckNoticesAWrongSign) {

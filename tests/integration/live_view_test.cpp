@@ -223,7 +223,7 @@ TEST_F(LiveServed, APortInUseIsRefusedWithTheRemedy) {
     const LiveView second(LiveScene{}, LiveOptions{port_, -1, [] {}});
     FAIL() << "two programs share a port";
   } catch (const ConfigError& refused) {
-    EXPECT_NE(std::string(refused.what()).find("--live=PORT"), std::string::npos) << refused.what();
+    EXPECT_NE(std::string(refused.what()).find("--live PORT"), std::string::npos) << refused.what();
   }
 }
 

@@ -109,12 +109,12 @@ TEST_F(ComediTest, ReadsPlainCountersOfTheWidthTheyHave) {
 
 TEST_F(ComediTest, RefusesWhatTheCardDoesNotOffer) {
   std::string sentence = refusal(card_rig_text("[-9, 9]"));
-  EXPECT_TRUE(says(sentence, "give range_v [-10.0, 10.0] or [-5.0, 5.0]: rig.yaml:1: comedi.output"))
-      << sentence;
+  EXPECT_TRUE(says(sentence, "give range_v [-10.0, 10.0] or [-5.0, 5.0]")) << sentence;
+  EXPECT_TRUE(says(sentence, "rig.yaml:1: comedi.output")) << sentence;
   sentence = refusal(replaced(card_rig_text(), "subdevice: 1", "subdevice: 0"));
-  EXPECT_TRUE(says(sentence, "give subdevice 1: ")) << sentence;
+  EXPECT_TRUE(says(sentence, "give subdevice 1")) << sentence;
   sentence = refusal(replaced(card_rig_text(), "channel: 1", "channel: 8"));
-  EXPECT_TRUE(says(sentence, "give channel 0 to 7: ")) << sentence;
+  EXPECT_TRUE(says(sentence, "give channel 0 to 7")) << sentence;
   sentence = refusal(replaced(card_rig_text(), "/dev/comedi0", "/dev/comedi3"));
   EXPECT_TRUE(says(sentence, "load the card's driver")) << sentence;
   const std::string potentiometer =

@@ -40,7 +40,10 @@ class RigBehind final : public Rig {
     behind_.written.push_back(voltage_v);
     return behind_.write_fault;
   }
-  void stop() noexcept override { behind_.stopped = true; }
+  StopReport stop() noexcept override {
+    behind_.stopped = true;
+    return at_zero_volts();
+  }
 
  private:
   Behind& behind_;

@@ -24,7 +24,7 @@ class WithOutput final : public Rig {
   void open() override { rig_->open(); }
   RigReading read() noexcept override { return rig_->read(); }
   RigFault write(double) noexcept override { return RigFault::none; }
-  void stop() noexcept override { rig_->stop(); }
+  StopReport stop() noexcept override { return rig_->stop(); }
 
  private:
   std::unique_ptr<Rig> rig_;

@@ -42,7 +42,7 @@ TEST(GpioRehearsal, TheEmergencyStopEndsARunOfASimulatedRig) {
   sim.pull(LineNumbers::stop, true);
   const std::string said = run.rest();
   EXPECT_EQ(run.wait(), 3) << said;
-  EXPECT_NE(said.find("release the emergency stop"), std::string::npos) << said;
+  EXPECT_NE(said.find("the emergency stop was pressed"), std::string::npos) << said;
   EXPECT_FALSE(sim.level(LineNumbers::enable));
 }
 

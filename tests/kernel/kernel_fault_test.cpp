@@ -49,9 +49,9 @@ Case mishap(const char* fault, Mishap what, const char* cause, Expectation expec
 /// What can befall either rig. `stood_still` is what comes of a controller that stands still for 250 ms.
 std::vector<Case> common_cases(const Expectation& stood_still) {
   std::vector<Case> cases = {
-      mishap("stuck_cart", Mishap::cart_sticks, "check the cart's encoder",
+      mishap("stuck_cart", Mishap::cart_sticks, "the cart's encoder did not count",
              stops({"stuck_encoder"}, stuck_noticed_s)),
-      mishap("stuck_pendulum", Mishap::pendulum_sticks, "check the pendulum's encoder",
+      mishap("stuck_pendulum", Mishap::pendulum_sticks, "the pendulum's encoder did not count",
              stops({"stuck_encoder"}, stuck_noticed_s)),
       mishap("jump", Mishap::cart_jumps, "the counts jumped", stops({"rig_fault"}, 4 * period_s)),
   };

@@ -48,6 +48,7 @@ inline const std::string line_rig_text =
     "amplifier: {limit_v: 10, sign: 1}\n"
     "track: {limit_m: 0.39, coast_s: 0.1}\n"
     "fall_angle_rad: 0.6\n"
+    "encoder_watch: {breakaway_v: {from: 0.3, to: 1.2}, largest_lag_s: 0.01, damping_v_per_mps: 9.5}\n"
     "watchdog_s: 0.1\n"
     "comedi:\n"
     "  cart: {kind: analog_input, device: /dev/comedi1, subdevice: 0, channel: 0, range_v: [-10, 10],\n"

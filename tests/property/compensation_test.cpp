@@ -6,11 +6,12 @@
 #include <cmath>
 #include <memory>
 #include <numbers>
-#include <random>
 #include <string>
 
 #include "upright/analysis/gain_design.hpp"
+#include "upright/analysis/mistaken_plant.hpp"
 #include "upright/analysis/parallel.hpp"
+#include "upright/control/controller.hpp"
 #include "upright/control/predictor.hpp"
 #include "upright/model/plant_file.hpp"
 #include "upright/sim/simulator.hpp"
@@ -25,21 +26,6 @@ constexpr double fall_rad = 1.0;
 
 Plant plant_named(const std::string& name) {
   return read_plant_file(std::string(UPRIGHT_SOURCE_DIR) + "/config/plants/" + name + ".yaml");
-}
-
-/// Every parameter 5 percent up or down.
-Plant mistaken(Plant plant, unsigned seed) {
-  std::mt19937 random(seed);
-  const auto part = [&] { return (random() & 1u) != 0 ? 1.05 : 0.95; };
-  plant.cart_mass_kg *= part();
-  plant.pendulum->mass_kg *= part();
-  plant.pendulum->given_inertia_kgm2 = plant.pendulum->inertia_about_pivot_kgm2() * part();
-  plant.pendulum->length_to_com_m *= part();
-  plant.motor.force_per_volt_n *= part();
-  plant.motor.back_emf_n_per_mps *= part();
-  for (PlantEffect& effect : plant.effects)
-    for (double& value : effect.values) value *= part();
-  return plant;
 }
 
 ControlConfig compensated(const Plant& model, double delay_s) {
@@ -100,7 +86,9 @@ TEST_P(Compensation, StaysUpTo150MillisecondsWithEveryParameter5PercentOff) {
   const Plant plant = plant_named(GetParam()), model = plant_named("viscous");
   for (const double delay_s : {0.01, 0.05, 0.1, 0.15}) {
     const ControlConfig config = compensated(model, delay_s);
-    EXPECT_EQ(falls_of(plant, [&](unsigned seed) { return predicting(config, mistaken(model, seed)); }), 0)
+    EXPECT_EQ(
+        falls_of(plant, [&](unsigned seed) { return predicting(config, mistaken_plant(model, seed, 0.05)); }),
+        0)
         << delay_s;
   }
 }
@@ -109,7 +97,7 @@ TEST_P(Compensation, TheGainsMayComeFromTheMistakenModelToo) {
   const Plant plant = plant_named(GetParam()), model = plant_named("viscous");
   EXPECT_EQ(falls_of(plant,
                      [&](unsigned seed) {
-                       const Plant off = mistaken(model, seed);
+                       const Plant off = mistaken_plant(model, seed, 0.05);
                        return predicting(compensated(off, 0.15), off);
                      }),
             0);

@@ -137,7 +137,7 @@ TEST_F(ComediRigTest, NamesTheRangesThereAre) {
   RigFile file = multiq3_file();
   file.comedi->output->range = {-4, 4};
   const std::string sentence = refusal(file);
-  EXPECT_TRUE(says(sentence, "give range_v [-10.0, 10.0] or [-5.0, 5.0]: ")) << sentence;
+  EXPECT_TRUE(says(sentence, "give range_v [-10.0, 10.0] or [-5.0, 5.0]")) << sentence;
   EXPECT_TRUE(says(sentence, "comedi-multiq3.yaml:1: comedi.output")) << sentence;
 }
 

@@ -10,6 +10,8 @@
 #include "upright/analysis/characteristic_roots.hpp"
 #include "upright/analysis/gain_design.hpp"
 #include "upright/analysis/linear_sampled_loop.hpp"
+#include "upright/analysis/overrun_limit.hpp"
+#include "upright/control/controller.hpp"
 #include "upright/model/plant_file.hpp"
 #include "upright/sim/simulator.hpp"
 
@@ -177,20 +179,67 @@ TEST(OverrunTolerance, CountsPeriodsWithinTheSlidingMargin) {
       overrun_tolerance(plant_named("exponential"), gains_named("exponential"));
   const double sliding =
       sampled_margin(plant_named("viscous"), gains_named("exponential"), 100.0, false).critical_delay_s;
-  EXPECT_TRUE(tolerance.sliding);
+  EXPECT_TRUE(tolerance.stabilized);
+  EXPECT_FALSE(tolerance.exceeded());
   EXPECT_NEAR(tolerance.extra_delay_s, sliding, 1e-9);
   EXPECT_EQ(tolerance.missed_periods, static_cast<int>(std::ceil(sliding * 1000.0)) - 1);
   EXPECT_NE(tolerance.sentence.find("consecutive missed periods"), std::string::npos);
 }
 
-TEST(OverrunTolerance, FallsBackToTheSmoothedPlantAndThenToNone) {
+TEST(OverrunTolerance, NothingIsLeftBeyondTheSlidingMargin) {
   ControlConfig config = gains_named("exponential");
-  config.delay_s = 0.020;
-  const OverrunTolerance beyond_sliding = overrun_tolerance(plant_named("exponential"), config);
-  EXPECT_FALSE(beyond_sliding.sliding);
-  EXPECT_GT(beyond_sliding.missed_periods, 0);
-  config.delay_s = 0.2;
-  EXPECT_EQ(overrun_tolerance(plant_named("exponential"), config).missed_periods, 0);
+  for (const double delay_s : {0.0145, 0.020, 0.05, 0.2}) {
+    config.delay_s = delay_s;
+    const OverrunTolerance tolerance = overrun_tolerance(plant_named("exponential"), config);
+    EXPECT_TRUE(tolerance.stabilized);
+    EXPECT_TRUE(tolerance.exceeded());
+    EXPECT_EQ(tolerance.missed_periods, 0);
+    EXPECT_NEAR(tolerance.critical_delay_s, 0.01415, 5e-5);
+  }
+}
+
+TEST(OverrunTolerance, CoggingWhereTheCartStandsDoesNotDecide) {
+  Plant plant = plant_named("exponential");
+  const OverrunTolerance smooth = overrun_tolerance(plant, gains_named("exponential"));
+  for (const double phase_rad : {0.0, std::numbers::pi}) {
+    plant.set("cogging_force", {2.0, 0.02, phase_rad});
+    EXPECT_NEAR(overrun_tolerance(plant, gains_named("exponential")).extra_delay_s, smooth.extra_delay_s,
+                1e-9);
+  }
+}
+
+TEST(OverrunLimit, OnlyTightensAsTheDelayGrows) {
+  ControlConfig config = gains_named("exponential");
+  std::uint64_t before = 1000;
+  for (double delay_s = 0.0; delay_s < 0.12; delay_s += 0.001) {
+    config.delay_s = delay_s;
+    const OverrunLimit limit = overrun_limit(plant_named("exponential"), config);
+    EXPECT_LE(limit.most_periods_late, before) << delay_s;
+    EXPECT_EQ(limit.warning.empty(), delay_s < 0.01415) << delay_s << limit.warning;
+    before = limit.most_periods_late;
+  }
+  EXPECT_EQ(before, 3u);
+}
+
+TEST(OverrunLimit, WithoutAModelIsTighterThanWhatLeavesTimeBeforeAFallAndSaysSo) {
+  ControlConfig config = gains_named("exponential");
+  const OverrunLimit limit = overrun_limit(std::nullopt, config);
+  EXPECT_FALSE(limit.tolerance);
+  EXPECT_EQ(limit.most_periods_late, 10u);
+  EXPECT_NE(limit.sentence.find("unknown"), std::string::npos) << limit.sentence;
+  EXPECT_EQ(limit.warning, "");
+  config.sample_rate_hz = 100.0;
+  EXPECT_EQ(overrun_limit(std::nullopt, config).most_periods_late, 3u);
+}
+
+TEST(OverrunLimit, GainsThatStabilizeNothingAreToldFromADelayThatIsTooLong) {
+  ControlConfig config = gains_named("exponential");
+  config.gains.pendulum_angle_v_per_rad *= -1.0;
+  const OverrunLimit limit = overrun_limit(plant_named("exponential"), config);
+  ASSERT_TRUE(limit.tolerance);
+  EXPECT_FALSE(limit.tolerance->stabilized);
+  EXPECT_EQ(limit.most_periods_late, 3u);
+  EXPECT_NE(limit.warning.find("do not stabilize"), std::string::npos) << limit.warning;
 }
 
 }  // namespace

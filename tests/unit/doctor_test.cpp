@@ -127,6 +127,27 @@ TEST(Link, CarriesTwoRoundTripsPerPeriod) {
   EXPECT_EQ(judge_link({}, 400.0).health, Health::bad);
 }
 
+TEST(Link, OneSlowExchangeIsNotItsRate) {
+  for (const int trips : {50, 100, 500, 5000}) {
+    LinkProbe probe;
+    for (int i = 1; i < trips; ++i) probe.round_trip.add(500'000);
+    probe.round_trip.add(4'000'000);
+    EXPECT_GT(highest_rate_hz(probe.round_trip), 900.0) << trips;
+  }
+  LinkProbe slow;
+  for (int i = 0; i < 100; ++i) slow.round_trip.add(i % 10 == 0 ? 4'000'000 : 500'000);
+  EXPECT_LT(highest_rate_hz(slow.round_trip), 130.0) << "one in ten is the rate";
+}
+
+TEST(Verdict, AgreesWithTheRateThatTheLinkCarries) {
+  const DurationHistogram trips = all_of(4'000'000);  // carries 125 Hz
+  EXPECT_NE(verdict_sentence(Health::poor, 1000.0, &trips).find("not fit for 1000 Hz"), std::string::npos);
+  EXPECT_EQ(verdict_sentence(Health::good, 100.0, &trips), "fit to run a rig");
+  EXPECT_EQ(verdict_sentence(Health::poor, 100.0, &trips).rfind("fit to run a rig", 0), 0u);
+  EXPECT_EQ(verdict_sentence(Health::bad, 1000.0, &trips).rfind("not fit to run a rig", 0), 0u);
+  EXPECT_EQ(verdict_sentence(Health::good, 1000.0, nullptr), "fit to run a rig") << "no link was measured";
+}
+
 Calibration ip02() {
   Calibration calibration;
   calibration.cart = {2.27485e-5, 1, 32, 5.0};
@@ -180,7 +201,7 @@ class MovedRig final : public Rig {
     ADD_FAILURE() << "a voltage was written";
     return RigFault::none;
   }
-  void stop() noexcept override {}
+  StopReport stop() noexcept override { return at_zero_volts(); }
 
  private:
   Clock& clock_;
@@ -248,7 +269,7 @@ class WiredRig final : public Rig {
     ADD_FAILURE() << "a voltage was written";
     return RigFault::none;
   }
-  void stop() noexcept override {}
+  StopReport stop() noexcept override { return at_zero_volts(); }
   SafetyInputs safety_inputs() const noexcept override { return inputs; }
 
  private:

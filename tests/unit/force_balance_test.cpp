@@ -71,6 +71,31 @@ TEST(ForceBalance, ReadsBreakawayFromARampInBothDirections) {
   }
 }
 
+TEST(ForceBalance, AJumpOfTheVoltageShowsNoBreakaway) {
+  for (const double volts : {0.34, 1.5}) {
+    const auto jump = [&](double t) { return t < 1.0 ? 0.0 : volts; };
+    EXPECT_TRUE(find_breakaways({run(cart(0.0), 3.0, jump)}, cart(0.0)).empty()) << volts;
+  }
+}
+
+TEST(ForceBalance, ACartThatIsPushedDuringARampShowsNoBreakaway) {
+  const auto pushed = [](double t) { return 0.1 * t + (t > 2.0 ? 0.3 : 0.0); };
+  EXPECT_TRUE(find_breakaways({run(cart(0.0), 4.0, pushed)}, cart(0.0)).empty());
+}
+
+TEST(ForceBalance, ASpeedThatStillGrowsIsNotSteady) {
+  Plant light = cart(0.0);  // a time constant of 1.1 s
+  light.motor.back_emf_n_per_mps = 0.3;
+  light.set("viscous_friction", {0.5});
+  EXPECT_TRUE(find_steady_points({run(light, 1.5, [](double) { return 1.0; })}, light).empty());
+}
+
+TEST(ForceBalance, ASpeedThatCoggingChangesIsNotSteady) {
+  Plant cogged = cart(0.0);
+  cogged.set("cogging_force", {0.4, 0.02, 0.0});
+  EXPECT_TRUE(find_steady_points({run(cogged, 3.0, [](double) { return 1.0; })}, cogged).empty());
+}
+
 TEST(ForceBalance, SaysNothingOfACartThatRests) {
   EXPECT_FALSE(balance_forces({run(cart(0.0), 3.0, [](double) { return 0.1; })}, cart(0.0)).has_value());
 }

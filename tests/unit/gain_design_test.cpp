@@ -6,9 +6,9 @@
 #include <random>
 
 #include "upright/analysis/dense_algebra.hpp"
-#include "upright/analysis/riccati.hpp"
 #include "upright/model/error.hpp"
 #include "upright/model/plant_file.hpp"
+#include "upright/model/riccati.hpp"
 
 namespace upright {
 namespace {
@@ -138,7 +138,8 @@ TEST_P(RandomSystem, DiscreteRiccatiHoldsAndStabilizes) {
   const Eigen::MatrixXd a = matrix(n, n) * 0.8, c = matrix(n, n);
   const Eigen::VectorXd b = matrix(n, 1);
   const Eigen::MatrixXd q = c.transpose() * c + 0.1 * Eigen::MatrixXd::Identity(n, n);
-  const RiccatiSolution solution = solve_discrete_riccati(a, b, q, Eigen::VectorXd::Zero(n), 1.0);
+  const DiscreteRiccatiSolution solution =
+      solve_discrete_riccati(a, b, q, Eigen::VectorXd::Zero(n), Eigen::MatrixXd::Identity(1, 1));
   EXPECT_LT(solution.residual, 1e-8);
   const Eigen::MatrixXd closed = a - b * solution.gain;
   EXPECT_LT(eigenvalues(closed).cwiseAbs().maxCoeff(), 1.0);

@@ -24,7 +24,7 @@ class ListedRig final : public Rig {
     return reading;
   }
   RigFault write(double) noexcept override { return RigFault::none; }
-  void stop() noexcept override {}
+  StopReport stop() noexcept override { return at_zero_volts(); }
 
  private:
   std::vector<std::int64_t> cart_;

@@ -28,6 +28,7 @@ struct Script {
   bool opens = true;
   double last_v = -1.0;
   std::vector<std::string>* story = nullptr;
+  StopReport stop = at_zero_volts();
 };
 
 class ScriptedRig final : public Rig {
@@ -46,7 +47,10 @@ class ScriptedRig final : public Rig {
     script_.last_v = voltage_v;
     return script_.write_fault;
   }
-  void stop() noexcept override { tell("stop"); }
+  StopReport stop() noexcept override {
+    tell("stop");
+    return script_.stop;
+  }
 
  private:
   void tell(const char* what) const { script_.story->push_back(script_.name + " " + what); }
@@ -116,6 +120,17 @@ TEST_F(JoinedRigTest, ServesTheOutputFirstAndReadsEveryPart) {
                                              "cart stop", "pendulum stop"}));
   EXPECT_EQ(output.last_v, 2.5);
   EXPECT_EQ(cart.last_v, -1.0) << "only the output is given a voltage";
+}
+
+TEST_F(JoinedRigTest, KnowsOfItsStopWhatItsOutputKnowsAndStopsTheOthersAllTheSame) {
+  const auto rig = three();
+  rig->open();
+  output.stop = {};
+  EXPECT_FALSE(rig->stop().zero_confirmed);
+  output.stop = at_zero_volts();
+  cart.stop = {};
+  EXPECT_TRUE(rig->stop().done());
+  EXPECT_EQ(std::count(story.begin(), story.end(), "pendulum stop"), 2);
 }
 
 TEST_F(JoinedRigTest, IsWorthWhatItsWorstPartIsWorth) {

@@ -50,6 +50,24 @@ TEST(LiveEvents, AreOneNamedEventWithOneLineOfData) {
   EXPECT_EQ(Json::parse(maker.scene_json()).at("title"), scene().title);
 }
 
+TEST(LiveFrames, EndAtZeroVoltsWhateverTheLastRowHeld) {
+  FrameMaker lasted(scene()), stopped(scene());
+  for (FrameMaker* maker : {&lasted, &stopped})
+    for (std::uint64_t tick = 0; tick < 8; ++tick) maker->add(row(tick));
+  LogRecord stop = row(8);
+  stop.voltage_v = 0.0;
+  stop.flags = row_flag::stale | row_flag::stopped;
+  stopped.add(stop);
+  stopped.rest();
+  lasted.rest();
+  for (FrameMaker* maker : {&lasted, &stopped}) {
+    const Json frame = Json::parse(maker->frame_json());
+    EXPECT_EQ(frame.at("voltage_v"), 0.0);
+    EXPECT_EQ(frame.at("points").back().at(3), 0.0) << "of the curve too";
+  }
+  EXPECT_EQ(Json::parse(lasted.frame_json()).at("rows"), 8) << "no row was made up";
+}
+
 TEST(LiveFrames, HoldTheLatestRowAndAPointEveryFiveMilliseconds) {
   FrameMaker maker(scene());
   for (std::uint64_t tick = 0; tick < 100; ++tick) maker.add(row(tick));

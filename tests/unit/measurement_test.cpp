@@ -1,33 +1,18 @@
 #include "upright/analysis/measurement.hpp"
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <cmath>
-#include <filesystem>
-#include <fstream>
 #include <random>
 
-#include "upright/model/error.hpp"
+#include "measurement_folder.hpp"
+#include "upright/analysis/long_records.hpp"
 
 namespace upright {
 namespace {
 
-class MeasurementFile : public testing::Test {
+class MeasurementFile : public MeasurementFolder {
  protected:
-  void SetUp() override {
-    folder_ = std::filesystem::temp_directory_path() /
-              ("upright_measurement_" + std::to_string(::getpid()) + "_" +
-               testing::UnitTest::GetInstance()->current_test_info()->name());
-    std::filesystem::create_directories(folder_);
-  }
-  void TearDown() override { std::filesystem::remove_all(folder_); }
-
-  std::filesystem::path file(const std::string& name, const std::string& text) const {
-    std::ofstream(folder_ / name) << text;
-    return folder_ / name;
-  }
-
   static std::string rows(const std::string& header, const std::string& bad_row = "") {
     std::string text = header + "\n";
     for (int k = 0; k < 40; ++k)
@@ -41,17 +26,6 @@ class MeasurementFile : public testing::Test {
     for (int k = 0; k < 40; ++k) text += std::to_string(0.01 * k) + ",0.5,1\n";
     return text;
   }
-
-  std::string refusal(const std::filesystem::path& path) const {
-    try {
-      read_measurement(path);
-    } catch (const ConfigError& error) {
-      return error.what();
-    }
-    return "";
-  }
-
-  std::filesystem::path folder_;
 };
 
 TEST_F(MeasurementFile, ReadsAPlainCsv) {
@@ -83,7 +57,7 @@ TEST_F(MeasurementFile, RefusesWhatCannotBeUsedAndSaysWhere) {
   EXPECT_NE(refusal(file("a.csv", rows("t,q,u"))).find("time_s"), std::string::npos);
   EXPECT_NE(refusal(file("b.csv", "time_s,cart_m,voltage_v\n0,0,0\n")).find("fewer than 10"),
             std::string::npos);
-  EXPECT_NE(refusal(file("c.csv", rows("time_s,cart_m,voltage_v", "0.4,nan,1\n"))).find(":42:"),
+  EXPECT_NE(refusal(file("c.csv", rows("time_s,cart_m,voltage_v", "0.4,fast,1\n"))).find(":42:"),
             std::string::npos);
   EXPECT_NE(refusal(file("d.csv", rows("time_s,cart_m,voltage_v", "0.1,0.002,1\n"))).find("does not grow"),
             std::string::npos);
@@ -101,6 +75,49 @@ TEST_F(MeasurementFile, LeavesOutWhatDoesNotMoveBesideWhatDoes) {
   EXPECT_NE(runs[0].notes[0].find("still.csv is left out"), std::string::npos);
   EXPECT_THROW(read_measurements({a, a}), ConfigError);
   EXPECT_THROW(read_measurements({b, file("short.csv", "time_s,cart_m,voltage_v\n0,0,0\n")}), ConfigError);
+}
+
+TEST(LongRecords, AreCutToPiecesThatAreSpreadEvenly) {
+  Measurement run;
+  run.name = "long";
+  constexpr std::size_t many = 200000;
+  for (std::size_t k = 0; k < many; ++k) {
+    run.time_s.push_back(1e-3 * static_cast<double>(k));
+    run.voltage_v.push_back(static_cast<double>(k));
+    run.cart_m.push_back(static_cast<double>(k));
+  }
+  run.cart_weight.assign(many, 1.0);
+  run.breaks = {100000, 100100};
+  EXPECT_EQ(within_samples({run}, many).front().size(), many) << "what is short enough stays whole";
+  const std::vector<Measurement> kept = within_samples({run}, 50000);
+  ASSERT_EQ(kept.size(), 1u);
+  const Measurement& m = kept[0];
+  EXPECT_NEAR(static_cast<double>(m.size()), 50000.0, 10.0);
+  EXPECT_EQ(m.cart_m.size(), m.size());
+  EXPECT_EQ(m.cart_weight.size(), m.size());
+  EXPECT_TRUE(m.theta_rad.empty());
+  ASSERT_EQ(m.notes.size(), 1u);
+  EXPECT_NE(m.notes[0].find("200000 samples"), std::string::npos) << m.notes[0];
+  // Every jump is a break, and the record's own breaks are where they were.
+  std::vector<std::size_t> jumps;
+  for (std::size_t k = 1; k < m.size(); ++k)
+    if (m.cart_m[k] != m.cart_m[k - 1] + 1.0 || m.cart_m[k] == 100000.0 || m.cart_m[k] == 100100.0)
+      jumps.push_back(k);
+  EXPECT_EQ(m.breaks, jumps);
+  EXPECT_LT(m.cart_m.front(), 30000.0);
+  EXPECT_GT(m.cart_m.back(), 170000.0);
+}
+
+TEST(LongRecords, OfManyShortRunsEveryNthIsKept) {
+  std::vector<Measurement> runs(100);
+  for (Measurement& run : runs)
+    for (int k = 0; k < 1000; ++k) {
+      run.time_s.push_back(1e-3 * k);
+      run.voltage_v.push_back(0.0);
+    }
+  const std::vector<Measurement> kept = within_samples(runs, 25000);
+  EXPECT_EQ(kept.size(), 25u);
+  for (const Measurement& run : kept) EXPECT_EQ(run.size(), 1000u);
 }
 
 TEST(Resolution, IsFoundWhereThereAreStepsAndNowhereElse) {

@@ -5,6 +5,7 @@
 #include <deque>
 #include <random>
 
+#include "upright/control/controller.hpp"
 #include "upright/model/error.hpp"
 #include "upright/model/linear_plant.hpp"
 #include "upright/model/plant_file.hpp"
@@ -14,7 +15,7 @@ namespace upright {
 namespace {
 
 Plant viscous_plant() {
-  return read_plant_file(std::string(UPRIGHT_SOURCE_DIR) + "/config/plants/viscous.yaml");
+  return read_plant_file(std::filesystem::path(UPRIGHT_SOURCE_DIR) / "config/plants/viscous.yaml");
 }
 
 ControlConfig config_with(double delay_s, EstimatorKind kind = EstimatorKind::second_order_filter) {

@@ -18,7 +18,7 @@
 
 #include "counted_calls.hpp"
 #include "fake_comedi.hpp"
-#include "upright/control/predictor.hpp"
+#include "upright/control/model_parts.hpp"
 #include "upright/hal/rig_factory.hpp"
 #include "upright/hal/simulated_rig.hpp"
 #include "upright/hal/virtual_rig.hpp"
@@ -51,7 +51,7 @@ class CountingRig final : public Rig {
     return rig_.read();
   }
   RigFault write(double voltage_v) noexcept override { return rig_.write(voltage_v); }
-  void stop() noexcept override { rig_.stop(); }
+  StopReport stop() noexcept override { return rig_.stop(); }
 
  private:
   Rig& rig_;
@@ -67,7 +67,7 @@ Counted count_on(Rig& plain, const RigFile& file, const ControlConfig& control, 
   rig.open();
   Counted counted;
   {
-    Controller controller(control, file.amplifier.limit_v, make_compensator(control));
+    Controller controller(control, file.amplifier.limit_v, make_model_parts(control));
     PoseScaler scaler(calibration_in_use(file));
     RunLog::Options options;
     options.queue_rows = 1024;
@@ -117,6 +117,16 @@ TEST(RealtimeSafety, TheLoopNeitherAllocatesNorLocksInRealTime) {
   const Counted counted = count_in_loop(clock, 1.0, [] {});
   EXPECT_EQ(counted.allocations, 0);
   EXPECT_EQ(counted.locks, 0);
+}
+
+TEST(RealtimeSafety, StateEstimatorNeitherAllocatesNorLocks) {
+  for (const char* const gain_file : {"quiet", "quiet-friction"}) {
+    VirtualClock clock;
+    const Counted counted = count_in_loop(
+        clock, 20.0, [] {}, gain_file);
+    EXPECT_EQ(counted.allocations, 0) << gain_file;
+    EXPECT_EQ(counted.locks, 0) << gain_file;
+  }
 }
 
 TEST(RealtimeSafety, ThePredictorNeitherAllocatesNorLocks) {

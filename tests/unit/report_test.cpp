@@ -8,6 +8,7 @@
 #include <set>
 
 #include "../../src/report/row_thinner.hpp"
+#include "../../src/report/ticks.hpp"
 #include "upright/model/error.hpp"
 #include "upright/report/html.hpp"
 #include "upright/report/plot.hpp"
@@ -55,13 +56,14 @@ TEST(HtmlPage, TextNeverBecomesMarkupAnywhere) {
   page.preformatted(hostile);
   const std::string text = page.text();
   EXPECT_EQ(occurrences(text, "<script"), 0u);
-  // 16 texts on the page, the title twice, as they were given; 5 in the drawing.
+  // On the page as they were given: 16 texts, the title twice, and the plot's title and key; in its two
+  // drawings the words of the axes and of a mark.
   EXPECT_EQ(
       occurrences(text, "&lt;script&gt;alert(1)&lt;/script&gt; &amp; &quot;it&#39;s&quot; `date` $(date) %s"),
-      17u);
+      19u);
   EXPECT_EQ(
       occurrences(text, "&#x3c;script&#x3e;alert(1)&#x3c;/script&#x3e; &#x26; &#x22;it&#x27;s&#x22; `date`"),
-      5u);
+      6u);
 }
 
 TEST(HtmlPage, RefersToNothingElsewhereAndRepeatsNoIdentifier) {
@@ -98,9 +100,8 @@ TEST(Svg, EveryKindOfPlotDrawsItsData) {
   map.x.logarithmic = true;
   map.heat_map =
       HeatMap{{0.1, 1.0, 10.0}, {0.0, 1.0}, {0, 1, 2, 0, 0, 1}, "outcome", {"stable", "osc", "fell"}};
-  const std::string svg = svg_of(map, "p");
-  EXPECT_NE(svg.find("osc"), std::string::npos);
-  EXPECT_EQ(svg.find("xmlns"), std::string::npos);
+  EXPECT_EQ(svg_of(map, "p").find("xmlns"), std::string::npos);
+  EXPECT_EQ(key_of(map).at(1).name, "osc");
 }
 
 TEST(Svg, SurvivesEmptyConstantAndNotFiniteData) {
@@ -129,6 +130,98 @@ TEST(Svg, RefusesSeriesOfUnequalLengths) {
   Plot plot;
   plot.series.push_back({"s", {0, 1, 2}, {1}});
   EXPECT_THROW(svg_of(plot, "p"), Error);
+}
+
+TEST(Palette, GivesAnOutcomeItsColourInEveryPlot) {
+  Plot map;
+  map.heat_map = HeatMap{{1, 2, 3}, {0, 1}, {0, 1, 2, 0, 1, 2}, "", {"stable", "oscillating", "fell"}};
+  const std::vector<KeyEntry> key = key_of(map);
+  ASSERT_EQ(key.size(), 3u);
+  for (const KeyEntry& entry : key) {
+    EXPECT_EQ(entry.color, color::of_outcome(entry.name));
+    const auto part = [&](std::size_t at) {
+      return std::stoi(std::string(entry.color.substr(at, 2)), nullptr, 16);
+    };
+    char drawn[32];
+    std::snprintf(drawn, sizeof drawn, "rgb(%3d, %3d, %3d)", part(1), part(3), part(5));
+    EXPECT_NE(svg_of(map, "p").find(drawn), std::string::npos) << entry.name;
+    for (std::size_t k = 0; k < 20; ++k) EXPECT_NE(color::curve(k), entry.color) << "means something else";
+  }
+}
+
+TEST(Ticks, StandAtStepsThatExist) {
+  const auto texts = [](const AxisSpan& axis) {
+    std::string text;
+    for (const Tick& tick : ticks_of(axis)) text += tick.text + " ";
+    return text;
+  };
+  EXPECT_EQ(texts({0.0, 2.0, false, true, 900.0}), "0 1 2 ") << "counts have no halves";
+  EXPECT_EQ(texts({0.0, 2.0, false, false, 240.0}), "0.0 0.5 1.0 1.5 2.0 ");
+  EXPECT_EQ(texts({0.9, 6.0, true, false, 240.0, false}), "1 2 3 5 ") << "less than a decade";
+  EXPECT_EQ(texts({1e-3, 0.1, true, false, 300.0}), "0.001 0.003 0.01 0.03 0.1 ");
+  for (const double length : {120.0, 300.0, 900.0})
+    for (const double high : {1e-6, 0.03, 1.0, 17.0, 1e5, 1e12})
+      for (const bool log : {false, true}) {
+        const AxisSpan axis{log ? 1e-4 * high : -0.3 * high, high, log, false, length};
+        const std::vector<Tick> ticks = ticks_of(axis);
+        EXPECT_GE(ticks.size(), 1u) << high << " " << length;
+        double end = -1e9;
+        for (const Tick& tick : ticks) {
+          const double part = log ? std::log(tick.at / axis.low) / std::log(axis.high / axis.low)
+                                  : (tick.at - axis.low) / (axis.high - axis.low);
+          const double half = 0.5 * text_width_px(tick.text, axis.text_px);
+          EXPECT_GT(part * length - half, end) << "texts touch: " << texts(axis);
+          end = part * length + half;
+        }
+      }
+}
+
+TEST(Ticks, EndForAnyRange) {
+  for (const double low : {0.0, 1e17, -1e100, 1e-300})
+    for (const double span : {1e-6, 1e-300, 16.0, 1e99})
+      EXPECT_LT(ticks_of({low, low + span, false, false, 900.0}).size(), 200u) << low << " " << span;
+}
+
+TEST(Align, PutsTheTimeAxesOfStackedPlotsAtOnePlace) {
+  Plot small, large;
+  small.series.push_back({"", {0.0, 9.0}, {0.0, 1.0}});
+  large.series.push_back({"", {1.0, 10.0}, {0.0, 0.123456e-3}});
+  std::vector<Plot> plots{small, large};
+  align(plots);
+  EXPECT_EQ(plots[0].left_px, plots[1].left_px);
+  EXPECT_EQ(plots[0].x.low, 0.0);
+  EXPECT_EQ(plots[0].x.high, 10.0);
+  EXPECT_EQ(plots[1].x.low, 0.0);
+  EXPECT_EQ(plots[1].x.high, 10.0);
+}
+
+TEST(NumberText, IsPlainWherePeopleReadIt) {
+  EXPECT_EQ(number_text(11061.4), "11060");
+  EXPECT_EQ(number_text(7512.0, 2), "7500");
+  EXPECT_EQ(number_text(-1246.3, 3), "-1250");
+  EXPECT_EQ(number_text(9999999.9), "1 × 10⁷");
+  EXPECT_EQ(number_text(3.14e-7, 2), "3.1 × 10⁻⁷");
+  EXPECT_EQ(number_text(0.00012344), "0.0001234");
+  EXPECT_EQ(number_text(0.0), "0");
+  EXPECT_EQ(number_text(std::nan("")), "-");
+  EXPECT_EQ(number_within(0.4306523, 0.4303976, 0.4309071), "0.43065");
+  EXPECT_EQ(number_within(4.03e-6, -1.45e-5, 2.25e-5), "0.000004");
+  EXPECT_EQ(number_within(-4.0e-9, -1.45e-5, 2.25e-5), "0.000000");
+  EXPECT_EQ(number_within(12345.0, 10000.0, 15000.0), "12300");
+}
+
+TEST(LinkTo, LeadsBesideThePageOnly) {
+  EXPECT_EQ(link_to("20260101T000000Z-a/report.html"), "./20260101T000000Z-a/report.html");
+  EXPECT_EQ(link_to("javascript:alert(1)"), "./javascript%3Aalert%281%29");
+  EXPECT_EQ(link_to("a b\"<>"), "./a%20b%22%3C%3E");
+}
+
+TEST(Bars, AreOneForEachName) {
+  HtmlPage page("a", "b");
+  page.bars({{"given", 100.0, color::before}, {"with this", 10.0}, {"with that", 1.0}}, 1.0, "");
+  const std::string text = page.text();
+  for (const char* part : {"given", "with this", "with that", "width:100%", "width:50%", "width:0%"})
+    EXPECT_NE(text.find(part), std::string::npos) << part;
 }
 
 TEST(Thinned, KeepsEveryPeakAndTheEnds) {

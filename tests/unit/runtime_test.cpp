@@ -232,8 +232,10 @@ RunSetup setup_for(const RigFile& rig, double duration_s, double theta0_deg = 3.
   setup.theta0_rad = theta0_deg * std::numbers::pi / 180.0;
   setup.control = read_gain_file(UPRIGHT_SOURCE_DIR "/config/gains/exponential.yaml");
   setup.rig = rig;
-  setup.limits = {static_cast<std::uint64_t>(duration_s * setup.control.sample_rate_hz), rig.track_limit_m,
-                  rig.fall_angle_rad, rig.watchdog_s, default_periods_late(setup.control.period_s())};
+  setup.limits = rig_limits(rig, read_plant_file(rig.simulated->plant));
+  setup.limits.coast_s = 0.0;
+  setup.limits.periods = static_cast<std::uint64_t>(duration_s * setup.control.sample_rate_hz);
+  setup.limits.most_periods_late = default_periods_late(setup.control.period_s());
   return setup;
 }
 
@@ -254,15 +256,19 @@ class TamperedRig final : public Rig {
     const RigFault fault = rig_.write(voltage_v);
     return on_write ? on_write(writes) : fault;
   }
-  void stop() noexcept override {
+  StopReport stop() noexcept override {
     last_v = 0.0;
     stopped = true;
-    rig_.stop();
+    ++stops;
+    const StopReport report = rig_.stop();
+    return on_stop ? on_stop(stops) : report;
   }
+  int last_exception() const noexcept override { return exception; }
 
   std::function<void(int, RigReading&)> on_read;
   std::function<RigFault(int)> on_write;
-  int reads = 0, writes = 0;
+  std::function<StopReport(int)> on_stop;
+  int reads = 0, writes = 0, stops = 0, exception = 0;
   double last_v = 0.0;
   bool stopped = false;
 
@@ -314,6 +320,54 @@ TEST(Session, BalancesForAMinuteOnAllThreeFrictions) {
   }
 }
 
+TEST(Session, NamesTheExceptionBehindAFault) {
+  TemporaryFolder folder;
+  const TestRun run = run_tampered(folder, setup_for(simulated_file(), 2.0), [](TamperedRig& rig, Clock&) {
+    rig.exception = 6;
+    rig.on_read = [](int i, RigReading& reading) {
+      if (i < 100) return;
+      reading.status = RigStatus::fault;
+      reading.fault = RigFault::device_busy;
+    };
+  });
+  EXPECT_EQ(run.result.outcome.exception, 6);
+  EXPECT_NE(run.record.outcome->text("sentence").find("exception 06 (device busy)"), std::string::npos);
+}
+
+TEST(Session, WaitsForZeroVoltsAndSaysWhetherItIsConfirmed) {
+  TemporaryFolder folder;
+  for (const bool comes : {true, false}) {
+    const TestRun run = run_tampered(folder, setup_for(simulated_file(), 0.5), [=](TamperedRig& rig, Clock&) {
+      rig.on_stop = [=](int times) {
+        StopReport report;
+        report.zero_confirmed = comes && times > 100;
+        report.fault = RigFault::link_timeout;
+        return report;
+      };
+    });
+    EXPECT_EQ(run.result.outcome.reason, StopReason::duration);
+    EXPECT_EQ(run.result.outcome.stop.done(), comes);
+    EXPECT_EQ(run.record.outcome->text("zero_volts"), comes ? "confirmed" : "not_confirmed");
+    EXPECT_EQ(run.record.samples.rows.size(), 500u) << "one that lasted has its periods and no row more";
+  }
+}
+
+/// The voltage of a pose that has passed is not given again when periods were missed meanwhile.
+TEST(Session, SendsNoOldVoltageAfterAGap) {
+  TemporaryFolder folder;
+  constexpr int gap = 200;
+  int writes_before = 0, writes_in_gap = -1;
+  run_tampered(folder, setup_for(simulated_file(), 1.0), [&](TamperedRig& rig, Clock& clock) {
+    rig.on_read = [&](int i, RigReading& reading) {
+      if (i == gap) clock.sleep_until(clock.now_ns() + 4'200'000);
+      if (i == gap + 1) writes_before = rig.writes;
+      if (i > gap && i <= gap + 3) reading.status = RigStatus::stale;
+      if (i == gap + 4) writes_in_gap = rig.writes - writes_before;
+    };
+  });
+  EXPECT_EQ(writes_in_gap, 0);
+}
+
 TEST(Session, SameSeedSameBytesAndAnotherSeedOthers) {
   TemporaryFolder folder;
   RigFile rig = simulated_file();
@@ -326,6 +380,52 @@ TEST(Session, SameSeedSameBytesAndAnotherSeedOthers) {
   EXPECT_EQ(first, second);
   setup.seed = 2;
   EXPECT_NE(first, bytes());
+}
+
+LoopOutcome ended_by(StopReason reason, std::uint64_t tick) {
+  LoopOutcome outcome;
+  outcome.reason = reason;
+  outcome.first_bad_tick = tick;
+  outcome.time_s = 0.001 * static_cast<double>(tick);
+  return outcome;
+}
+
+bool says(const std::string& sentence, const std::string& part) {
+  return sentence.find(part) != std::string::npos;
+}
+
+TEST(SentenceOfAnEnd, SuspectsSignsOnlyOnARealRigThatNobodyChecked) {
+  LoopLimits limits{.track_limit_m = 0.35, .fall_angle_rad = 0.6, .watchdog_s = 0.1};
+  for (const StopReason reason : {StopReason::fell, StopReason::track_limit}) {
+    const LoopOutcome soon = ended_by(reason, 400), late = ended_by(reason, 9000),
+                      at_once = ended_by(reason, 0);
+    EXPECT_FALSE(says(sentence_of(soon, limits), "signs")) << "a simulated rig, or one that was checked";
+    LoopLimits unproven = limits;
+    unproven.signs_unproven = true;
+    EXPECT_TRUE(says(sentence_of(soon, unproven), "check the signs"));
+    EXPECT_FALSE(says(sentence_of(late, unproven), "signs")) << "it balanced before";
+    EXPECT_FALSE(says(sentence_of(at_once, unproven), "signs"))
+        << "nobody lifted it, or the cart was at the end";
+    unproven.delay_exceeded = true;
+    EXPECT_FALSE(says(sentence_of(soon, unproven), "signs"));
+    EXPECT_TRUE(says(sentence_of(soon, unproven), "upright margin"));
+  }
+}
+
+TEST(RigLimits, KnowWhetherSomebodyCheckedTheSigns) {
+  EXPECT_FALSE(rig_limits(simulated_file(), std::nullopt).signs_unproven);
+  const RigFile unchecked = read_rig_file(UPRIGHT_SOURCE_DIR "/config/rigs/modbus-tcp.yaml");
+  EXPECT_TRUE(rig_limits(unchecked, std::nullopt).signs_unproven);
+}
+
+TEST(SentenceOfAnEnd, AsksForRealTimeSchedulingOnlyWhereItWasNotGranted) {
+  LoopOutcome outcome = ended_by(StopReason::overrun, 500);
+  outcome.counts.overruns_wake = 4;
+  EXPECT_TRUE(says(sentence_of(outcome, {}), "grant it"));
+  outcome.realtime = true;
+  EXPECT_FALSE(says(sentence_of(outcome, {}), "grant"));
+  outcome.counts.overruns_read = 9;
+  EXPECT_TRUE(says(sentence_of(outcome, {}), "check the link"));
 }
 
 TEST(Session, RunsAreReplayedBitForBitAlsoWithDelayJitterNoiseAndGaps) {
@@ -414,6 +514,8 @@ TEST(Session, EveryTroubleEndsInZeroVoltsWithItsReasonAndItsCycle) {
       {"timeout", StopReason::link_lost, always(RigStatus::fault, RigFault::link_timeout)},
       {"lost", StopReason::link_lost, always(RigStatus::fault, RigFault::link_lost)},
       {"corrupt", StopReason::link_lost, always(RigStatus::fault, RigFault::corrupt_reply)},
+      {"busy", StopReason::link_lost, always(RigStatus::fault, RigFault::device_busy)},
+      {"refused", StopReason::rig_fault, always(RigStatus::fault, RigFault::device_refused)},
       {"restarted", StopReason::rig_fault, always(RigStatus::fault, RigFault::device_restarted)},
       {"e-stop", StopReason::emergency_stop, always(RigStatus::fault, RigFault::emergency_stop)},
       {"limit switch", StopReason::track_limit, always(RigStatus::fault, RigFault::limit_switch)},
@@ -613,7 +715,10 @@ TEST(Session, ASignalStopsBeforeAnotherVoltageIsWritten) {
   const TestRun run = run_tampered(folder, setup_for(simulated_file(), 5.0), {}, SIGTERM);
   EXPECT_EQ(run.result.outcome.reason, StopReason::signal);
   EXPECT_TRUE(run.stopped);
-  EXPECT_TRUE(run.record.samples.rows.empty());
+  ASSERT_EQ(run.record.samples.rows.size(), 1u) << "the stop's own";
+  EXPECT_EQ(run.record.samples.rows.back().voltage_v, 0.0);
+  EXPECT_TRUE(run.record.samples.rows.back().flags & row_flag::stopped);
+  EXPECT_FALSE(replay(run.record).first_mismatch.has_value());
   EXPECT_NE(run.record.outcome->text("sentence").find("SIGTERM"), std::string::npos);
 }
 

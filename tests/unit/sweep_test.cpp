@@ -347,7 +347,7 @@ TEST_F(SweepFolder, TakesAPredictorAlong) {
   std::string text = text_with("gains", compensated);
   text.replace(text.find("continuous"), 10, "sampled\n  rig: " + source + "/config/rigs/simulated.yaml");
   const SweepConfig config = read_sweep_file(write(text));
-  ASSERT_TRUE(config.setup.make_compensator);
+  ASSERT_TRUE(config.setup.make_parts);
   const auto team = make_thread_team(config, 1);
   for (const SweepRun& run : run_sweep(config, folder_ / "out", {}, *team).runs) {
     EXPECT_TRUE(std::isnan(run.fall_time_s)) << run.start.delay_s;

@@ -38,7 +38,7 @@ TEST(YamlReader, UnknownKeyNamesTheNearestKnownOneWithFileAndLine) {
   map.number("mass_kg");
   EXPECT_FALSE(map.has("length_m"));
   EXPECT_EQ(message_of([&] { map.finish(); }),
-            "did you mean length_m? otherwise remove it: f.yaml:2: lenght_m is not a known key");
+            "f.yaml:2: lenght_m is not a known key: did you mean length_m? otherwise remove it");
 }
 
 TEST(YamlReader, RefusesWhatIsNotAFiniteNumberInRange) {
@@ -58,7 +58,7 @@ TEST(YamlReader, RefusesDoubledKeysBrokenYamlAndDeepNesting) {
 
 TEST(YamlReader, RefusesASecondDocumentAndTextInWhichYamlCppFindsDocumentsForEver) {
   EXPECT_EQ(message_of([] { YamlMap::from_text("a: 1\n---\nb: 2\n", "f.yaml"); }),
-            "keep one YAML document: f.yaml:2: a second one begins here");
+            "f.yaml:2: a second document begins here: keep one YAML document");
   EXPECT_THROW(YamlMap::from_text("a:\n   , - b'\n", "f.yaml"), ConfigError);
 }
 

@@ -23,6 +23,9 @@ struct DataRange {
 
 DataRange range_of(const std::vector<Measurement>& runs, const Plant& plant);
 
+/// Whether anything moved far enough to show an effect: well beyond the sensors' steps.
+bool moves_enough(const std::vector<Measurement>& runs);
+
 /// The parameters of an effect as free ones.
 std::vector<FreeParameter> free_parameters(std::size_t effect, const DataRange& range);
 

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "upright/analysis/linear_sampled_loop.hpp"
 #include "upright/control/gain_file.hpp"
 #include "upright/model/plant.hpp"
 
@@ -38,26 +39,39 @@ struct LoopMargin {
   std::optional<Confirmation> confirmation;
 };
 
-/// Linearises with sgn(v) as tanh(smoothing v). With a predictor the continuous loop is the one without it.
-/// Throws ConfigError.
+/// Linearises with sgn(v) as tanh(smoothing v). A state estimator is taken as it is without a period; with a
+/// predictor the continuous loop is the one without it, and so it is with a velocity estimator. Throws
+/// ConfigError.
+LoopMargin continuous_margin(const Plant& plant, const ControlConfig& config, double smoothing);
+/// The same of the true state fed back.
 LoopMargin continuous_margin(const Plant& plant, const Gains& gains, double smoothing);
 
-/// Hold, velocity estimator, delay line with its interpolation, and predictor included. `confirm`: find the
-/// roots on both sides, which takes longer the longer the delay.
+/// Hold, estimator, delay line with its interpolation, and predictor included. `confirm`: find the roots on
+/// both sides, where the delay is not too long for it (LinearSampledLoop::most_periods). `extra`: whether the
+/// delay is the gain file's, which a state estimator knows of, or one of the actuator that it does not know
+/// of, on top of the gain file's.
 LoopMargin sampled_margin(const Plant& plant, const ControlConfig& config, double smoothing,
-                          bool confirm = true);
+                          bool confirm = true, ExtraDelay extra = ExtraDelay::known);
 
-/// What a run may lose in time before its gains no longer hold the pendulum.
+/// The plant as motions far larger than stick-slip and cogging feel it: without dry friction, and without
+/// cogging, which averages out over its pitch.
+Plant large_motion_plant(const Plant& plant);
+
+/// What a run may lose in time before its gains no longer hold the pendulum. The sliding plant decides, since
+/// it bears less than one near rest, and is what a disturbed pendulum meets.
 struct OverrunTolerance {
+  bool stabilized = false;  ///< by the gains, without delay
+  double critical_delay_s =
+      0.0;                     ///< sampled, sliding; 0 where there is none, infinite when no delay takes it
   double extra_delay_s = 0.0;  ///< beyond the configured delay; 0 when the loop is beyond it already
   int missed_periods = 0;      ///< consecutive, such that the voltage held over them is not older than that
-  bool sliding =
-      true;  ///< of the plant without its dry friction, which large motions feel; else of the smoothed
-  std::string sentence;  ///< for the user
+  std::string sentence;        ///< for the user
+
+  /// The loop will oscillate or fall.
+  bool exceeded() const { return extra_delay_s <= 0.0; }
 };
 
-/// From the sampled loop. The sliding plant counts, since it bears less and is what a disturbed pendulum
-/// meets; where the gains do not stabilize it at the configured delay, the smoothed plant does.
-OverrunTolerance overrun_tolerance(const Plant& plant, const ControlConfig& config, double smoothing = 100.0);
+/// From the sampled loop on the large-motion plant. Throws ConfigError.
+OverrunTolerance overrun_tolerance(const Plant& plant, const ControlConfig& config);
 
 }  // namespace upright

@@ -2,6 +2,7 @@
 // with it.
 #pragma once
 
+#include <atomic>
 #include <functional>
 #include <optional>
 #include <string>
@@ -77,6 +78,13 @@ struct NextExperiment {
 
 struct Diagnosis {
   Verdict verdict = Verdict::no_discrepancy;
+  /// A signal ended the search: what stands here is the best answer so far. Where it was not examined the
+  /// verdict is `unexplained`, and gaps that were not measured are not numbers.
+  bool interrupted = false;
+  /// The bound of the search ended it. What it had found until then was examined as usual, where that did not
+  /// reach a bound of its own.
+  bool bound_reached = false;
+  bool examined = true;  ///< what is left was examined: the verdict is one
   double gap_before = 0.0, gap_after = 0.0;
   std::vector<FoundEffect> effects;        ///< in the order found
   std::vector<CandidateScore> candidates;  ///< of the first round, best first
@@ -102,7 +110,14 @@ struct NextBest {
 /// Nothing of an effect that was added otherwise: in a pair, by an exchange, or as a correction.
 NextBest next_best(const Diagnosis& diagnosis, const FoundEffect& effect);
 
+/// How often a search may follow each sample of the data at most, before the bound ends it. Searches on
+/// simulated rigs needed 150 to 750; on data in wrong units, of which nothing comes, 2000 and more.
+inline constexpr double default_search_bound = 10000.0;
+
 struct DiagnosisOptions {
+  /// Once it is not zero the search gives up, within some tenths of a second. Null: never.
+  const std::atomic<int>* signal = nullptr;
+  double search_bound = default_search_bound;
   /// Told from time to time how far the work is (0 to 1) and what it does.
   std::function<void(double, const std::string&)> progress;
   void tell(double done, const std::string& what) const {

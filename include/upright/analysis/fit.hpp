@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "upright/analysis/measurement.hpp"
+#include "upright/analysis/work_bound.hpp"
 #include "upright/model/dynamics.hpp"
 #include "upright/model/plant.hpp"
 
@@ -93,6 +94,7 @@ inline Noise sensors_only(Noise noise) {
 struct FitData {
   const std::vector<Measurement>* runs = nullptr;
   std::vector<Segment> segments;
+  WorkBound* bound = nullptr;  ///< of the search that the fit is a part of; null: none
 };
 
 struct FitPoint {
@@ -106,6 +108,7 @@ struct FitResult {
   double objective = 0.0;  ///< minus twice the log of likelihood and priors
   /// Of the objective in a further step, were residuals linear; nothing where a step must be cut short.
   std::optional<double> promised_fall;
+  double bounded_fall = 0.0;               ///< the same of a step that is cut short where it must be
   std::vector<double> segment_objective;   ///< the likelihood part, by segment
   std::vector<double> block_objective;     ///< the same by blocks of a quarter of a second, in order
   std::vector<double> segment_chi_square;  ///< sum of squared whitened residuals, by segment
@@ -113,6 +116,7 @@ struct FitResult {
   Eigen::MatrixXd covariance;              ///< of the free parameters, robust to noise that is not white
   Eigen::MatrixXd information;             ///< of the free parameters, initial states eliminated
   bool converged = false;
+  double work_samples = 0.0;  ///< how many samples were followed, each as often as it was
 };
 
 /// What is believed of all free parameters together: a Gaussian, in their order.
@@ -130,11 +134,13 @@ struct FitOptions {
   double tolerance = 1e-4;        ///< relative fall of the objective per sample at which to stop
 };
 
-/// Fits. A fit that fails returns an infinite objective; it does not throw.
+/// Fits. A fit that fails returns an infinite objective. Throws only Interrupted (parallel.hpp), and
+/// BoundReached where the bound of the data was reached before it began; one that reaches it on its way ends
+/// where it is.
 FitResult fit(const FitData& data, const FitPoint& start, const std::vector<FreeParameter>& free,
               const FitOptions& options = {});
 
-/// Lets the initial states follow, with plant and noise held.
+/// Lets the initial states follow, with plant and noise held. Throws as `fit` does.
 FitResult follow(const FitData& data, const FitPoint& start,
                  int most_iterations = FitOptions{}.most_iterations);
 

@@ -28,7 +28,7 @@ struct ForceBalance {
 /// None where no run moves the cart enough.
 std::optional<ForceBalance> balance_forces(const std::vector<Measurement>& runs, const Plant& plant);
 
-/// The voltage grew slowly from rest until the cart went.
+/// The voltage grew slowly from rest, as one ramp, until the cart went under that same ramp.
 struct Breakaway {
   std::size_t run = 0;
   double time_s = 0.0;
@@ -36,7 +36,8 @@ struct Breakaway {
 };
 std::vector<Breakaway> find_breakaways(const std::vector<Measurement>& runs, const Plant& plant);
 
-/// A stretch of constant voltage and nearly constant speed.
+/// A stretch of constant voltage along which the speed stays the same, but for what the sensor's noise makes
+/// of it.
 struct SteadyPoint {
   std::size_t run = 0;
   double cart_mps = 0.0;

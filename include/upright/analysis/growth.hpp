@@ -18,9 +18,11 @@ namespace upright {
 /// steps.
 class Growth {
  public:
-  /// Begins with the plant file as given. Throws ConfigError when that cannot be simulated.
   Growth(Search& search, const DiagnosisOptions& options, Diagnosis& record);
 
+  /// Fits the plant file as given: before everything else. Throws ConfigError when that cannot be simulated.
+  /// This and what follows throw Interrupted and BoundReached; what was found until then stays readable.
+  void begin();
   /// From the plant file: one effect after the other, and pairs in their place.
   void find();
   /// What is left is more than noise: the same model from initial states as the data show them. Whether that

@@ -14,8 +14,9 @@ struct DataSplit {
 };
 
 /// Which of each three in the order of how lively they are is held out: the middle one, alike to the rest, or
-/// another, where the fit needs what only that middle one shows. (Of two the calmer one, or the other.)
-enum class HeldOut { middle, other };
+/// another, where the fit needs what only that middle one shows. (Of two the calmer one, or the other.) `end`
+/// is `middle` of several runs, and the last third of a single one.
+enum class HeldOut { middle, other, end };
 
 /// Holds out a third.
 DataSplit split(const std::vector<Measurement>& runs, HeldOut which);

@@ -2,11 +2,22 @@
 // foreign CSV.
 #pragma once
 
+#include <cstddef>
 #include <filesystem>
+#include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 namespace upright {
+
+struct Dataset;
+
+/// From a sample on, so much was added to the angle because it had been folded into one turn.
+struct Unfolding {
+  std::size_t from = 0;
+  double added_rad = 0.0;
+};
 
 /// One run: encoders were read at time_s[k], then voltage_v[k] was commanded and held until time_s[k + 1].
 struct Measurement {
@@ -21,7 +32,14 @@ struct Measurement {
   /// How much of a measurement each sample is: quantised values that stay the same are not new each time.
   /// Empty: all whole.
   std::vector<double> cart_weight, theta_weight;
-  std::vector<std::string> notes;  ///< what was found and assumed while reading
+  /// What cart_noise_m() and theta_noise_rad() found when the run was read; they look at every sample
+  /// otherwise.
+  std::optional<double> known_cart_noise_m, known_theta_noise_rad;
+  std::vector<std::size_t> breaks;  ///< samples before which rows are missing: nothing is followed across
+  std::vector<Unfolding> unfoldings;
+  std::shared_ptr<const Dataset> dataset;  ///< how it was read; none if it was not read from a file
+  std::size_t missing_rows = 0;            ///< rows of the file without a number in a cell
+  std::vector<std::string> notes;          ///< what was found and assumed while reading
 
   std::size_t size() const { return time_s.size(); }
   bool has_cart() const { return !cart_m.empty(); }
@@ -34,7 +52,7 @@ struct Measurement {
 };
 
 /// Reads one item of `--data`. Throws ConfigError with remedy, file and line for everything that cannot be
-/// used: no common columns, one sample, constant data, values that are not finite, time that does not grow.
+/// used: no common columns, one sample, constant data, text for a number, time that does not grow.
 Measurement read_measurement(const std::filesystem::path& path);
 
 /// Reads all items of `--data`. A run in which nothing moves says nothing of the model, and may be an encoder

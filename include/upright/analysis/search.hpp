@@ -141,7 +141,6 @@ class Search {
   /// Where a pair starts, on all of the training data.
   FitPoint pair_point(const Hypothesis& base, const Hypothesis& first, const Hypothesis& second) const;
   std::vector<PlantState<double>> sieve_starts(const std::vector<PlantState<double>>& starts) const;
-  std::vector<std::pair<double, double>> force_residual(const Hypothesis& base) const;
   /// Fits once more from less noise, and keeps what is better: much noise and a poor fit hold each other up.
   void calm(Hypothesis& h, const FitOptions& options);
   /// Whether a fit from less noise may find better: of what is far better than `base`, as a part of the

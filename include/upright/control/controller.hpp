@@ -1,4 +1,4 @@
-// The one control step, shared by run, replay, sweep and experiment: velocity estimates, delay, state
+// The one control step, shared by run, replay, sweep and experiment: state estimates, delay, state
 // feedback and limiter as a pure function of counts-in-SI and what came before. Allocates at construction
 // only.
 #pragma once
@@ -11,21 +11,10 @@
 #include "upright/control/gain_file.hpp"
 #include "upright/control/limiter.hpp"
 #include "upright/control/state.hpp"
+#include "upright/control/state_estimator.hpp"
 #include "upright/control/velocity_estimator.hpp"
 
 namespace upright {
-
-/// Makes up for the delay: turns the delayed state into an estimate of the present one. Called once per
-/// period, in the loop: no allocation, no lock, no exception.
-class DelayCompensator {
- public:
-  virtual ~DelayCompensator() = default;
-  /// Begins from rest at `state`, which has held for ever.
-  virtual void start(const ControlState& state) noexcept = 0;
-  /// `delayed`: the state one delay ago. `applied_v`: the voltage that was held over the period that just
-  /// ended.
-  virtual ControlState compensate(const ControlState& delayed, double applied_v) noexcept = 0;
-};
 
 /// One sample, already scaled and unwrapped.
 struct ControlInput {
@@ -47,10 +36,9 @@ struct ControlOutput {
 
 class Controller {
  public:
-  /// `amplifier_limit_v`: the limiter's. Throws ConfigError when the configuration cannot be run: a
-  /// compensation other than none needs a `compensator`.
-  Controller(const ControlConfig& config, double amplifier_limit_v,
-             std::unique_ptr<DelayCompensator> compensator = nullptr);
+  /// `amplifier_limit_v`: the limiter's. `parts`: those that the configuration asks for (`make_model_parts`).
+  /// Throws ConfigError when the configuration cannot be run, or a part of it is missing.
+  Controller(const ControlConfig& config, double amplifier_limit_v, ModelParts parts = {});
 
   /// From now on `source` says what to do; null: balance about zero. It must outlive the controller.
   void follow(CommandSource* source) noexcept { source_ = source; }
@@ -59,9 +47,10 @@ class Controller {
   /// Forgets what came before: the next step begins from rest there.
   void reset() noexcept { started_ = false; }
 
-  /// The voltage for a sample. Samples missing since the last step are taken as lying on the straight line
-  /// between the two that are there, so that estimates and delay keep their time; at most
-  /// `most_missing_periods` of them, beyond which the controller begins anew from rest.
+  /// The voltage for a sample. Samples missing since the last step are predicted by a state estimator;
+  /// without one they are taken as lying on the straight line between the two that are there. So estimates
+  /// and delay keep their time; at most `most_missing_periods` of them, beyond which the controller begins
+  /// anew from rest.
   ControlOutput step(const ControlInput& input) noexcept;
 
   const ControlConfig& config() const { return config_; }
@@ -73,13 +62,15 @@ class Controller {
  private:
   void begin(const ControlInput& input) noexcept;
   double feedback(const Demand& demand) const noexcept;
+  void advance_to(const ControlInput& input, std::uint64_t periods) noexcept;
   void advance(double cart_m, double theta_rad) noexcept;
+  void act_on(const ControlState& newest) noexcept;
 
   ControlConfig config_;
   double limit_v_;
   VelocityEstimator cart_, pendulum_;
   DelayLine delay_;
-  std::unique_ptr<DelayCompensator> compensator_;
+  ModelParts parts_;
   CommandSource* source_ = nullptr;
   ControlState state_, acting_;
   std::uint64_t tick_ = 0;

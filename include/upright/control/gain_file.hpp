@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -27,15 +28,57 @@ struct DelayCompensation {
       plant;  ///< predictor only: the model it predicts with, resolved against the gain file
 };
 
+enum class StateEstimatorKind : std::uint8_t {
+  none,
+  kalman,           ///< predicts with the plant file while the cart slides; friction is an unknown force
+  extended_kalman,  ///< predicts with the plant file as it is, its dry friction and every other effect
+};
+
+/// A Kalman filter in place of the velocity estimator. What is left out has a default that follows from the
+/// plant (`process_noise_of`) or from the rig's encoders (`with_encoders`).
+struct StateEstimatorConfig {
+  StateEstimatorKind kind = StateEstimatorKind::none;
+  std::filesystem::path plant;  ///< its model, resolved against the gain file
+  /// How fast the force on the cart that the model lacks may change: a random walk. The one number to tune:
+  /// more follows friction quicker, and bears less delay of the actuator that the model does not know. 0: no
+  /// such force.
+  std::optional<double> cart_force_noise_n2_per_s;
+  /// The same of the angle's zero; 0: the zero is as calibrated.
+  std::optional<double> angle_zero_noise_rad2_per_s;
+  std::optional<double> cart_noise_m2_per_s3;        ///< white acceleration of the cart
+  std::optional<double> pendulum_noise_rad2_per_s3;  ///< white acceleration of the pendulum
+  std::optional<double> cart_resolution_m;           ///< step of the cart's encoder
+  std::optional<double> angle_resolution_rad;        ///< step of the pendulum's encoder
+};
+
+/// Share of the estimated force on the cart that the voltage takes away, 0 to 1.
+struct DisturbanceRejection {
+  double share = 1.0;
+  /// A predictor lets the force fade with this time constant; 0: it stays as it is.
+  double decay_s = 0.0;
+};
+
+/// Share of the dry friction in an extended Kalman filter's plant file that the voltage takes away, 0 to 1.
+struct FrictionCompensation {
+  double share = 1.0;
+  /// First-order lag of it: about what a real actuator is later than its model. Quicker, and it would push
+  /// before the motor has let go of the last direction.
+  double lag_s = 0.005;
+};
+
 /// Everything a controller is made of: V(t) = gains . [x, theta, x', theta'](t - delay_s).
 struct ControlConfig {
   Gains gains;
   double delay_s = 0.0;
   double sample_rate_hz = 1000.0;
   EstimatorConfig estimator;
+  StateEstimatorConfig state_estimator;
+  DisturbanceRejection rejection;
+  FrictionCompensation friction;
   DelayCompensation compensation;
 
   double period_s() const { return 1.0 / sample_rate_hz; }
+  bool has_state_estimator() const { return state_estimator.kind != StateEstimatorKind::none; }
 };
 
 inline constexpr double lowest_sample_rate_hz = 1.0;

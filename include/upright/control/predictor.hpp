@@ -21,7 +21,9 @@
 #include <memory>
 #include <vector>
 
-#include "upright/control/controller.hpp"
+#include "upright/control/gain_file.hpp"
+#include "upright/control/state_estimator.hpp"
+#include "upright/control/velocity_estimator.hpp"
 #include "upright/model/dynamics.hpp"
 #include "upright/model/plant.hpp"
 
@@ -102,8 +104,5 @@ class Predictor final : public DelayCompensator {
   std::size_t steps_ = 0;
   Vector free_state_;
 };
-
-/// The compensator a configuration asks for; none where it asks for none. Reads the plant file it names.
-std::unique_ptr<DelayCompensator> make_compensator(const ControlConfig& config);
 
 }  // namespace upright

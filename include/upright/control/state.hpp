@@ -9,6 +9,9 @@ struct ControlState {
   double theta_rad = 0.0;
   double cart_velocity_mps = 0.0;
   double pendulum_rate_radps = 0.0;
+  // Known to a model-based estimator only.
+  double motor_v = 0.0;       ///< behind a motor lag that its plant file has
+  double cart_force_n = 0.0;  ///< estimated: what the voltage is to take away of the force on the cart
 };
 
 }  // namespace upright

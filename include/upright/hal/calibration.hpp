@@ -100,6 +100,8 @@ class PoseScaler {
     return pose();
   }
 
+  const Calibration& calibration() const noexcept { return calibration_; }
+
  private:
   Pose pose() const noexcept {
     const EncoderCalibration& c = calibration_.cart;

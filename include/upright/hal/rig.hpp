@@ -21,7 +21,9 @@ enum class RigFault : std::uint8_t {
   corrupt_reply,     ///< a reply failed its check sum or its format
   device_restarted,  ///< the device came back with its counters or its watchdog reset
   counts_jumped,     ///< the counts went somewhere no motion leads to, and stayed there
-  device_refused,    ///< the device answered with an exception
+  device_refused,    ///< the device answered with an exception that will not pass by itself
+  device_busy,       ///< the device answered with an exception that says: later
+  output_kept,       ///< the device acknowledged zero volts, but its output reads back as another voltage
   not_finite,        ///< a value that is not a finite number was about to be used
   out_of_range,      ///< counts or volts outside what the hardware can mean
   emergency_stop,
@@ -66,6 +68,28 @@ struct SafetyInputs {
   int limit_switches = 0;
 };
 
+/// What is known of a stop. Zero volts is confirmed when the device has taken it and, where its output can be
+/// read back, when that reads zero.
+struct StopReport {
+  bool zero_confirmed = false;
+  bool read_back = false;  ///< the output reads zero; false: the device's acknowledgement is all there is
+  bool disabled = true;    ///< the amplifier is disabled, or nothing here can disable it
+  /// The device's own watchdog takes the voltage away so long after the last request, as was programmed and
+  /// read back [s]; 0: it has none.
+  double watchdog_s = 0.0;
+  RigFault fault = RigFault::none;  ///< of the latest attempt: why zero volts is not confirmed
+  int exception = 0;                ///< behind a fault: the number that the device answered with
+
+  bool done() const noexcept { return zero_confirmed && disabled; }
+};
+
+/// Of a rig that has no voltage to take away, or that cannot fail to.
+constexpr StopReport at_zero_volts() noexcept {
+  StopReport report;
+  report.zero_confirmed = true;
+  return report;
+}
+
 /// A rig as the loop sees it. `open` may throw Error and take its time; everything else is called from the
 /// real-time thread and neither allocates, locks, throws nor blocks beyond the deadline the backend was
 /// opened with.
@@ -78,9 +102,13 @@ class Rig {
   /// Commands a voltage that the limiter has passed. A value that is not finite is refused and becomes zero
   /// volts.
   virtual RigFault write(double voltage_v) noexcept = 0;
-  /// Zero volts and output disabled, by every means the backend has. May be called again and from a signal's
-  /// aftermath.
-  virtual void stop() noexcept = 0;
+  /// Begins to put out zero volts and to disable the amplifier, by every means the backend has, and says what
+  /// is known of it so far. It never waits for an answer: call it again until the report is done. A backend
+  /// that has to wait goes on trying by itself, until the rig is opened again or destroyed.
+  virtual StopReport stop() noexcept = 0;
+  /// The number of the exception that the device answered with last; 0: none. A rig around another one passes
+  /// on that one's.
+  virtual int last_exception() const noexcept { return 0; }
   /// What is wired, of an open rig. A rig around another one passes on that one's.
   virtual SafetyInputs safety_inputs() const noexcept { return {}; }
 };

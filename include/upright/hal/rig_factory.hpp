@@ -14,6 +14,10 @@ struct RigOptions {
   double period_s = 0.0;  ///< of the loop: links must answer within it
 };
 
+/// Throws ConfigError where the rig's link cannot carry a loop of this period: its response timeout or the
+/// bytes of one period on a serial line take longer.
+void require_link_fits(const RigFile& rig, double period_s);
+
 /// Throws ConfigError for what this build or this combination cannot do, and for a response timeout that does
 /// not fit into the period. The rig is not open yet.
 std::unique_ptr<Rig> make_rig(const RigFile& rig, const RigOptions& options);

@@ -7,6 +7,7 @@
 #include <optional>
 #include <string>
 
+#include "upright/control/encoder_assumptions.hpp"
 #include "upright/hal/calibration.hpp"
 #include "upright/hal/comedi_wiring.hpp"
 #include "upright/hal/gpio.hpp"
@@ -83,6 +84,8 @@ struct ModbusRig {
   CounterFormat counter;
   int voltage_address = 0;
   VoltageFormat voltage;
+  /// False: the voltage registers read back as something else than the output, so that a stop does not ask.
+  bool voltage_reads_back = true;
   std::optional<int> enable_address;      ///< holding register: 1 enables the amplifier, 0 disables it
   std::optional<int> boot_count_address;  ///< same table as the counters: changes when the device restarts
   std::optional<DeviceWatchdog> watchdog;
@@ -106,6 +109,7 @@ struct RigFile {
   std::optional<ModbusRig> modbus;
   std::optional<ComediRig> comedi;
   std::optional<GpioRig> gpio;
+  std::optional<EncoderAssumptions> encoder_watch;
 };
 
 /// Reads a rig file. Throws ConfigError with remedy, file, line and key.

@@ -36,6 +36,9 @@ class SimulatedRigWithHand : public Rig {
  public:
   /// Outside the loop, on an open rig. Undoes what the hand did before.
   virtual void handle(const Hand& hand) = 0;
+  /// Steps that the plant's integration has taken since the hand last did something, an event counted as the
+  /// steps that finding its time takes: a measure of the computing, of which a stiff plant needs much more.
+  virtual std::uint64_t steps_taken() const noexcept = 0;
 };
 
 /// Reads the plant file that `rig` names. The plant is held in its initial state, as a hand would, until the

@@ -49,6 +49,8 @@ class FrameMaker {
   /// A pose from before the first run, while the program waits at zero volts.
   void add_pose(double time_s, const Pose& pose);
   void say(const LiveState& state) { state_ = state; }
+  /// No row follows: what is shown last is no voltage, which a run that lasted its whole time has no row of.
+  void rest();
   const LiveState& state() const { return state_; }
   /// Rows that did not come through to here, beyond those that were added.
   void note_unseen(std::uint64_t rows) { unseen_ += rows; }

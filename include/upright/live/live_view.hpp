@@ -1,9 +1,8 @@
 // `--live`: one page on the loopback interface that shows a run while it goes on, and has a stop button.
 //
 // The way of the data: the log's writer thread puts each row into a lock-free queue and never waits; a thread
-// of the view takes rows out 25 times per second and makes frames; the server's threads send them. None of
-// them has real-time priority, and all stay off the loop's processor. The loop itself does nothing for the
-// page.
+// of the view takes rows out 25 times per second and makes frames; the server's thread sends them. Neither
+// has real-time priority, and both stay off the loop's processor. The loop itself does nothing for the page.
 #pragma once
 
 #include <functional>

@@ -14,7 +14,7 @@ enum class ExitCode : int {
   device = 4,   ///< link or device error
 };
 
-/// One plain sentence, the remedy first, and the exit code the command ends with.
+/// One plain sentence, the cause first and then the remedy, and the exit code the command ends with.
 class Error : public std::runtime_error {
  public:
   Error(ExitCode code, const std::string& sentence) : std::runtime_error(sentence), code_(code) {}

@@ -51,7 +51,7 @@ struct Plant {
   void remove(std::size_t effect);
 };
 
-/// What is wrong with a plant as a whole, a sentence with the remedy first; empty when it can be simulated.
+/// What is wrong with a plant as a whole, "CAUSE: REMEDY"; empty when it can be simulated.
 std::string fault_of(const Plant& plant);
 
 }  // namespace upright

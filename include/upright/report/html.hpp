@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "upright/report/number_text.hpp"
 #include "upright/report/plot.hpp"
 
 namespace upright {
@@ -21,7 +22,18 @@ struct HtmlTable {
   std::vector<std::string> header;
   std::vector<std::vector<std::string>> rows;
   std::string caption;
+  std::vector<std::string> links = {};  ///< for the first cell of each row; empty: none there, or nowhere
 };
+
+/// One bar of a bar chart whose lengths are magnitudes above `floor`, on a logarithmic scale.
+struct HtmlBar {
+  std::string name;
+  double value = 0.0;
+  std::string_view color = color::after;
+};
+
+/// A link to a file beside a page: its path with what a browser would misread written as %XX.
+std::string link_to(const std::filesystem::path& relative);
 
 class HtmlPage {
  public:
@@ -35,12 +47,17 @@ class HtmlPage {
   /// A remark set off from the text.
   void note(Tone tone, const std::string& text);
   /// Cells that read as numbers are aligned to the right.
+  /// Where the window is too narrow for a table's words, each row becomes a small list of its own.
   void table(const HtmlTable& table);
+  /// A bar for each name, with its value; the smallest length is `floor`'s.
+  void bars(const std::vector<HtmlBar>& bars, double floor, const std::string& caption);
   /// Names and their values, in two columns where there is room.
   void facts(const std::vector<std::pair<std::string, std::string>>& facts);
   void figure(const Plot& plot, const std::string& caption);
   /// Two figures beside each other where the window is wide enough.
   void figures(const std::vector<Plot>& plots, const std::string& caption);
+  /// Plots above each other whose horizontal axes align: same range, same place.
+  void stack(std::vector<Plot> plots, const std::string& caption);
   /// Text as it is, in a fixed pitch.
   void preformatted(const std::string& text);
   /// Text as it is (a configuration file, say), folded away under its heading.
@@ -51,14 +68,12 @@ class HtmlPage {
   void write(const std::filesystem::path& file) const;
 
  private:
+  void draw(const std::vector<Plot>& plots);
   std::string next_id();
   std::string title_;
   std::string subtitle_;
   std::string body_;
   int figures_ = 0;
 };
-
-/// A number for a reader: `digits` significant digits.
-std::string number_text(double value, int digits = 4);
 
 }  // namespace upright

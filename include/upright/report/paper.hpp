@@ -3,8 +3,8 @@
 #pragma once
 
 #include <filesystem>
-#include <functional>
-#include <string>
+
+#include "upright/model/progress.hpp"
 
 namespace upright {
 
@@ -12,7 +12,7 @@ struct PaperOptions {
   std::filesystem::path config = "config";  ///< the folder with gains/, plants/ and rigs/
   unsigned threads = 0;                     ///< 0: one per processor
   /// Called before each part of the work.
-  std::function<void(const std::string& part)> progress;
+  ProgressCallback progress;
 };
 
 /// Makes every run and writes `paper.md` and the plots it shows (`paper/*.svg`) into `folder`. Throws Error.

@@ -4,8 +4,11 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
+
+#include "upright/report/palette.hpp"
 
 namespace upright {
 
@@ -14,6 +17,7 @@ struct Axis {
   bool logarithmic = false;
   std::optional<double> low;  ///< not given: from the data
   std::optional<double> high;
+  bool whole = false;  ///< counts: no tick between two whole numbers
 };
 
 /// Points joined in their order. A value that is not finite leaves a gap.
@@ -23,7 +27,7 @@ struct Series {
   std::vector<double> x;
   std::vector<double> y;  ///< as many as x
   Style style = Style::line;
-  int color = -1;  ///< place in the palette; -1: the next one
+  std::string_view color = {};  ///< of the palette; empty: the next of color::curve
   bool dashed = false;
 };
 
@@ -41,7 +45,7 @@ struct HeatMap {
   std::vector<double> y;
   std::vector<double> values;  ///< row by row, y.size() rows of x.size(); not finite: left blank
   std::string label;           ///< of the colour scale
-  /// For outcomes instead of magnitudes: value k is drawn in the k-th colour and named `classes[k]`.
+  /// For outcomes instead of magnitudes: value k is `classes[k]`, in the colour that it has everywhere.
   std::vector<std::string> classes;
 };
 
@@ -60,17 +64,37 @@ struct Plot {
   std::optional<HeatMap> heat_map;
   std::vector<Mark> vertical_marks;
   std::vector<Mark> horizontal_marks;
+  std::string link;  ///< where the title leads to, on a page: a file beside it
   int width_px = 900;
   int height_px = 260;
+  int text_px = 12;
+  /// Room for the vertical axis; plots above each other share the largest, so that their axes align.
+  std::optional<int> left_px;
 };
 
-/// Draws the plot: one `<svg>` element that refers to nothing outside itself and whose identifiers begin with
-/// `id` (letters and digits; unique within a page). Text is shown as given, never interpreted. Long lines are
-/// thinned to the smallest and largest value of each pixel column, so no peak is lost.
-/// Throws Error when gnuplot is missing or fails, and when x and y of a series differ in length.
+/// What a plot's curves and colours mean, for a key beside the drawing.
+struct KeyEntry {
+  enum class Swatch { line, dashed, point, area };
+  std::string name;
+  std::string_view color;
+  Swatch swatch = Swatch::line;
+};
+std::vector<KeyEntry> key_of(const Plot& plot);
+
+/// The room that the texts of the vertical axis need.
+int left_px_of(const Plot& plot);
+
+/// Gives plots that stand above each other the same horizontal range at the same place.
+void align(std::vector<Plot>& plots);
+
+/// Draws the plot without its title and key: one `<svg>` element that refers to nothing outside itself and
+/// whose identifiers begin with `id` (letters and digits; unique within a page). Text is shown as given,
+/// never interpreted. Long lines are thinned to the smallest and largest value of each pixel column, so no
+/// peak is lost. Throws Error when gnuplot is missing or fails, and when x and y of a series differ in
+/// length.
 std::string svg_of(const Plot& plot, const std::string& id);
 
-/// The same as a file of its own, which a browser shows and a Markdown page includes.
+/// The same with title and key as a file of its own, which a browser shows and a Markdown page includes.
 std::string svg_file_of(const Plot& plot);
 
 /// Thins a line to at most about two points per column over `columns` columns; keeps each column's extremes.

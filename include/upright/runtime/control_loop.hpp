@@ -47,9 +47,12 @@ struct LoopLimits {
   double watchdog_s = 0.0;
   /// Stop when more periods than this in a row ended late or were missed.
   std::uint64_t most_periods_late = 0;
-  /// A cart without voltage rolls on for so many seconds times its velocity. Experiments leave it at 0: the
-  /// travel they keep to has room for that.
+  /// A cart without voltage rolls on for so many seconds times its velocity.
   double coast_s = 0.0;
+  EncoderAssumptions encoders = {};  ///< of the watch on the encoders
+  // What is known beforehand and may be why it ends: for sentence_of.
+  bool delay_exceeded = false;  ///< the plant does not bear the loop's delay, or its gains
+  bool signs_unproven = false;  ///< a real rig whose signs nobody checked
 };
 
 /// The latest of the loop, for whoever shows it. Written by the loop, read by others; each field for itself.
@@ -72,8 +75,10 @@ struct LoopCounts {
 struct LoopOutcome {
   StopReason reason = StopReason::duration;
   RigFault fault = RigFault::none;          ///< behind a stop by the rig or the link
+  int exception = 0;                        ///< behind that fault: the number the device answered with
   StuckEncoder stuck = StuckEncoder::none;  ///< behind a stop by a stuck encoder
   int signal = 0;
+  bool realtime = false;             ///< the loop was granted SCHED_FIFO
   std::int64_t start_ns = 0;         ///< on the loop's clock: time zero of the samples
   std::uint64_t tick = 0;            ///< cycle in which the run ended
   std::uint64_t first_bad_tick = 0;  ///< of the trouble that ended it
@@ -81,11 +86,12 @@ struct LoopOutcome {
   double worst_theta_rad = 0.0;      ///< largest |theta|
   double worst_cart_m = 0.0;         ///< largest |x|
   double last_theta_rad = 0.0, last_cart_m = 0.0;
+  StopReport stop;  ///< whether the motor is known to be at zero volts
   LoopCounts counts;
   DurationHistogram wake_late, read, compute, write, cycle;
 };
 
-/// One sentence: what ended the run, the first bad cycle and what to do.
+/// One sentence: what ended the run with its first bad cycle, and then what to do.
 std::string sentence_of(const LoopOutcome& outcome, const LoopLimits& limits);
 
 /// Set by a signal handler: the signal's number, or 0. The live page's stop button sets
@@ -93,7 +99,8 @@ std::string sentence_of(const LoopOutcome& outcome, const LoopLimits& limits);
 using SignalFlag = std::atomic<int>;
 inline constexpr int stop_button_pressed = -1;
 
-/// Runs until the periods are over or a safety stop. The rig is open; when this returns it has been stopped.
+/// Runs until the periods are over or a safety stop. The rig is open; when this returns its stop has begun
+/// (`LoopOutcome::stop`), and somebody else waits for it. The last row of a safety stop is at zero volts.
 /// Neither allocates, locks nor throws from the first cycle on, except that in virtual time it waits for the
 /// log.
 class ControlLoop {
@@ -111,10 +118,13 @@ class ControlLoop {
     std::int64_t read_ns, computed_ns, end_ns;
   };
   Stamps act(const Wake& wake, LoopOutcome& outcome) noexcept;
+  bool asked_to_end(LoopOutcome& outcome) noexcept;
+  void log_stop(std::int64_t woke_ns, LoopOutcome& outcome) noexcept;
   void run_cycle(const Wake& wake, std::int64_t woke_ns, LoopOutcome& outcome) noexcept;
   bool accept(const RigReading& reading, const Wake& wake, LoopOutcome& outcome) noexcept;
   void compute(const Wake& wake, LoopOutcome& outcome) noexcept;
-  bool beyond_track(bool balancing) const noexcept;
+  bool beyond_track(const Demand& demand) noexcept;
+  bool strays_on_return() noexcept;
   void watch_encoders(const Wake& wake, bool balancing, LoopOutcome& outcome) noexcept;
   void write(const Wake& wake, LoopOutcome& outcome) noexcept;
   void count_missed(const Wake& wake, LoopOutcome& outcome) noexcept;
@@ -136,6 +146,9 @@ class ControlLoop {
   std::int64_t watchdog_ns_ = 0, last_fresh_ns_ = 0, last_write_ns_ = 0, read_done_ns_ = 0;
   std::uint64_t first_held_tick_ = 0, first_unwritten_tick_ = 0, first_late_tick_ = 0, periods_late_ = 0;
   RigFault last_fault_ = RigFault::none;
+  bool after_gap_ = false;       // periods were missed, and no fresh reading has come since
+  double return_bound_m_ = 0.0;  ///< how far out the cart may be while it comes back
+  bool returning_ = false;  ///< a script began homing, and the cart is not yet known to stay on the track
   bool held_ = false, unwritten_ = false, begun_ = false, stopped_ = false, over_ = false, scripted_ = false;
 };
 

@@ -6,12 +6,14 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "upright/hal/simulated_rig.hpp"
+#include "upright/model/progress.hpp"
 #include "upright/runtime/experiment_script.hpp"
 #include "upright/runtime/run_reader.hpp"
 #include "upright/runtime/session.hpp"
@@ -25,18 +27,32 @@ struct ExperimentSetup {
   Plant plant;                     ///< what the plan is made with
   std::optional<Plant> simulated;  ///< the simulated rig's own
   ControlConfig control;           ///< without a gain file: no feedback, 1000 Hz
+  /// The gain files that pieces compare.
+  std::map<std::filesystem::path, ControlConfig> controllers;
 };
 
 /// `plant`, where given, stands in for the experiment's and the simulated rig's. Throws ConfigError.
 ExperimentSetup resolve_experiment(const std::filesystem::path& file, const std::filesystem::path& rig,
                                    const std::filesystem::path& plant, std::optional<double> sample_rate_hz);
 
+/// Reads the gain files that pieces compare into `setup.controllers`. All run at the rate of the experiment:
+/// where nothing but gain files gives it (no `sample_rate_hz` here), theirs must be the same. Throws
+/// ConfigError.
+void read_controllers(ExperimentSetup& setup, std::optional<double> sample_rate_hz);
+
+/// What controls a piece that balances; of a comparison, its controller of that number.
+const ControlConfig& control_of(const ExperimentSetup& setup, const Piece& piece, std::size_t controller = 0);
+
 /// What a piece did, or would do.
 struct Rehearsal {
   LoopOutcome outcome;
   std::vector<LogRecord> rows;
   double farthest_m = 0.0;
-  int cut_short = 0;  ///< times the guard had to end a stretch
+  double most_v = 0.0;
+  int cut_short = 0;         ///< times the guard had to end a stretch
+  bool script_over = false;  ///< false: it did not come to its end
+  std::uint64_t steps = 0;   ///< control periods and integration steps that it took
+  bool too_long = false;     ///< more of them than it may take: it was broken off
 };
 
 /// Runs a piece through the one loop on a simulated rig with `setup.plant`, in virtual time and in memory.
@@ -44,21 +60,37 @@ Rehearsal rehearse(const Piece& piece, const ExperimentSetup& setup);
 /// The same where the rig is `real`, and the plan is made with `setup.plant` all the same.
 Rehearsal rehearse(const Piece& piece, const ExperimentSetup& setup, const Plant& real);
 
-/// The pieces as they will be run: voltages lowered where the file allows it. Throws ConfigError, remedy
-/// first, for a piece that would leave the travel, could not reach its speed on it, or falls.
-std::vector<Piece> plan_pieces(const ExperimentSetup& setup);
+/// A piece as it will be run: its voltages lowered where the file allows it. The rest is what its rehearsal
+/// did, of a delay sweep that of the shortest delay, of a comparison the most of any controller and start.
+struct PlannedPiece {
+  Piece piece;
+  double duration_s = 0.0, farthest_m = 0.0, most_v = 0.0;
+};
+
+/// Rehearses every piece. Throws ConfigError, with file and line, for a piece that would leave the travel,
+/// could not reach its speed on it, falls, or takes more than 16 million control periods and integration
+/// steps to rehearse together with those before it (some 10 s of computing).
+std::vector<PlannedPiece> rehearse_all(const ExperimentSetup& setup, const ProgressCallback& progress = {});
+/// The pieces of the same.
+std::vector<Piece> plan_pieces(const ExperimentSetup& setup, const ProgressCallback& progress = {});
 
 /// What the operator does before a piece, on a simulated rig.
 Hand hand_for(const Piece& piece);
 
-/// One run: a piece, or one delay of a sweep.
+/// One run: a piece, one delay of a sweep, or one controller of a comparison.
 struct ExperimentTrial {
   std::size_t piece = 0;
   int repeat = 0;
   double delay_s = 0.0;
+  std::size_t controller = 0;  ///< place in Piece::controllers
 };
 
-/// How a trial went. `outcome`: "done", or for delay sweeps "stable", "oscillating" or "fell".
+/// The piece as one trial runs it: one delay, one controller, one start.
+Piece piece_of(const ExperimentTrial& trial, const Piece& piece);
+
+/// How a trial went. `outcome`: "done"; in comparisons also "fell"; for delay sweeps "stable", "oscillating"
+/// or "fell"; empty where
+/// the run ended before what it was to measure had begun, or was cut short: it is no result.
 struct TrialResult {
   ExperimentTrial trial;
   std::string run_directory;  ///< within the experiment's folder
@@ -67,14 +99,21 @@ struct TrialResult {
   double theta0_rad = 0.0, theta_amplitude_rad = 0.0, cart_amplitude_m = 0.0;
   double fall_time_s = 0.0;   ///< not a number: it did not fall
   double frequency_hz = 0.0;  ///< of the angle; not a number where it does not oscillate
+  std::string controller;     ///< of a comparison: its name; otherwise empty
+  std::string gains;          ///< the gain file, where the piece balances; characters of CSV replaced
 };
 
 /// The next trial, given those that were done; none: all is done. Delays grow, so that falls come late; what
-/// lies between two outcomes is bisected, the fall last.
+/// lies between two outcomes is bisected, the fall last. Controllers take turns, round after round.
 std::optional<ExperimentTrial> next_trial(const std::vector<Piece>& pieces,
                                           const std::vector<TrialResult>& done);
 
-/// Judges the balancing part of a run: amplitudes and frequency over its last third.
+/// Why delay sweeps whose trials are all done are not complete: a repeat in which nothing fell has not found
+/// where it falls. Cause first; empty: every transition was found.
+std::string missing_transitions(const std::vector<Piece>& pieces, const std::vector<TrialResult>& done);
+
+/// Judges the balancing part of a run of `piece` (the whole one): amplitudes and frequency over its last
+/// third. A run that never balanced has no outcome.
 TrialResult judge_trial(const ExperimentTrial& trial, const Piece& piece, const std::vector<LogRecord>& rows,
                         StopReason reason);
 
@@ -84,6 +123,10 @@ struct ExperimentOptions {
   std::uint64_t seed = 1;
   RealtimeRequest realtime;
   RowWatcher* watcher = nullptr;  ///< of every trial's rows; null: nobody
+  /// Puts what is known of a loop that balances, with the trial's delay, into its limits: how many late
+  /// periods it bears, and whether its delay is beyond that. Empty: default_periods_late.
+  std::function<void(const ControlConfig&, LoopLimits&)> know_loop;
+  StopWatcher stop;  ///< of the end of every trial
   /// Before each trial. May wait for somebody, and may throw.
   std::function<void(const Piece&, const ExperimentTrial&)> announce;
   std::function<void(const TrialResult&)> finished;
@@ -95,11 +138,17 @@ struct ExperimentResult {
   std::size_t made = 0;             ///< in this call
   bool complete = false;
   std::string sentence;  ///< why it is not complete
+  /// Of the last trial in this call. Where zero volts could not be confirmed nothing follows.
+  StopReport stop = at_zero_volts();
 };
 
-/// The trials that a folder holds; none where it is not an experiment's.
+/// The trials that a folder holds; none where it is not an experiment's. Throws ConfigError with file and
+/// line.
 std::vector<TrialResult> read_trials(const std::filesystem::path& folder);
-/// Trials that a folder holds already. Throws ConfigError where it belongs to another experiment.
+/// Those of them that are results of `pieces`: a run of a sweep without an outcome is to be made again.
+/// Throws ConfigError with file and line.
+std::vector<TrialResult> read_trials(const std::filesystem::path& folder, const std::vector<Piece>& pieces);
+/// The same. Throws ConfigError where the folder belongs to another experiment.
 std::vector<TrialResult> read_trials(const std::filesystem::path& folder, const ExperimentSetup& setup,
                                      const std::vector<Piece>& pieces);
 

@@ -32,6 +32,12 @@ const char* name_of(PieceKind kind) noexcept;
 /// Who brings the pendulum upright.
 enum class StartBy : std::uint8_t { hand, swing_up };
 
+/// A controller that takes turns with others: the name it is told by, and its gain file.
+struct NamedGains {
+  std::string name;
+  std::filesystem::path file;
+};
+
 /// One piece. Which fields count depends on the kind; docs/experiments.md has the table.
 struct Piece {
   PieceKind kind = PieceKind::observe;
@@ -55,15 +61,23 @@ struct Piece {
   double bisect_to_s = 0.0;      ///< 0: transitions are not bisected
   double stable_below_rad = 0.0;
   StartBy start = StartBy::hand;
-  double theta0_rad = 0.0;     ///< where the hand of a simulated rig lets go
-  double push_mps = 0.0;       ///< what the hand of a simulated rig gives the cart (observe)
+  double theta0_rad = 0.0;  ///< where the hand of a simulated rig lets go
+  double push_mps = 0.0;    ///< what the hand of a simulated rig gives the cart (observe)
+  /// Controllers that take turns, from the same starts (closed_loop); empty: the experiment's.
+  std::vector<NamedGains> controllers;
+  /// With `controllers`: the same for one round after another; empty: theta0_rad in each.
+  std::vector<double> starts_rad;
   double patience_s = 0.0;     ///< longest wait for the operator
   bool fit_to_travel = false;  ///< lower the voltage until the prediction stays within the travel
   bool amplifier_off = false, turned = false;
+  std::optional<YamlMap> source;  ///< where it was read: for what only the plan can refuse
 };
 
 /// True for the kinds that balance.
 bool balances(const Piece& piece) noexcept;
+
+/// True where controllers take turns.
+bool compares(const Piece& piece) noexcept;
 
 struct Experiment {
   std::string name;
@@ -74,7 +88,8 @@ struct Experiment {
   double travel_m = 0.0;        ///< the cart stays within +- this
   double voltage_limit_v = 0.0;
   std::vector<Piece> pieces;
-  std::string text;  ///< of the file, as it was read
+  std::string text;               ///< of the file, as it was read
+  std::optional<YamlMap> source;  ///< where it was read: for what only the plan can refuse
 };
 
 /// Reads an experiment file. Throws ConfigError with remedy, file, line and key.

@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "upright/control/controller.hpp"
+#include "upright/model/progress.hpp"
 #include "upright/runtime/run_reader.hpp"
 
 namespace upright {
@@ -23,13 +24,12 @@ struct ReplayResult {
   std::optional<std::uint64_t> first_lost_tick;
 };
 
-/// Every voltage, requested and applied, must come out bit for bit. A `compensator` is needed when the run
-/// had one, and so is a `source`.
-ReplayResult replay(const RunRecord& run, std::unique_ptr<DelayCompensator> compensator = nullptr,
-                    CommandSource* source = nullptr);
+/// Every voltage, requested and applied, must come out bit for bit. `parts` are those that the run's
+/// controller asks for (`make_model_parts`), and `source` is the run's, where it had one.
+ReplayResult replay(const RunRecord& run, ModelParts parts = {}, CommandSource* source = nullptr);
 
-/// The same with the rows of a file: `run` is read without them.
-ReplayResult replay(const RunRecord& run, SampleReader& rows,
-                    std::unique_ptr<DelayCompensator> compensator = nullptr, CommandSource* source = nullptr);
+/// The same with the rows of a file: `run` is read without them. `progress` may be empty.
+ReplayResult replay(const RunRecord& run, SampleReader& rows, ModelParts parts = {},
+                    CommandSource* source = nullptr, const ProgressCallback& progress = {});
 
 }  // namespace upright

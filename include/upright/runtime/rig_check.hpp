@@ -28,10 +28,15 @@ struct LinkProbe {
 /// Reads at `rate_hz` for `duration_s`, or until a signal.
 LinkProbe probe_link(Rig& rig, Clock& clock, double rate_hz, double duration_s, const SignalFlag& signal);
 
-/// The rate at which 99.9 % of the periods have time for their two exchanges, reading and writing [Hz].
+/// The rate at which 99 % of the periods have time for their two exchanges, reading and writing [Hz]. One
+/// slow exchange never decides it.
 double highest_rate_hz(const DurationHistogram& round_trip);
 
 Finding judge_link(const LinkProbe& probe, double rate_hz);
+
+/// The doctor's verdict in one sentence. It is about `rate_hz`, the rate that was examined: where the link
+/// carries less, it says how much. Without a link `round_trip` is null.
+std::string verdict_sentence(Health verdict, double rate_hz, const DurationHistogram* round_trip);
 
 /// The pendulum hangs at rest: is that what the calibration says? If not, the remedy has the counts to put
 /// in.

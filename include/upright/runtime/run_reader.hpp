@@ -37,6 +37,8 @@ class SampleReader {
   bool next(LogRecord& row);
   /// After the last row: the last line was cut and was left out.
   bool truncated() const noexcept;
+  /// How much of the file is read, 0 to 1.
+  double share_read() const noexcept;
 
  private:
   class Implementation;

@@ -1,5 +1,6 @@
 // Do signs and directions agree on a rig? Low pulses tell: positive voltage must make cart_m grow, and a
-// hanging pendulum lags behind the cart. The answer is kept beside the rig file; experiments ask for it.
+// hanging pendulum lags behind the cart. The answer is kept beside the rig file; runs and
+// experiments ask for it.
 #pragma once
 
 #include <filesystem>
@@ -23,6 +24,8 @@ SignFinding judge_signs(const std::vector<LogRecord>& rows, bool has_pendulum);
 std::filesystem::path sign_record_of(const RigFile& rig);
 /// True when there is a record, of the same link, calibration and amplifier sign.
 bool signs_are_checked(const RigFile& rig);
+/// Throws ConfigError on hardware without such a record. `otherwise` ends the sentence: what else would do.
+void require_checked_signs(const RigFile& rig, const std::string& otherwise);
 /// Throws Error when it cannot be written.
 void write_sign_record(const RigFile& rig, const std::string& sentence);
 

@@ -38,6 +38,9 @@ struct EngineOptions {
   /// Steps of the Runge-Kutta engine are at most this fraction of the inverse of the fastest rate of the
   /// motion.
   double step_fraction = 0.2;
+  /// Steps of the Runge-Kutta engine are no shorter than this but at events, however fast the motion: a bound
+  /// on the work of an engine that a control loop waits for.
+  double min_step_s = 0.0;
   /// Steps of the Runge-Kutta engine resolve the oscillation of the cart on its bristles even where their
   /// relaxation damps it. Without, stiff bristles cost nothing, and positions err by less than 1e-6 m or so.
   bool resolve_bristles = true;

@@ -252,7 +252,9 @@ class EventEngine {
     return std::min(rate, most_rate_radps);
   }
 
-  double rate_step(double rate) const { return std::min(options_.max_step_s, options_.step_fraction / rate); }
+  double rate_step(double rate) const {
+    return std::clamp(options_.step_fraction / rate, options_.min_step_s, options_.max_step_s);
+  }
 
   static S even_step(const S& remaining, double limit) {
     const double pieces = std::ceil(value_of(remaining) / limit - 1e-9);
@@ -264,7 +266,10 @@ class EventEngine {
     if (dynamics_.has_motor_lag()) {
       const double gap_v = std::abs(value_of(drive_) - value_of(state_.motor_v));
       constexpr double settled_v = 1e-9;
-      if (gap_v > settled_v) rate += options_.step_fraction / value_of(dynamics_.motor_time_constant_s());
+      // A lag that is shorter than the shortest step is over within it.
+      if (gap_v > settled_v)
+        rate = std::min(rate + options_.step_fraction / value_of(dynamics_.motor_time_constant_s()),
+                        most_rate_radps);
     }
     return even_step(remaining, rate_step(rate));
   }

@@ -26,9 +26,8 @@ struct LoopSetup {
   double amplifier_limit_v = 1e6;     ///< sampled; the default is out of reach of any loop
   double duration_s = 20.0;
   double fell_above_rad = 1.0;  ///< a run ends where |theta| reaches this
-  /// Makes the compensator of a sampled loop for one delay; empty: none.
-  std::function<std::unique_ptr<DelayCompensator>(const ControlConfig&, double amplifier_limit_v)>
-      make_compensator;
+  /// Makes the estimator and the compensator of a sampled loop for one delay; empty: neither.
+  std::function<ModelParts(const ControlConfig&)> make_parts;
 
   /// The amplitudes are taken over the last third of the run.
   double window_begin_s() const { return duration_s * (2.0 / 3.0); }

@@ -1,4 +1,4 @@
-#include "upright/analysis/riccati.hpp"
+#include "upright/model/riccati.hpp"
 
 #include <Eigen/Dense>
 #include <Eigen/Eigenvalues>
@@ -76,22 +76,22 @@ void finish_continuous(RiccatiSolution& solution, const MatrixXd& a, const Vecto
                                                      square.cwiseAbs().maxCoeff(), q.cwiseAbs().maxCoeff()});
 }
 
-[[noreturn]] void refuse(const MatrixXd& a, const VectorXd& b, const MatrixXd& q, const std::string& why) {
-  throw ConfigError("correct the plant or the weights: " + why + ", " + matrix_text("A", a) + ", " +
-                    matrix_text("b", b) + ", " + matrix_text("Q", q));
+[[noreturn]] void refuse(const MatrixXd& a, const MatrixXd& b, const MatrixXd& q, const std::string& why) {
+  throw ConfigError(why + ", " + matrix_text("A", a) + ", " + matrix_text("b", b) + ", " +
+                    matrix_text("Q", q) + ": correct the plant or the weights");
 }
 
-void check(const MatrixXd& a, const VectorXd& b, const MatrixXd& q, double r) {
+void check(const MatrixXd& a, const MatrixXd& b, const MatrixXd& q, const MatrixXd& r) {
   if (!a.allFinite()) refuse(a, b, q, "the matrix A has an entry that is not finite");
   if (!b.allFinite()) refuse(a, b, q, "the matrix b has an entry that is not finite");
   if (!q.allFinite()) refuse(a, b, q, "the matrix Q has an entry that is not finite");
-  if (!(r > 0.0)) refuse(a, b, q, "the weight r must be above 0");
+  if (!(r.diagonal().minCoeff() > 0.0)) refuse(a, b, q, "the weight r must be above 0");
 }
 
 }  // namespace
 
 RiccatiSolution solve_continuous_riccati(const MatrixXd& a, const VectorXd& b, const MatrixXd& q, double r) {
-  check(a, b, q, r);
+  check(a, b, q, MatrixXd::Constant(1, 1, r));
   const Index n = a.rows();
   MatrixXd hamiltonian(2 * n, 2 * n);
   hamiltonian << a, -b * b.transpose() / r, -q, -a.transpose();
@@ -117,13 +117,14 @@ RiccatiSolution solve_continuous_riccati(const MatrixXd& a, const VectorXd& b, c
   return solution;
 }
 
-RiccatiSolution solve_discrete_riccati(const MatrixXd& a, const VectorXd& b, const MatrixXd& q,
-                                       const VectorXd& s, double r) {
+DiscreteRiccatiSolution solve_discrete_riccati(const MatrixXd& a, const MatrixXd& b, const MatrixXd& q,
+                                               const MatrixXd& s, const MatrixXd& r) {
   check(a, b, q, r);
   const Index n = a.rows();
-  MatrixXd f = a - b * s.transpose() / r;
-  MatrixXd g = b * b.transpose() / r;
-  MatrixXd h = symmetric_part(q - s * s.transpose() / r);
+  const Eigen::LDLT<MatrixXd> weight(r);
+  MatrixXd f = a - b * weight.solve(s.transpose());
+  MatrixXd g = symmetric_part(b * weight.solve(b.transpose()));
+  MatrixXd h = symmetric_part(q - s * weight.solve(s.transpose()));
   constexpr int most_doublings = 60;
   constexpr double converged = 1e-15;
   bool done = false;
@@ -140,10 +141,10 @@ RiccatiSolution solve_discrete_riccati(const MatrixXd& a, const VectorXd& b, con
   if (!done)
     refuse(a, b, q,
            "the matrix pair (A, b) is not stabilizable, or (A, Q) does not show every unstable mode");
-  RiccatiSolution solution;
+  DiscreteRiccatiSolution solution;
   solution.x = h;
-  const Eigen::RowVectorXd cross = b.transpose() * h * a + s.transpose();
-  solution.gain = cross / (r + b.dot(h * b));
+  const MatrixXd cross = b.transpose() * h * a + s.transpose();
+  solution.gain = (r + b.transpose() * h * b).ldlt().solve(cross);
   const MatrixXd moved = a.transpose() * h * a;
   const MatrixXd remainder = moved + q - cross.transpose() * solution.gain - h;
   solution.residual =

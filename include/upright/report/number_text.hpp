@@ -1,0 +1,15 @@
+// Numbers for people: rounded, without an exponent where a plain number is as short.
+#pragma once
+
+#include <string>
+
+namespace upright {
+
+/// `digits` significant digits: 0.4306, 12350, 3.1 × 10⁻⁷. Plain from 0.0001 to ten millions; a dash for what
+/// is not a number.
+std::string number_text(double value, int digits = 4);
+
+/// A value, or an end of its interval, with as many decimals as the interval's width bears: two digits of it.
+std::string number_within(double value, double low, double high);
+
+}  // namespace upright

@@ -1,0 +1,95 @@
+// The fault suite's rows on stops that a Modbus device does not obey at once, or at all: what its own record
+// says, and what is said of it.
+#include <gtest/gtest.h>
+
+#include <ostream>
+#include <string>
+#include <vector>
+
+#include "../integration/stopped_device.hpp"
+#include "fault_table.hpp"
+
+namespace upright::test {
+namespace {
+
+constexpr double trouble_s = 1.0, for_good_s = 60.0;
+/// Between two attempts, with their time-outs, and what a busy machine adds.
+constexpr double noticed_within_s = 1.5;
+
+struct StopFault {
+  const char* key;
+  Trouble trouble;
+  bool for_good = false;
+  bool has_watchdog = false;
+};
+
+const std::vector<StopFault>& stop_faults() {
+  static const std::vector<StopFault> list = {
+      {"stop_busy", Trouble::busy},
+      {"stop_refused_connections", Trouble::refuses_connections},
+      {"stop_resets", Trouble::resets},
+      {"stop_wrong_replies", Trouble::wrong_unit},
+      {"stop_ignored", Trouble::ignores_writes},
+      {"stop_refused_function", Trouble::refuses_read_write, true},
+      {"stop_ignored_for_good", Trouble::ignores_writes, true},
+      {"stop_silent_watchdog", Trouble::silent, true, true},
+  };
+  return list;
+}
+
+struct On {
+  StopFault fault;
+  bool serial;
+};
+
+void PrintTo(const On& on, std::ostream* out) {
+  *out << on.fault.key << (on.serial ? " over RTU" : " over TCP");
+}
+
+std::vector<On> all() {
+  std::vector<On> list;
+  for (const StopFault& fault : stop_faults())
+    for (const bool serial : {false, true}) list.push_back({fault, serial});
+  return list;
+}
+
+/// What the device's record and the report come to, as the table says it.
+std::string judged(const StopFault& fault, const Stopped& result) {
+  EXPECT_DOUBLE_EQ(result.ran_v, run_v);
+  if (result.report.done()) {
+    EXPECT_EQ(result.at_report_v, 0.0);
+    EXPECT_EQ(result.later_v, 0.0);
+    EXPECT_FALSE(result.enabled_later);
+    EXPECT_LT(result.on_for_s, (fault.for_good ? 0.0 : trouble_s) + noticed_within_s);
+    return fault.for_good ? "0 V at once by function 0x10, confirmed" : "0 V once it obeys, confirmed then";
+  }
+  EXPECT_FALSE(result.report.zero_confirmed);
+  const std::string code = "not confirmed: said aloud, exit code 4";
+  if (!fault.has_watchdog) {
+    EXPECT_DOUBLE_EQ(result.later_v, run_v);
+    return "the voltage stays, " + code;
+  }
+  EXPECT_EQ(result.later_v, 0.0);
+  EXPECT_LT(result.on_for_s, 0.1 + 0.05);
+  return "the device's watchdog: 0 V within 100 ms, " + code;
+}
+
+class ModbusStop : public testing::TestWithParam<On> {};
+
+TEST_P(ModbusStop, HasItsOutcome) {
+  const StopFault& fault = GetParam().fault;
+  const double begun_s = monotonic_s();
+  StopWatcher watcher;  // somebody presses Ctrl-C once more
+  watcher.end_requests = [&] { return fault.for_good && monotonic_s() - begun_s > 2.0 ? 1u : 0u; };
+  const StopCase c{GetParam().serial, fault.has_watchdog, fault.trouble,
+                   fault.for_good ? for_good_s : trouble_s};
+  const std::string cell = judged(fault, stopped(c, watcher));
+  if (!HasFailure()) record(fault.key, GetParam().serial ? Bench::modbus_rtu : Bench::modbus_tcp, cell);
+}
+
+INSTANTIATE_TEST_SUITE_P(, ModbusStop, testing::ValuesIn(all()), [](const auto& item) {
+  return std::string(item.param.fault.key) + (item.param.serial ? "_rtu" : "_tcp");
+});
+
+}  // namespace
+}  // namespace upright::test
