@@ -13,6 +13,7 @@
 #include "upright/analysis/sweep.hpp"
 #include "upright/control/model_parts.hpp"
 #include "upright/model/error.hpp"
+#include "upright/model/linear_plant.hpp"
 #include "upright/model/plant_file.hpp"
 #include "upright/report/html.hpp"
 #include "upright/report/paired_report.hpp"
@@ -102,11 +103,37 @@ double first_of(const std::vector<TrialResult>& trials, int repeat, bool fall) {
   return first;
 }
 
+/// What the linear analysis and a simulated sweep say of the plant that the plan was made with.
+struct SweepModel {
+  std::vector<SweepRun> simulated;
+  LoopMargin margin, sliding_margin;
+};
+
+SweepModel sweep_model(const Plant& plant, const RunRecord& run, const std::vector<TrialResult>& trials,
+                       double duration_s) {
+  constexpr double smoothing = 100.0;
+  return {simulate(plant, run, trials, duration_s), continuous_margin(plant, run.control.gains, smoothing),
+          continuous_margin(sliding_plant(plant), run.control.gains, smoothing)};
+}
+
+/// The same of files: a plant or gains that cannot be analysed are named.
+SweepModel sweep_model(const std::filesystem::path& folder, const std::vector<TrialResult>& trials,
+                       double duration_s) {
+  const std::filesystem::path plant_file = folder / "plan_plant.yaml";
+  const std::filesystem::path run_folder = folder / trials.front().run_directory;
+  const RunRecord run = read_run_without_samples(run_folder);
+  const Plant plant = read_plant_file(plant_file);
+  try {
+    return sweep_model(plant, run, trials, duration_s);
+  } catch (const ConfigError& error) {
+    throw ConfigError(plant_file.string() + " with the gains of " + (run_folder / "run.yaml").string() +
+                      ": " + error.what());
+  }
+}
+
 void add_sweep(HtmlPage& page, const std::filesystem::path& folder, const Piece& piece,
                const std::vector<TrialResult>& trials) {
-  const RunRecord run = read_run_without_samples(folder / trials.front().run_directory);
-  const Plant plant = read_plant_file(folder / "plan_plant.yaml");
-  const std::vector<SweepRun> simulated = simulate(plant, run, trials, piece.duration_s);
+  const auto [simulated, margin, sliding_margin] = sweep_model(folder, trials, piece.duration_s);
   Plot plot;
   plot.title = "Amplitude over delay";
   plot.x.label = "delay [ms]";
@@ -134,15 +161,6 @@ void add_sweep(HtmlPage& page, const std::filesystem::path& folder, const Piece&
       }
     if (!points.x.empty()) plot.series.push_back(points);
   }
-  ControlConfig control = run.control;
-  control.delay_s = 0.0;
-  constexpr double smoothing = 100.0;
-  const LoopMargin margin = continuous_margin(plant, control.gains, smoothing);
-  Plant sliding = plant;
-  for (const char* dry : {"coulomb_friction", "stribeck_friction", "bristle_friction", "friction_asymmetry",
-                          "position_dependent_friction"})
-    sliding.remove(effect_number(dry));
-  const LoopMargin sliding_margin = continuous_margin(sliding, control.gains, smoothing);
   const auto mark = [&](const LoopMargin& m, const char* words) {
     if (m.critical_delay_s > 0.0 && std::isfinite(m.critical_delay_s))
       plot.vertical_marks.push_back({1e3 * m.critical_delay_s, words});
@@ -167,12 +185,6 @@ void add_sweep(HtmlPage& page, const std::filesystem::path& folder, const Piece&
                   " degree counts as stable."});
 }
 
-/// A name within the folder, so that a folder from somebody else leads nowhere else.
-bool is_within(const std::string& run_directory) {
-  return !run_directory.empty() && run_directory != "." && run_directory != ".." &&
-         std::filesystem::path(run_directory).filename() == run_directory;
-}
-
 /// Writes the report of each run and notes where it is.
 void write_run_reports(const std::filesystem::path& folder, Record& record) {
   record.links.assign(record.trials.size(), "");
@@ -180,7 +192,6 @@ void write_run_reports(const std::filesystem::path& folder, Record& record) {
   parallel_for(record.trials.size(), [&](std::size_t i) {
     const std::string& run = record.trials[i].run_directory;
     try {
-      if (!is_within(run)) throw ConfigError("its name leads out of the folder");
       write_run_report(folder / run);
       record.links[i] = link_to(std::filesystem::path(run) / "report.html");
     } catch (const Error& error) {

@@ -9,6 +9,7 @@
 #include <sstream>
 #include <stdexcept>
 
+#include "upright/control/delay_line.hpp"
 #include "upright/model/error.hpp"
 #include "upright/model/input_file.hpp"
 #include "upright/model/plant_file.hpp"
@@ -118,6 +119,16 @@ bool parse(const std::string& text, Number& value) {
   return result.ec == std::errc{} && result.ptr == text.data() + text.size();
 }
 
+/// A name within the folder, so that a folder from somebody else leads nowhere else.
+bool is_within_folder(const std::string& run_directory) {
+  return !run_directory.empty() && run_directory != "." && run_directory != ".." &&
+         std::filesystem::path(run_directory).filename() == run_directory;
+}
+
+bool is_delay(double delay_s) {
+  return delay_s >= 0.0 && delay_s <= DelayLine::longest_delay_s;
+}
+
 /// False: not a line of the journal.
 bool read_line(const std::string& line, TrialResult& r) {
   const std::vector<std::string> cells = cells_of(line);
@@ -129,11 +140,11 @@ bool read_line(const std::string& line, TrialResult& r) {
   r.run_directory = cells[4];
   r.reason = cells[5];
   r.outcome = cells[6];
-  return parse(cells[0], r.trial.piece) && parse(cells[2], r.trial.repeat) && r.trial.repeat >= 0 &&
-         parse(cells[3], r.trial.delay_s) && std::isfinite(r.trial.delay_s) &&
-         parse(cells[7], r.theta0_rad) && parse(cells[8], r.theta_amplitude_rad) &&
-         parse(cells[9], r.cart_amplitude_m) && parse(cells[10], r.fall_time_s) &&
-         parse(cells[11], r.frequency_hz);
+  return is_within_folder(r.run_directory) && parse(cells[0], r.trial.piece) &&
+         parse(cells[2], r.trial.repeat) && r.trial.repeat >= 0 && parse(cells[3], r.trial.delay_s) &&
+         is_delay(r.trial.delay_s) && parse(cells[7], r.theta0_rad) &&
+         parse(cells[8], r.theta_amplitude_rad) && parse(cells[9], r.cart_amplitude_m) &&
+         parse(cells[10], r.fall_time_s) && parse(cells[11], r.frequency_hz);
 }
 
 [[noreturn]] void refuse_line(const std::filesystem::path& file, std::size_t number) {

@@ -144,6 +144,46 @@ TEST(RecordedMutants, OfExperimentFolders) {
        [&](const fs::path&) { write_experiment_report(made); });
 }
 
+/// What a call refuses with; empty: it refused nothing.
+std::string refusal_of(const std::function<void()>& what) {
+  try {
+    what();
+    return "";
+  } catch (const ConfigError& error) {
+    return error.what();
+  }
+}
+
+TEST(ExperimentFolder, RefusesTrialsOfAnImpossibleDelayOrFolderAtTheirLine) {
+  const Folder folder;
+  const fs::path made = make_experiment(folder.path(), short_experiments()[10]);
+  const std::string journal = text_of(made / "trials.csv");
+  const std::string run = read_trials(made).at(0).run_directory, delay = ",0,0.0," + run;
+  ASSERT_NE(journal.find(delay), std::string::npos) << journal;
+  const auto changed_to = [&](const std::string& cells) {
+    std::string text = journal;
+    write(made / "trials.csv", text.replace(text.find(delay), delay.size(), cells));
+  };
+  for (const std::string& cells : {",0,2e6," + run, ",0,-0.001," + run, std::string(",0,0.0,"),
+                                   std::string(",0,0.0,.."), ",0,0.0,../" + run}) {
+    changed_to(cells);
+    EXPECT_NE(refusal_of([&] { write_experiment_report(made); }).find("trials.csv:2: not a trial"),
+              std::string::npos)
+        << cells;
+  }
+}
+
+TEST(ExperimentFolder, NamesThePlantFileThatCannotBeAnalysed) {
+  const Folder folder;
+  const QuickGnuplot quick(folder.path());
+  const fs::path made = make_experiment(folder.path(), short_experiments()[10]);
+  Plant plant = read_plant_file(made / "plan_plant.yaml");
+  plant.motor.back_emf_n_per_mps = 1e300;
+  write_plant_file(plant, made / "plan_plant.yaml", {});
+  const std::string refusal = refusal_of([&] { write_experiment_report(made); });
+  EXPECT_NE(refusal.find((made / "plan_plant.yaml").string()), std::string::npos) << refusal;
+}
+
 TEST(RecordedMutants, OfSignRecords) {
   const Folder folder;
   RigFile rig = read_rig_file(config / "rigs" / "modbus-tcp.yaml");
