@@ -19,11 +19,11 @@ class GuestRun {
  public:
   static constexpr int rate_hz = 200;
 
-  explicit GuestRun(const std::string& rig_text) {
+  explicit GuestRun(const std::string& rig_text, int sample_rate_hz = rate_hz) {
     std::ofstream(rig_file()) << rig_text;
     std::ofstream(gain_file()) << replaced(text_of(UPRIGHT_SOURCE_DIR "/config/gains/exponential.yaml"),
                                            "sample_rate_hz: 1000",
-                                           "sample_rate_hz: " + std::to_string(rate_hz));
+                                           "sample_rate_hz: " + std::to_string(sample_rate_hz));
   }
   std::filesystem::path rig_file() const { return folder_ / "rig.yaml"; }
   std::filesystem::path gain_file() const { return folder_ / "gains.yaml"; }

@@ -101,7 +101,7 @@ class LineWires final : public Wires {
   }
 
   void suffer(Mishap mishap) override {
-    constexpr std::int64_t rattle_counts = 200, burst_counts = 750;  // forth and back are 1500 edges
+    constexpr std::int64_t rattle_counts = 200, burst_counts = 550;  // forth and back are 1100 edges
     mishap_ = mishap;
     switch (mishap) {
       case Mishap::encoder_rattles:
