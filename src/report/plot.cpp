@@ -183,10 +183,13 @@ void add_series(const Plot& plot, Curves& curves) {
 }
 
 /// The edges between cell centres; the outer cells are as wide as their neighbours. With a logarithmic axis
-/// the middle is the geometric one.
+/// the middle is the geometric one, and no edge lies where nothing is drawn.
 std::vector<double> edges_of(const std::vector<double>& centres, const Axis& axis) {
   const auto to = [&](double v) { return axis.logarithmic ? std::log(v) : v; };
-  const auto from = [&](double v) { return axis.logarithmic ? std::exp(v) : v; };
+  const double farthest = std::log(largest_drawn);
+  const auto from = [&](double v) {
+    return axis.logarithmic ? std::exp(std::clamp(v, -farthest, farthest)) : v;
+  };
   std::vector<double> edges;
   if (centres.size() == 1) {
     const double half = axis.logarithmic ? 0.1 : std::max(0.5 * std::abs(centres[0]), 1e-9);

@@ -2,12 +2,15 @@
 #include <gtest/gtest.h>
 
 #include <fstream>
+#include <limits>
 
 #include "mutant_feeder.hpp"
 #include "upright/analysis/file_agreement.hpp"
 #include "upright/analysis/sweep.hpp"
+#include "upright/hal/calibration.hpp"
 #include "upright/model/error.hpp"
 #include "upright/model/plant_file.hpp"
+#include "upright/report/plot.hpp"
 #include "upright/runtime/experiment.hpp"
 #include "upright/sim/simulator.hpp"
 
@@ -100,6 +103,23 @@ TEST(MutantFinds, ASweepMakesAnewWhatItsJournalKeepsOfOtherCases) {
   run_sweep(sweep, out, {}, *team);
   EXPECT_EQ(text_of(out / "sweep.csv"), expected);
   EXPECT_EQ(text_of(out / "transitions.csv"), moved);
+}
+
+/// The difference of two counts left the range of a signed number.
+TEST(MutantFinds, CountsAtTheEndsOfTheirRangeAreFollowed) {
+  constexpr std::int64_t largest = std::numeric_limits<std::int64_t>::max();
+  EXPECT_EQ(counts_between(largest, -10, 32), -9) << "the lowest 32 bits of the largest number are all ones";
+  Unwrapper unwrapper;
+  unwrapper.start(-10, largest);
+  EXPECT_EQ(unwrapper.follow(largest), 0);
+}
+
+/// The edge of the outermost cell was zero, and the search for ticks went through all powers of ten to it.
+TEST(MutantFinds, AMapOverTooManyPowersOfTenIsDrawn) {
+  Plot plot;
+  plot.x.logarithmic = plot.y.logarithmic = true;
+  plot.heat_map = HeatMap{{1e-3, 1e-2}, {1e-300, 0.03}, {0, 1, 1, 2}, "", {"stable", "oscillating", "fell"}};
+  EXPECT_NE(svg_of(plot, "p").find("<svg"), std::string::npos);
 }
 
 }  // namespace

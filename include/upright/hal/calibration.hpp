@@ -39,6 +39,13 @@ constexpr std::int64_t signed_counts(std::int64_t counts, int width_bits) noexce
   return static_cast<std::int64_t>(static_cast<std::uint64_t>(counts) << unused) >> unused;
 }
 
+/// How far a counter of so many bits moved, the short way round. What a damaged log may hold is more than a
+/// signed difference can.
+constexpr std::int64_t counts_between(std::int64_t from, std::int64_t to, int width_bits) noexcept {
+  const std::uint64_t moved = static_cast<std::uint64_t>(to) - static_cast<std::uint64_t>(from);
+  return signed_counts(static_cast<std::int64_t>(moved), width_bits);
+}
+
 /// Follows a counter across its wraps. Right as long as the counter moves by less than half its range between
 /// two readings.
 class Unwrapper {
@@ -48,11 +55,11 @@ class Unwrapper {
   /// Starts at `counts`, measured from `zero` the short way round.
   constexpr void start(std::int64_t counts, std::int64_t zero) noexcept {
     last_ = counts;
-    total_ = signed_counts(counts - zero, width_bits_);
+    total_ = counts_between(zero, counts, width_bits_);
   }
   /// Takes a new reading; returns the counts from zero, without wraps.
   constexpr std::int64_t follow(std::int64_t counts) noexcept {
-    total_ += signed_counts(counts - last_, width_bits_);
+    total_ += counts_between(last_, counts, width_bits_);
     last_ = counts;
     return total_;
   }
@@ -148,7 +155,7 @@ inline double safe_voltage(double voltage_v, double limit_v) noexcept {
 /// allowed: that much is quantisation.
 inline bool implausible_step(std::int64_t from, std::int64_t to, double elapsed_s,
                              const EncoderCalibration& encoder) noexcept {
-  const double moved = std::abs(static_cast<double>(signed_counts(to - from, encoder.width_bits)));
+  const double moved = std::abs(static_cast<double>(counts_between(from, to, encoder.width_bits)));
   return moved > 2.0 + encoder.fastest_per_s * elapsed_s / encoder.per_count;
 }
 
