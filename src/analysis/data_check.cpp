@@ -39,6 +39,8 @@ constexpr double implausible_voltage = 10.0;
 constexpr double hardly_any = 0.3;
 /// No cart on a track travels further, and none of these rigs moves faster for half of a record.
 constexpr double longest_travel_m = 20.0, fastest_cart_mps = 20.0, fastest_pendulum_radps = 100.0;
+/// No motor of such a rig moves its cart at less [V]: a voltage that would be smaller is not in millivolts.
+constexpr double least_driving_v = 0.1;
 /// Mistakes at once that are looked for; each more must leave a fifth of what is left over without it.
 /// Columns that are swapped have one more mistake at most, since many swaps fit something.
 constexpr std::size_t most_mistakes = 3, most_beside_swap = 1;
@@ -61,6 +63,12 @@ bool all_whole(const std::vector<double>& values) {
   constexpr double whole = 1e-6;
   return std::all_of(values.begin(), values.end(),
                      [](double v) { return std::abs(v - std::round(v)) < whole; });
+}
+
+double largest(const std::vector<double>& values) {
+  double found = 0.0;
+  for (const double v : values) found = std::max(found, std::abs(v));
+  return found;
 }
 
 std::string text(const char* format, double value) {
@@ -167,6 +175,14 @@ class Suspicion {
     return unmirror(angle) > 0;
   }
 
+  /// Of any column, since they may be swapped.
+  double largest_number() const {
+    double found = 0.0;
+    for (std::size_t c = 0; c < channels; ++c)
+      if (judge_.has(c)) found = std::max(found, largest(judge_.raw(c)));
+    return found;
+  }
+
   void list_units(bool cart, bool theta, bool driven) {
     for (const auto& [factor, unit] : {std::pair{1e-3, "milliseconds"}, std::pair{1e-6, "microseconds"}}) {
       const double period_s = judge_.period_s() * factor;
@@ -176,7 +192,9 @@ class Suspicion {
       add(time, std::string("time_s is in ") + unit,
           [factor = factor](DataReading& r) { r.time_factor = factor; });
     }
-    if (driven) add_factor(voltage_unit, voltage_channel, 1e-3, "voltage_v is in millivolts");
+    constexpr double millivolt_v = 1e-3;
+    if (driven && millivolt_v * largest_number() >= least_driving_v)
+      add_factor(voltage_unit, voltage_channel, millivolt_v, "voltage_v is in millivolts");
     if (cart) {
       add_factor(cart_unit, cart_channel, 1e-3, "cart_m is in millimetres");
       add_factor(cart_unit, cart_channel, 1e-2, "cart_m is in centimetres");
