@@ -36,12 +36,14 @@ if(UPRIGHT_FUZZ)
   target_compile_options(upright_options INTERFACE -fsanitize=fuzzer-no-link)
 endif()
 
-# upright_library(NAME SOURCES... LINK PUBLIC-TARGETS... PRIVATE PRIVATE-TARGETS...)
+# upright_library(NAME SOURCES... OFFERS HEADERS... LINK PUBLIC-TARGETS... PRIVATE PRIVATE-TARGETS...): the library of a
+# folder. Other folders may include its headers in include/upright and those it OFFERS (scripts/check_includes.py).
 function(upright_library name)
-  cmake_parse_arguments(arg "" "" "SOURCES;LINK;PRIVATE" ${ARGN})
+  cmake_parse_arguments(arg "" "" "SOURCES;OFFERS;LINK;PRIVATE" ${ARGN})
   if(arg_SOURCES)
     add_library(${name} STATIC ${arg_SOURCES})
-    target_include_directories(${name} PUBLIC ${PROJECT_SOURCE_DIR}/include)
+    target_include_directories(${name} PUBLIC ${PROJECT_SOURCE_DIR}/include
+                               ${PROJECT_SOURCE_DIR}/src ${PROJECT_SOURCE_DIR})
     target_link_libraries(${name} PUBLIC ${arg_LINK} PRIVATE ${arg_PRIVATE} upright_options)
   else()
     add_library(${name} INTERFACE)

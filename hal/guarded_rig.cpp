@@ -1,4 +1,4 @@
-#include "upright/hal/guarded_rig.hpp"
+#include "guarded_rig.hpp"
 
 #include <utility>
 

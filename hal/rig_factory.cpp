@@ -5,11 +5,11 @@
 #include <vector>
 
 #include "comedi/comedi_rig.hpp"
+#include "gpio_rig.hpp"
+#include "guarded_rig.hpp"
 #include "joined_rig.hpp"
 #include "modbus/modbus_rig.hpp"
-#include "upright/hal/gpio_rig.hpp"
-#include "upright/hal/guarded_rig.hpp"
-#include "upright/model/error.hpp"
+#include "upright/base/error.hpp"
 
 namespace upright {
 

@@ -10,7 +10,7 @@
 #include "comedi/comedi_section.hpp"
 #include "gpio/gpio_section.hpp"
 #include "quoted.hpp"
-#include "upright/model/error.hpp"
+#include "upright/base/error.hpp"
 #include "yaml_words.hpp"
 
 namespace upright {

@@ -10,7 +10,7 @@
 #include <cstring>
 #include <functional>
 
-#include "upright/model/error.hpp"
+#include "upright/base/error.hpp"
 
 namespace upright {
 

@@ -5,7 +5,7 @@
 #include <array>
 #include <string>
 
-#include "upright/model/yaml_reader.hpp"
+#include "upright/base/yaml_reader.hpp"
 
 namespace upright {
 

@@ -10,7 +10,7 @@
 #include <cmath>
 #include <string>
 
-#include "upright/model/error.hpp"
+#include "upright/base/error.hpp"
 
 namespace upright {
 

@@ -3,9 +3,9 @@
 
 #include <string>
 
+#include "upright/base/yaml_reader.hpp"
 #include "upright/hal/comedi_wiring.hpp"
 #include "upright/hal/rig_file.hpp"
-#include "upright/model/yaml_reader.hpp"
 
 namespace upright {
 

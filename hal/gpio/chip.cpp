@@ -3,7 +3,7 @@
 #include <cerrno>
 #include <cstring>
 
-#include "upright/model/error.hpp"
+#include "upright/base/error.hpp"
 
 namespace upright {
 

@@ -12,9 +12,9 @@
 #include <utility>
 
 #include "edge_source.hpp"
+#include "hal/gpio_rig.hpp"
+#include "upright/base/error.hpp"
 #include "upright/hal/clock.hpp"
-#include "upright/hal/gpio_rig.hpp"
-#include "upright/model/error.hpp"
 
 namespace upright {
 

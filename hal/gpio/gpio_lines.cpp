@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "chip.hpp"
-#include "upright/hal/gpio_rig.hpp"
+#include "hal/gpio_rig.hpp"
 
 namespace upright {
 

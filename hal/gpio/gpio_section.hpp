@@ -3,8 +3,8 @@
 
 #include <string>
 
+#include "upright/base/yaml_reader.hpp"
 #include "upright/hal/gpio.hpp"
-#include "upright/model/yaml_reader.hpp"
 
 namespace upright {
 

@@ -1,7 +1,7 @@
 #include <array>
 #include <cstdio>
 
-#include "upright/hal/modbus_exception.hpp"
+#include "hal/modbus_exception.hpp"
 
 namespace upright {
 

@@ -8,7 +8,7 @@
 #include <filesystem>
 #include <span>
 
-#include "upright/model/error.hpp"
+#include "upright/base/error.hpp"
 
 namespace upright {
 

@@ -10,8 +10,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "upright/hal/modbus_exception.hpp"
-#include "upright/model/error.hpp"
+#include "hal/modbus_exception.hpp"
+#include "upright/base/error.hpp"
 
 namespace upright {
 

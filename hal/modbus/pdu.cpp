@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "upright/hal/modbus_exception.hpp"
+#include "hal/modbus_exception.hpp"
 
 namespace upright {
 

@@ -10,7 +10,7 @@
 #include <cerrno>
 
 #include "channel.hpp"
-#include "upright/model/error.hpp"
+#include "upright/base/error.hpp"
 
 namespace upright {
 

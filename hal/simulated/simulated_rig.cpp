@@ -3,7 +3,7 @@
 #include <cmath>
 #include <random>
 
-#include "upright/model/error.hpp"
+#include "upright/base/error.hpp"
 #include "upright/model/plant_file.hpp"
 #include "upright/sim/simulator.hpp"
 

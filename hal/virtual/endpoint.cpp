@@ -14,7 +14,7 @@
 #include <cstdlib>
 #include <cstring>
 
-#include "upright/model/error.hpp"
+#include "upright/base/error.hpp"
 
 namespace upright {
 

@@ -10,8 +10,8 @@
 #include <string>
 #include <vector>
 
+#include "hal/virtual_rig.hpp"
 #include "upright/hal/rig_file.hpp"
-#include "upright/hal/virtual_rig.hpp"
 
 namespace upright {
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <numbers>
 
-#include "upright/model/error.hpp"
+#include "upright/base/error.hpp"
 #include "upright/model/plant_model.hpp"
 
 namespace upright {

@@ -4,8 +4,8 @@
 #include <cstdint>
 #include <fstream>
 
+#include "hal/virtual_rig.hpp"
 #include "upright/hal/rig_file.hpp"
-#include "upright/hal/virtual_rig.hpp"
 #include "upright/sim/simulator.hpp"
 
 namespace upright {

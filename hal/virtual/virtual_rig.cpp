@@ -1,4 +1,4 @@
-#include "upright/hal/virtual_rig.hpp"
+#include "hal/virtual_rig.hpp"
 
 #include <poll.h>
 #include <pthread.h>
@@ -17,7 +17,7 @@
 #include <vector>
 
 #include "endpoint.hpp"
-#include "upright/model/error.hpp"
+#include "upright/base/error.hpp"
 #include "virtual_plant.hpp"
 
 namespace upright {

@@ -8,15 +8,15 @@
 #include <vector>
 
 #include "commands.hpp"
-#include "upright/analysis/file_agreement.hpp"
-#include "upright/analysis/measurement.hpp"
-#include "upright/analysis/sweep.hpp"
+#include "commissioning/file_agreement.hpp"
+#include "experiment/experiment_file.hpp"
+#include "sweep/sweep.hpp"
+#include "upright/base/error.hpp"
 #include "upright/control/gain_file.hpp"
 #include "upright/control/model_parts.hpp"
 #include "upright/hal/rig_file.hpp"
-#include "upright/model/error.hpp"
+#include "upright/measurement/measurement.hpp"
 #include "upright/model/plant_file.hpp"
-#include "upright/runtime/experiment_file.hpp"
 
 namespace upright::cli {
 

@@ -10,8 +10,8 @@
 #include <string>
 #include <vector>
 
-#include "upright/model/error.hpp"
-#include "upright/model/yaml_reader.hpp"
+#include "upright/base/error.hpp"
+#include "upright/base/yaml_reader.hpp"
 
 namespace CLI {
 class App;

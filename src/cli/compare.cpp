@@ -7,14 +7,14 @@
 #include <string>
 #include <vector>
 
+#include "base/number_text.hpp"
 #include "commands.hpp"
+#include "comparison/paired_comparison.hpp"
+#include "comparison/run_behaviour.hpp"
 #include "options.hpp"
-#include "upright/analysis/paired_comparison.hpp"
-#include "upright/analysis/run_behaviour.hpp"
-#include "upright/model/error.hpp"
-#include "upright/report/compare_report.hpp"
-#include "upright/report/number_text.hpp"
-#include "upright/report/paired_report.hpp"
+#include "report/compare_report.hpp"
+#include "report/paired_report.hpp"
+#include "upright/base/error.hpp"
 
 namespace upright::cli {
 

@@ -10,11 +10,11 @@
 #include <string>
 
 #include "commands.hpp"
+#include "design/estimator_design.hpp"
+#include "design/gain_design.hpp"
 #include "progress.hpp"
-#include "upright/analysis/estimator_design.hpp"
-#include "upright/analysis/gain_design.hpp"
+#include "upright/base/error.hpp"
 #include "upright/control/gain_file.hpp"
-#include "upright/model/error.hpp"
 #include "upright/model/plant_file.hpp"
 
 namespace upright::cli {

@@ -10,16 +10,16 @@
 #include <vector>
 
 #include "commands.hpp"
+#include "diagnosis/diagnosis_json.hpp"
+#include "diagnosis/trace.hpp"
 #include "experiment_data.hpp"
+#include "measurement/data_check.hpp"
+#include "measurement/long_records.hpp"
 #include "options.hpp"
 #include "progress.hpp"
 #include "signals.hpp"
-#include "upright/analysis/data_check.hpp"
-#include "upright/analysis/diagnosis.hpp"
-#include "upright/analysis/diagnosis_json.hpp"
-#include "upright/analysis/long_records.hpp"
-#include "upright/analysis/trace.hpp"
-#include "upright/model/error.hpp"
+#include "upright/base/error.hpp"
+#include "upright/diagnosis/diagnosis.hpp"
 #include "upright/model/plant_file.hpp"
 
 namespace upright::cli {

@@ -11,18 +11,18 @@
 #include <vector>
 
 #include "commands.hpp"
+#include "commissioning/machine_check.hpp"
+#include "commissioning/rig_check.hpp"
+#include "commissioning/wake_probe.hpp"
+#include "hal/gpio_rig.hpp"
 #include "histogram_json.hpp"
 #include "progress.hpp"
+#include "record/histogram_text.hpp"
 #include "signals.hpp"
+#include "upright/base/error.hpp"
 #include "upright/control/gain_file.hpp"
-#include "upright/hal/gpio_rig.hpp"
 #include "upright/hal/rig_factory.hpp"
 #include "upright/hal/simulated_rig.hpp"
-#include "upright/model/error.hpp"
-#include "upright/runtime/histogram_text.hpp"
-#include "upright/runtime/machine_check.hpp"
-#include "upright/runtime/rig_check.hpp"
-#include "upright/runtime/wake_probe.hpp"
 
 namespace upright::cli {
 

@@ -1,5 +1,5 @@
 // `upright experiment`: a list of pieces on any rig, planned and rehearsed before anything moves.
-#include "upright/runtime/experiment.hpp"
+#include "experiment/experiment.hpp"
 
 #include <unistd.h>
 
@@ -20,16 +20,18 @@
 #include <vector>
 
 #include "commands.hpp"
+#include "commissioning/sign_check.hpp"
+#include "hal/gpio_rig.hpp"
 #include "live.hpp"
 #include "options.hpp"
 #include "progress.hpp"
+#include "record/sign_record.hpp"
+#include "record/stop_report.hpp"
+#include "runtime/overrun_limit.hpp"
 #include "signals.hpp"
 #include "stop_watcher.hpp"
-#include "upright/analysis/overrun_limit.hpp"
-#include "upright/hal/gpio_rig.hpp"
+#include "upright/base/error.hpp"
 #include "upright/hal/rig_factory.hpp"
-#include "upright/model/error.hpp"
-#include "upright/runtime/sign_check.hpp"
 
 namespace upright::cli {
 

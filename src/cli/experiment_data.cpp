@@ -6,9 +6,9 @@
 #include <set>
 #include <string_view>
 
-#include "upright/model/error.hpp"
-#include "upright/model/yaml_reader.hpp"
-#include "upright/runtime/experiment.hpp"
+#include "experiment/experiment.hpp"
+#include "upright/base/error.hpp"
+#include "upright/base/yaml_reader.hpp"
 
 namespace upright::cli {
 

@@ -3,7 +3,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "upright/runtime/timing_stats.hpp"
+#include "upright/record/timing_stats.hpp"
 
 namespace upright::cli {
 

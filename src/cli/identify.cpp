@@ -12,15 +12,15 @@
 
 #include "commands.hpp"
 #include "experiment_data.hpp"
+#include "identification/identification.hpp"
+#include "measurement/data_check.hpp"
+#include "measurement/long_records.hpp"
 #include "options.hpp"
 #include "progress.hpp"
+#include "report/identification_report.hpp"
 #include "signals.hpp"
-#include "upright/analysis/data_check.hpp"
-#include "upright/analysis/identification.hpp"
-#include "upright/analysis/long_records.hpp"
-#include "upright/model/error.hpp"
+#include "upright/base/error.hpp"
 #include "upright/model/plant_file.hpp"
-#include "upright/report/identification_report.hpp"
 
 namespace upright::cli {
 

@@ -4,7 +4,7 @@
 #include <optional>
 
 #include "signals.hpp"
-#include "upright/model/error.hpp"
+#include "upright/base/error.hpp"
 
 namespace upright::cli {
 

@@ -7,8 +7,8 @@
 #include <string>
 
 #include "command_line.hpp"
+#include "live/live_view.hpp"
 #include "upright/hal/rig_file.hpp"
-#include "upright/live/live_view.hpp"
 #include "upright/model/plant.hpp"
 #include "upright/runtime/realtime.hpp"
 

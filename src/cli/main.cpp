@@ -7,7 +7,7 @@
 
 #include "commands.hpp"
 #include "options.hpp"
-#include "upright/model/error.hpp"
+#include "upright/base/error.hpp"
 
 namespace {
 

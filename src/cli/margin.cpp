@@ -8,10 +8,10 @@
 #include <string>
 
 #include "commands.hpp"
+#include "design/delay_margin.hpp"
+#include "design/physical_limits.hpp"
 #include "progress.hpp"
-#include "upright/analysis/delay_margin.hpp"
-#include "upright/analysis/overrun_limit.hpp"
-#include "upright/analysis/physical_limits.hpp"
+#include "runtime/overrun_limit.hpp"
 #include "upright/model/linear_plant.hpp"
 #include "upright/model/plant_file.hpp"
 

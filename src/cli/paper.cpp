@@ -1,5 +1,5 @@
 // `upright paper`: the paper's figures and numbers recomputed, as a document with plots.
-#include "upright/report/paper.hpp"
+#include "studies/paper/paper.hpp"
 
 #include <cstdio>
 #include <memory>
@@ -7,7 +7,7 @@
 
 #include "commands.hpp"
 #include "progress.hpp"
-#include "upright/model/error.hpp"
+#include "upright/base/error.hpp"
 
 namespace upright::cli {
 

@@ -12,7 +12,7 @@
 #include <string>
 #include <thread>
 
-#include "upright/model/progress.hpp"
+#include "upright/base/progress.hpp"
 
 namespace upright::cli {
 

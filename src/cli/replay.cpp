@@ -1,5 +1,5 @@
 // `upright replay`: feeds a run's counts through its controller again.
-#include "upright/runtime/replay.hpp"
+#include "upright/record/replay.hpp"
 
 #include <cstdio>
 #include <iostream>
@@ -7,11 +7,11 @@
 #include <nlohmann/json.hpp>
 
 #include "commands.hpp"
+#include "experiment/experiment.hpp"
 #include "progress.hpp"
+#include "upright/base/error.hpp"
+#include "upright/base/yaml_reader.hpp"
 #include "upright/control/model_parts.hpp"
-#include "upright/model/error.hpp"
-#include "upright/model/yaml_reader.hpp"
-#include "upright/runtime/experiment.hpp"
 
 namespace upright::cli {
 

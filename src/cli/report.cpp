@@ -9,11 +9,11 @@
 
 #include "commands.hpp"
 #include "progress.hpp"
-#include "upright/model/error.hpp"
-#include "upright/report/diagnosis_report.hpp"
-#include "upright/report/experiment_report.hpp"
-#include "upright/report/run_report.hpp"
-#include "upright/report/sweep_report.hpp"
+#include "report/diagnosis_report.hpp"
+#include "report/experiment_report.hpp"
+#include "report/run_report.hpp"
+#include "report/sweep_report.hpp"
+#include "upright/base/error.hpp"
 
 namespace upright::cli {
 

@@ -8,7 +8,7 @@
 #include <fstream>
 #include <iterator>
 
-#include "upright/model/error.hpp"
+#include "upright/base/error.hpp"
 
 namespace upright::cli {
 

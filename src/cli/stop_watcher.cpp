@@ -2,6 +2,7 @@
 
 #include <cstdio>
 
+#include "record/stop_report.hpp"
 #include "signals.hpp"
 
 namespace upright::cli {

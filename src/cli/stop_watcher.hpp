@@ -1,7 +1,7 @@
 // Who waits for the end of a run: while zero volts is not confirmed the terminal and the page say so.
 #pragma once
 
-#include "upright/live/live_view.hpp"
+#include "live/live_view.hpp"
 #include "upright/runtime/zero_volts.hpp"
 
 namespace upright::cli {

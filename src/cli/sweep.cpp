@@ -10,8 +10,8 @@
 
 #include "commands.hpp"
 #include "progress.hpp"
-#include "upright/analysis/sweep_ranks.hpp"
-#include "upright/model/error.hpp"
+#include "sweep/sweep_ranks.hpp"
+#include "upright/base/error.hpp"
 
 namespace upright::cli {
 

@@ -1,5 +1,5 @@
 // `upright virtual-rig`: the plant in real time behind a real Modbus server.
-#include "upright/hal/virtual_rig.hpp"
+#include "hal/virtual_rig.hpp"
 
 #include <csignal>
 #include <iostream>
@@ -9,7 +9,7 @@
 #include <string>
 
 #include "commands.hpp"
-#include "upright/model/error.hpp"
+#include "upright/base/error.hpp"
 #include "upright/model/plant_file.hpp"
 
 namespace upright::cli {

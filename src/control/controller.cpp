@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "upright/model/error.hpp"
+#include "upright/base/error.hpp"
 
 namespace upright {
 

@@ -1,10 +1,10 @@
-#include "upright/control/estimate_predictor.hpp"
+#include "estimate_predictor.hpp"
 
 #include <cmath>
 #include <numbers>
 
-#include "upright/model/error.hpp"
-#include "upright/model/yaml_reader.hpp"
+#include "upright/base/error.hpp"
+#include "upright/base/yaml_reader.hpp"
 
 namespace upright {
 

@@ -1,4 +1,4 @@
-#include "upright/control/extended_kalman_filter.hpp"
+#include "extended_kalman_filter.hpp"
 
 #include <cmath>
 

@@ -1,12 +1,12 @@
-#include "upright/control/filter_model.hpp"
+#include "filter_model.hpp"
 
 #include <Eigen/Dense>
 #include <numbers>
 #include <vector>
 
-#include "upright/model/error.hpp"
+#include "model/riccati.hpp"
+#include "upright/base/error.hpp"
 #include "upright/model/linear_plant.hpp"
-#include "upright/model/riccati.hpp"
 
 namespace upright {
 

@@ -2,8 +2,8 @@
 
 #include <fstream>
 
+#include "upright/base/error.hpp"
 #include "upright/control/delay_line.hpp"
-#include "upright/model/error.hpp"
 
 namespace upright {
 

@@ -1,4 +1,4 @@
-#include "upright/control/kalman_filter.hpp"
+#include "kalman_filter.hpp"
 
 #include <algorithm>
 #include <cmath>

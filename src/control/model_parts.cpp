@@ -1,9 +1,9 @@
 #include "upright/control/model_parts.hpp"
 
-#include "upright/control/estimate_predictor.hpp"
-#include "upright/control/extended_kalman_filter.hpp"
-#include "upright/control/kalman_filter.hpp"
-#include "upright/control/predictor.hpp"
+#include "estimate_predictor.hpp"
+#include "extended_kalman_filter.hpp"
+#include "kalman_filter.hpp"
+#include "predictor.hpp"
 #include "upright/model/plant_file.hpp"
 
 namespace upright {

@@ -1,9 +1,9 @@
-#include "upright/control/predictor.hpp"
+#include "predictor.hpp"
 
 #include <Eigen/Dense>
 #include <cmath>
 
-#include "upright/model/error.hpp"
+#include "upright/base/error.hpp"
 #include "upright/model/linear_plant.hpp"
 
 namespace upright {

@@ -3,8 +3,8 @@
 #include <cmath>
 #include <numbers>
 
-#include "upright/model/error.hpp"
-#include "upright/model/yaml_reader.hpp"
+#include "upright/base/error.hpp"
+#include "upright/base/yaml_reader.hpp"
 
 namespace upright {
 

@@ -1,4 +1,4 @@
-#include "upright/live/frame_maker.hpp"
+#include "frame_maker.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -11,7 +11,7 @@
 #include <span>
 #include <string>
 
-#include "upright/live/frame_maker.hpp"
+#include "frame_maker.hpp"
 
 namespace upright {
 

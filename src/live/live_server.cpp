@@ -22,9 +22,9 @@
 #include <utility>
 #include <vector>
 
+#include "base/palette.hpp"
 #include "http_connection.hpp"
-#include "upright/model/error.hpp"
-#include "upright/report/palette.hpp"
+#include "upright/base/error.hpp"
 #include "upright/runtime/realtime.hpp"
 
 namespace upright {

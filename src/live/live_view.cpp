@@ -1,4 +1,4 @@
-#include "upright/live/live_view.hpp"
+#include "live_view.hpp"
 
 #include <array>
 #include <atomic>

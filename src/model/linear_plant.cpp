@@ -7,8 +7,8 @@
 #include <cstdio>
 #include <unsupported/Eigen/MatrixFunctions>
 
+#include "upright/base/error.hpp"
 #include "upright/model/dynamics.hpp"
-#include "upright/model/error.hpp"
 
 namespace upright {
 

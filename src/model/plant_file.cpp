@@ -2,7 +2,7 @@
 
 #include <fstream>
 
-#include "upright/model/error.hpp"
+#include "upright/base/error.hpp"
 
 namespace upright {
 

@@ -1,11 +1,11 @@
-#include "upright/model/riccati.hpp"
+#include "riccati.hpp"
 
 #include <Eigen/Dense>
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <complex>
 
-#include "upright/model/error.hpp"
+#include "upright/base/error.hpp"
 #include "upright/model/linear_plant.hpp"
 
 namespace upright {

@@ -1,13 +1,13 @@
-#include "upright/report/compare_report.hpp"
+#include "compare_report.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <set>
 
+#include "base/number_text.hpp"
+#include "html.hpp"
+#include "plot.hpp"
 #include "run_data.hpp"
-#include "upright/report/html.hpp"
-#include "upright/report/number_text.hpp"
-#include "upright/report/plot.hpp"
 
 namespace upright {
 

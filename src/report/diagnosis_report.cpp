@@ -1,4 +1,4 @@
-#include "upright/report/diagnosis_report.hpp"
+#include "diagnosis_report.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -11,10 +11,10 @@
 #include <tuple>
 #include <vector>
 
-#include "upright/model/error.hpp"
-#include "upright/model/input_file.hpp"
-#include "upright/report/html.hpp"
-#include "upright/report/plot.hpp"
+#include "base/input_file.hpp"
+#include "html.hpp"
+#include "plot.hpp"
+#include "upright/base/error.hpp"
 
 namespace upright {
 

@@ -1,4 +1,4 @@
-#include "upright/report/experiment_report.hpp"
+#include "experiment_report.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -6,20 +6,20 @@
 #include <string>
 #include <vector>
 
+#include "base/parallel.hpp"
+#include "comparison/paired_comparison.hpp"
+#include "design/delay_margin.hpp"
+#include "experiment/experiment.hpp"
+#include "html.hpp"
+#include "paired_report.hpp"
+#include "plot.hpp"
 #include "run_data.hpp"
-#include "upright/analysis/delay_margin.hpp"
-#include "upright/analysis/paired_comparison.hpp"
-#include "upright/analysis/parallel.hpp"
-#include "upright/analysis/sweep.hpp"
+#include "run_report.hpp"
+#include "sweep/sweep.hpp"
+#include "upright/base/error.hpp"
 #include "upright/control/model_parts.hpp"
-#include "upright/model/error.hpp"
 #include "upright/model/linear_plant.hpp"
 #include "upright/model/plant_file.hpp"
-#include "upright/report/html.hpp"
-#include "upright/report/paired_report.hpp"
-#include "upright/report/plot.hpp"
-#include "upright/report/run_report.hpp"
-#include "upright/runtime/experiment.hpp"
 
 namespace upright {
 

@@ -11,7 +11,7 @@
 #include <cstring>
 #include <string_view>
 
-#include "upright/model/error.hpp"
+#include "upright/base/error.hpp"
 
 namespace upright {
 

@@ -1,12 +1,12 @@
-#include "upright/report/identification_report.hpp"
+#include "identification_report.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <fstream>
 
-#include "upright/model/error.hpp"
-#include "upright/report/html.hpp"
-#include "upright/report/plot.hpp"
+#include "html.hpp"
+#include "plot.hpp"
+#include "upright/base/error.hpp"
 
 namespace upright {
 

@@ -1,9 +1,9 @@
-#include "upright/report/paired_report.hpp"
+#include "paired_report.hpp"
 
 #include <algorithm>
 
-#include "upright/report/compare_report.hpp"
-#include "upright/report/number_text.hpp"
+#include "base/number_text.hpp"
+#include "compare_report.hpp"
 
 namespace upright {
 

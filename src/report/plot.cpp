@@ -1,4 +1,4 @@
-#include "upright/report/plot.hpp"
+#include "plot.hpp"
 
 #include <algorithm>
 #include <array>
@@ -9,8 +9,8 @@
 
 #include "gnuplot.hpp"
 #include "ticks.hpp"
-#include "upright/model/error.hpp"
-#include "upright/model/yaml_reader.hpp"
+#include "upright/base/error.hpp"
+#include "upright/base/yaml_reader.hpp"
 
 namespace upright {
 

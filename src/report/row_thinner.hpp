@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "upright/runtime/log_record.hpp"
+#include "upright/record/log_record.hpp"
 
 namespace upright {
 

@@ -3,9 +3,9 @@
 #include <array>
 #include <deque>
 
+#include "base/input_file.hpp"
 #include "row_thinner.hpp"
-#include "upright/model/input_file.hpp"
-#include "upright/runtime/run_reader.hpp"
+#include "upright/record/run_reader.hpp"
 
 namespace upright {
 

@@ -8,10 +8,10 @@
 #include <utility>
 #include <vector>
 
-#include "upright/model/progress.hpp"
-#include "upright/report/html.hpp"
-#include "upright/report/statistics.hpp"
-#include "upright/runtime/log_record.hpp"
+#include "html.hpp"
+#include "statistics.hpp"
+#include "upright/base/progress.hpp"
+#include "upright/record/log_record.hpp"
 
 namespace upright {
 

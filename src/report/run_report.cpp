@@ -1,13 +1,13 @@
-#include "upright/report/run_report.hpp"
+#include "run_report.hpp"
 
 #include <cstdint>
 #include <numbers>
 #include <utility>
 #include <vector>
 
+#include "html.hpp"
 #include "run_data.hpp"
-#include "upright/report/html.hpp"
-#include "upright/report/statistics.hpp"
+#include "statistics.hpp"
 
 namespace upright {
 

@@ -1,4 +1,4 @@
-#include "upright/report/statistics.hpp"
+#include "statistics.hpp"
 
 #include <algorithm>
 #include <bit>

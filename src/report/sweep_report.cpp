@@ -1,4 +1,4 @@
-#include "upright/report/sweep_report.hpp"
+#include "sweep_report.hpp"
 
 #include <array>
 #include <cmath>
@@ -10,10 +10,10 @@
 #include <sstream>
 #include <vector>
 
-#include "upright/model/error.hpp"
-#include "upright/model/input_file.hpp"
-#include "upright/report/html.hpp"
-#include "upright/report/plot.hpp"
+#include "base/input_file.hpp"
+#include "html.hpp"
+#include "plot.hpp"
+#include "upright/base/error.hpp"
 
 namespace upright {
 

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <cstdio>
 
-#include "upright/report/number_text.hpp"
+#include "base/number_text.hpp"
 
 namespace upright {
 

@@ -1,4 +1,4 @@
-#include "upright/runtime/cpu_latency.hpp"
+#include "cpu_latency.hpp"
 
 #include <fcntl.h>
 #include <unistd.h>

@@ -7,10 +7,11 @@
 #include <optional>
 #include <thread>
 
-#include "upright/model/error.hpp"
+#include "cpu_latency.hpp"
+#include "record/sign_record.hpp"
+#include "record/stop_report.hpp"
+#include "upright/base/error.hpp"
 #include "upright/model/plant_file.hpp"
-#include "upright/runtime/cpu_latency.hpp"
-#include "upright/runtime/sign_check.hpp"
 
 namespace upright {
 

@@ -1,4 +1,4 @@
-#include "upright/runtime/wait_upright.hpp"
+#include "wait_upright.hpp"
 
 #include <algorithm>
 #include <cmath>

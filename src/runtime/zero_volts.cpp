@@ -2,21 +2,12 @@
 
 #include <algorithm>
 
-#include "upright/hal/modbus_exception.hpp"
-#include "upright/model/yaml_reader.hpp"
-
 namespace upright {
 
 namespace {
 
 constexpr std::int64_t look_every_ns = 2'000'000;
 constexpr std::int64_t say_first_ns = 500'000'000, say_every_ns = 1'000'000'000;
-
-std::string watchdog_words(const StopReport& report) {
-  if (report.watchdog_s <= 0.0) return "; the device has no watchdog that would take the voltage away";
-  return "; the device's own watchdog, set and read back before the run, takes the voltage away " +
-         exact_text(report.watchdog_s) + " s after the last request that reached it";
-}
 
 }  // namespace
 
@@ -37,46 +28,6 @@ StopReport stop_and_wait(Rig& rig, Clock& clock, const StopWatcher& watcher) {
     }
     clock.sleep_until(now_ns + std::min(left_ns, look_every_ns));
   }
-}
-
-const char* name_of_zero(const StopReport& report) noexcept {
-  return report.zero_confirmed ? "confirmed" : "not_confirmed";
-}
-
-std::string reason_of(const StopReport& report) {
-  switch (report.fault) {
-    case RigFault::none:
-      return "there was no answer yet";
-    case RigFault::link_timeout:
-      return "no reply came in time";
-    case RigFault::link_lost:
-      return "there is no connection";
-    case RigFault::corrupt_reply:
-      return "the replies do not fit the requests";
-    case RigFault::device_refused:
-      return report.exception == 0 ? "the device refused"
-                                   : "the device refused with " + exception_text(report.exception);
-    case RigFault::device_busy:
-      return "the device answered with " + exception_text(report.exception);
-    case RigFault::output_kept:
-      return "the device acknowledged it, but reads back as before";
-    case RigFault::line_failed:
-      return "a digital line could not be set";
-    default:
-      return "the device has a fault";
-  }
-}
-
-std::string sentence_of(const StopReport& report) {
-  if (report.done())
-    return report.read_back ? "zero volts is confirmed: the device's output was read back"
-                            : "zero volts is confirmed: the device has acknowledged it";
-  if (report.zero_confirmed)
-    return "THE AMPLIFIER COULD NOT BE DISABLED: switch the amplifier off (zero volts is confirmed; of its "
-           "enable " +
-           reason_of(report) + ")";
-  return "ZERO VOLTS COULD NOT BE CONFIRMED: switch the amplifier off (" + reason_of(report) +
-         watchdog_words(report) + ")";
 }
 
 }  // namespace upright

@@ -13,9 +13,9 @@
 #include <thread>
 
 #include "../integration/virtual_rig_process.hpp"
+#include "base/palette.hpp"
 #include "browser.hpp"
 #include "command.hpp"
-#include "upright/report/palette.hpp"
 
 namespace upright::testing {
 namespace {

@@ -6,10 +6,10 @@
 #include <fstream>
 #include <regex>
 
+#include "base/palette.hpp"
 #include "browser.hpp"
 #include "command.hpp"
-#include "upright/report/identification_report.hpp"
-#include "upright/report/palette.hpp"
+#include "report/identification_report.hpp"
 
 namespace upright::testing {
 namespace {

@@ -16,8 +16,8 @@
 #include <vector>
 
 #include "blind_case.hpp"
-#include "upright/analysis/data_check.hpp"
-#include "upright/model/error.hpp"
+#include "measurement/data_check.hpp"
+#include "upright/base/error.hpp"
 #include "upright/model/plant_file.hpp"
 
 namespace {

@@ -41,10 +41,10 @@
 #include <sstream>
 
 #include "blind_case.hpp"
+#include "diagnosis/candidates.hpp"
 #include "diagnosis_tables.hpp"
-#include "upright/analysis/candidates.hpp"
-#include "upright/analysis/diagnosis.hpp"
-#include "upright/model/error.hpp"
+#include "upright/base/error.hpp"
+#include "upright/diagnosis/diagnosis.hpp"
 #include "upright/model/plant_file.hpp"
 
 namespace {

@@ -15,8 +15,8 @@
 #include <thread>
 #include <vector>
 
+#include "live/live_view.hpp"
 #include "upright/hal/simulated_rig.hpp"
-#include "upright/live/live_view.hpp"
 #include "upright/model/plant_file.hpp"
 #include "upright/runtime/session.hpp"
 

@@ -13,10 +13,10 @@
 #include <ctime>
 #include <vector>
 
-#include "upright/analysis/sweep.hpp"
+#include "sim/loop/closed_loop.hpp"
+#include "sim/loop/fast_loop.hpp"
+#include "sweep/sweep.hpp"
 #include "upright/model/plant_file.hpp"
-#include "upright/sim/closed_loop.hpp"
-#include "upright/sim/fast_loop.hpp"
 
 namespace {
 

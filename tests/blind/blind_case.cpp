@@ -5,7 +5,7 @@
 #include <numbers>
 #include <random>
 
-#include "upright/analysis/gain_design.hpp"
+#include "design/gain_design.hpp"
 
 namespace upright::blind {
 

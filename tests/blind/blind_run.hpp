@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "upright/analysis/measurement.hpp"
+#include "upright/measurement/measurement.hpp"
 #include "upright/model/plant.hpp"
 
 namespace upright::blind {

@@ -4,9 +4,9 @@
 #include <utility>
 
 #include "broken_compensator.hpp"
+#include "upright/base/error.hpp"
 #include "upright/control/gain_file.hpp"
 #include "upright/hal/rig_factory.hpp"
-#include "upright/model/error.hpp"
 #include "upright/runtime/session.hpp"
 
 namespace upright::test {

@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "upright/runtime/replay.hpp"
-#include "upright/runtime/run_reader.hpp"
+#include "upright/record/replay.hpp"
+#include "upright/record/run_reader.hpp"
 
 namespace upright::test {
 

@@ -12,7 +12,7 @@
 #include "broken_run.hpp"
 #include "evidence.hpp"
 #include "process_case.hpp"
-#include "upright/runtime/run_reader.hpp"
+#include "upright/record/run_reader.hpp"
 
 namespace upright::test {
 namespace {

@@ -9,14 +9,14 @@
 #include <cstdlib>
 #include <string>
 
-#include "upright/analysis/data_check.hpp"
-#include "upright/analysis/dataset_file.hpp"
-#include "upright/analysis/measurement.hpp"
+#include "experiment/experiment_file.hpp"
+#include "measurement/data_check.hpp"
+#include "measurement/dataset_file.hpp"
+#include "upright/base/error.hpp"
 #include "upright/control/gain_file.hpp"
 #include "upright/hal/rig_file.hpp"
-#include "upright/model/error.hpp"
+#include "upright/measurement/measurement.hpp"
 #include "upright/model/plant_file.hpp"
-#include "upright/runtime/experiment_file.hpp"
 
 namespace {
 

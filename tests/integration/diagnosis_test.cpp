@@ -1,7 +1,7 @@
 // Data in which the effect is hidden: made by the CVODE reference engine with true events, not by the engine
 // that fits (tests/blind). Quantised encoders, base parameters a few percent off, the voltages recorded as
 // commanded. The diagnosis sees the runs only. Hundreds of cases more: tests/bench/diagnosis_matrix.
-#include "upright/analysis/diagnosis.hpp"
+#include "upright/diagnosis/diagnosis.hpp"
 
 #include <gtest/gtest.h>
 
@@ -10,8 +10,8 @@
 #include <random>
 
 #include "blind_case.hpp"
-#include "upright/analysis/gain_design.hpp"
-#include "upright/model/error.hpp"
+#include "design/gain_design.hpp"
+#include "upright/base/error.hpp"
 
 namespace upright {
 namespace {

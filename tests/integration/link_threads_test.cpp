@@ -8,12 +8,12 @@
 #include <string>
 #include <thread>
 
+#include "hal/virtual_rig.hpp"
+#include "runtime/wait_upright.hpp"
 #include "upright/hal/rig_factory.hpp"
-#include "upright/hal/virtual_rig.hpp"
 #include "upright/model/plant_file.hpp"
-#include "upright/runtime/run_reader.hpp"
+#include "upright/record/run_reader.hpp"
 #include "upright/runtime/session.hpp"
-#include "upright/runtime/wait_upright.hpp"
 #include "virtual_rig_process.hpp"
 
 namespace upright::test {

@@ -16,7 +16,7 @@
 #include <thread>
 #include <vector>
 
-#include "upright/live/live_view.hpp"
+#include "live/live_view.hpp"
 
 namespace upright {
 namespace {

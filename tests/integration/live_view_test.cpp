@@ -1,6 +1,6 @@
 // The live page's server over loopback: what it serves, whom it refuses, what its stop button does, and that
 // nobody who reads slowly or not at all holds up the one who writes.
-#include "upright/live/live_view.hpp"
+#include "live/live_view.hpp"
 
 #include <arpa/inet.h>
 #include <gtest/gtest.h>
@@ -19,7 +19,7 @@
 #include <thread>
 #include <vector>
 
-#include "upright/model/error.hpp"
+#include "upright/base/error.hpp"
 
 namespace upright {
 namespace {

@@ -9,8 +9,8 @@
 #include <thread>
 
 #include "fresh_reading.hpp"
+#include "upright/base/error.hpp"
 #include "upright/hal/rig_factory.hpp"
-#include "upright/model/error.hpp"
 #include "virtual_rig_process.hpp"
 
 namespace upright::test {

@@ -8,8 +8,8 @@
 #include <thread>
 
 #include "fake_device.hpp"
-#include "upright/runtime/replay.hpp"
-#include "upright/runtime/run_reader.hpp"
+#include "upright/record/replay.hpp"
+#include "upright/record/run_reader.hpp"
 #include "virtual_rig_process.hpp"
 
 namespace upright::test {

@@ -11,8 +11,9 @@
 #include <vector>
 
 #include "fresh_reading.hpp"
+#include "record/stop_report.hpp"
 #include "stopped_device.hpp"
-#include "upright/model/error.hpp"
+#include "upright/base/error.hpp"
 
 namespace upright::test {
 namespace {

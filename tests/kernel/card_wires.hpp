@@ -6,7 +6,7 @@
 
 #include "../integration/virtual_rig_process.hpp"
 #include "comedi_card.hpp"
-#include "upright/model/yaml_reader.hpp"
+#include "upright/base/yaml_reader.hpp"
 #include "wires.hpp"
 
 namespace upright::test {

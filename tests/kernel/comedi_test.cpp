@@ -9,8 +9,8 @@
 #include "card_wires.hpp"
 #include "guest_run.hpp"
 #include "plant_on_wires.hpp"
+#include "upright/base/error.hpp"
 #include "upright/hal/rig_factory.hpp"
-#include "upright/model/error.hpp"
 
 namespace upright::test {
 namespace {

@@ -7,9 +7,9 @@
 #include <thread>
 
 #include "../../hal/gpio/edge_source.hpp"
+#include "hal/gpio_rig.hpp"
 #include "shaft.hpp"
-#include "upright/hal/gpio_rig.hpp"
-#include "upright/model/error.hpp"
+#include "upright/base/error.hpp"
 
 namespace upright::test {
 namespace {

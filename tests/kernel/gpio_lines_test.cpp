@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "gpio_sim.hpp"
-#include "upright/hal/gpio_rig.hpp"
-#include "upright/model/error.hpp"
+#include "hal/gpio_rig.hpp"
+#include "upright/base/error.hpp"
 
 namespace upright::test {
 namespace {

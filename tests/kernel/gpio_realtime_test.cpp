@@ -8,8 +8,8 @@
 
 #include "../../hal/gpio/edge_source.hpp"
 #include "../unit/counted_calls.hpp"
+#include "hal/gpio_rig.hpp"
 #include "shaft.hpp"
-#include "upright/hal/gpio_rig.hpp"
 
 namespace upright::test {
 namespace {

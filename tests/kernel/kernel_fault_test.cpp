@@ -17,7 +17,7 @@
 #include "line_wires.hpp"
 #include "plant_on_wires.hpp"
 #include "upright/hal/rig_factory.hpp"
-#include "upright/runtime/run_reader.hpp"
+#include "upright/record/run_reader.hpp"
 
 namespace upright::test {
 namespace {

@@ -8,11 +8,11 @@
 #include <numbers>
 #include <string>
 
-#include "upright/analysis/gain_design.hpp"
-#include "upright/analysis/mistaken_plant.hpp"
-#include "upright/analysis/parallel.hpp"
+#include "base/parallel.hpp"
+#include "control/predictor.hpp"
+#include "design/gain_design.hpp"
+#include "design/mistaken_plant.hpp"
 #include "upright/control/controller.hpp"
-#include "upright/control/predictor.hpp"
 #include "upright/model/plant_file.hpp"
 #include "upright/sim/simulator.hpp"
 

@@ -5,10 +5,10 @@
 #include <cmath>
 #include <random>
 
-#include "upright/analysis/delay_margin.hpp"
-#include "upright/analysis/gain_design.hpp"
+#include "design/delay_margin.hpp"
+#include "design/gain_design.hpp"
+#include "upright/base/error.hpp"
 #include "upright/hal/simulated_rig.hpp"
-#include "upright/model/error.hpp"
 #include "upright/model/linear_plant.hpp"
 #include "upright/model/plant_file.hpp"
 #include "upright/runtime/session.hpp"

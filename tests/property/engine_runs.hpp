@@ -6,7 +6,7 @@
 #include <numbers>
 #include <vector>
 
-#include "upright/sim/closed_loop.hpp"
+#include "sim/loop/closed_loop.hpp"
 
 namespace upright::test {
 

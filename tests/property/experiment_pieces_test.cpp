@@ -9,9 +9,9 @@
 #include <utility>
 #include <vector>
 
-#include "upright/model/error.hpp"
+#include "experiment/experiment.hpp"
+#include "upright/base/error.hpp"
 #include "upright/model/plant_file.hpp"
-#include "upright/runtime/experiment.hpp"
 
 namespace upright {
 namespace {

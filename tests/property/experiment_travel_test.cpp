@@ -7,8 +7,8 @@
 #include <numbers>
 #include <random>
 
+#include "experiment/experiment.hpp"
 #include "upright/model/plant_file.hpp"
-#include "upright/runtime/experiment.hpp"
 
 namespace upright {
 namespace {

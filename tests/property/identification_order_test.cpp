@@ -6,9 +6,9 @@
 #include <filesystem>
 #include <vector>
 
-#include "upright/analysis/identification.hpp"
+#include "experiment/experiment.hpp"
+#include "identification/identification.hpp"
 #include "upright/model/plant_file.hpp"
-#include "upright/runtime/experiment.hpp"
 
 namespace upright {
 namespace {

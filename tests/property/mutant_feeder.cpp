@@ -15,7 +15,7 @@
 #include <regex>
 
 #include "mutator.hpp"
-#include "upright/model/error.hpp"
+#include "upright/base/error.hpp"
 
 #ifdef __SANITIZE_ADDRESS__
 #include <sanitizer/common_interface_defs.h>

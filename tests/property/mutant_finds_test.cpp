@@ -4,14 +4,14 @@
 #include <fstream>
 #include <limits>
 
+#include "commissioning/file_agreement.hpp"
+#include "experiment/experiment.hpp"
 #include "mutant_feeder.hpp"
-#include "upright/analysis/file_agreement.hpp"
-#include "upright/analysis/sweep.hpp"
+#include "report/plot.hpp"
+#include "sweep/sweep.hpp"
+#include "upright/base/error.hpp"
 #include "upright/hal/calibration.hpp"
-#include "upright/model/error.hpp"
 #include "upright/model/plant_file.hpp"
-#include "upright/report/plot.hpp"
-#include "upright/runtime/experiment.hpp"
 #include "upright/sim/simulator.hpp"
 
 namespace upright::testing {

@@ -9,17 +9,17 @@
 #include <numbers>
 #include <random>
 
+#include "commissioning/file_agreement.hpp"
+#include "control/filter_model.hpp"
+#include "experiment/experiment.hpp"
 #include "mutant_feeder.hpp"
 #include "short_experiments.hpp"
-#include "upright/analysis/file_agreement.hpp"
-#include "upright/analysis/sweep.hpp"
+#include "sweep/sweep.hpp"
+#include "upright/base/error.hpp"
 #include "upright/control/controller.hpp"
-#include "upright/control/filter_model.hpp"
 #include "upright/control/model_parts.hpp"
 #include "upright/hal/simulated_rig.hpp"
-#include "upright/model/error.hpp"
 #include "upright/model/plant_file.hpp"
-#include "upright/runtime/experiment.hpp"
 #include "upright/runtime/session.hpp"
 #include "upright/sim/simulator.hpp"
 

@@ -5,7 +5,7 @@
 #include <random>
 
 #include "../unit/plants.hpp"
-#include "upright/model/error.hpp"
+#include "upright/base/error.hpp"
 
 namespace upright {
 namespace {

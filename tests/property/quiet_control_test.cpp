@@ -9,13 +9,13 @@
 #include <string>
 #include <vector>
 
-#include "upright/analysis/estimator_design.hpp"
-#include "upright/analysis/mistaken_plant.hpp"
-#include "upright/analysis/parallel.hpp"
-#include "upright/control/filter_model.hpp"
+#include "base/parallel.hpp"
+#include "control/filter_model.hpp"
+#include "design/estimator_design.hpp"
+#include "design/mistaken_plant.hpp"
 #include "upright/control/model_parts.hpp"
 #include "upright/model/plant_file.hpp"
-#include "upright/sim/loop_run.hpp"
+#include "upright/sim/loop/loop_run.hpp"
 
 namespace upright {
 namespace {

@@ -5,22 +5,22 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "comparison/run_behaviour.hpp"
+#include "experiment/experiment.hpp"
+#include "measurement/data_check.hpp"
 #include "mutant_feeder.hpp"
+#include "record/sign_record.hpp"
+#include "report/diagnosis_report.hpp"
+#include "report/experiment_report.hpp"
+#include "report/run_report.hpp"
+#include "report/sweep_report.hpp"
 #include "short_experiments.hpp"
-#include "upright/analysis/data_check.hpp"
-#include "upright/analysis/measurement.hpp"
-#include "upright/analysis/run_behaviour.hpp"
-#include "upright/analysis/sweep.hpp"
+#include "sweep/sweep.hpp"
+#include "upright/base/error.hpp"
 #include "upright/control/model_parts.hpp"
-#include "upright/model/error.hpp"
+#include "upright/measurement/measurement.hpp"
 #include "upright/model/plant_file.hpp"
-#include "upright/report/diagnosis_report.hpp"
-#include "upright/report/experiment_report.hpp"
-#include "upright/report/run_report.hpp"
-#include "upright/report/sweep_report.hpp"
-#include "upright/runtime/experiment.hpp"
-#include "upright/runtime/replay.hpp"
-#include "upright/runtime/sign_check.hpp"
+#include "upright/record/replay.hpp"
 
 namespace upright::testing {
 namespace {

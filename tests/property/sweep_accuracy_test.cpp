@@ -7,10 +7,10 @@
 #include <string>
 #include <vector>
 
+#include "sim/loop/closed_loop.hpp"
+#include "sim/loop/fast_loop.hpp"
 #include "upright/model/plant_file.hpp"
-#include "upright/sim/closed_loop.hpp"
 #include "upright/sim/event_engine.hpp"
-#include "upright/sim/fast_loop.hpp"
 
 namespace upright {
 namespace {

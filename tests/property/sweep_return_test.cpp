@@ -8,10 +8,10 @@
 #include <filesystem>
 #include <numbers>
 
-#include "upright/control/predictor.hpp"
-#include "upright/model/error.hpp"
+#include "control/predictor.hpp"
+#include "experiment/experiment.hpp"
+#include "upright/base/error.hpp"
 #include "upright/model/plant_file.hpp"
-#include "upright/runtime/experiment.hpp"
 
 namespace upright {
 namespace {

@@ -9,8 +9,8 @@
 #include <memory>
 
 #include "fake_comedi.hpp"
+#include "upright/base/error.hpp"
 #include "upright/hal/rig_factory.hpp"
-#include "upright/model/error.hpp"
 
 namespace upright::test {
 namespace {

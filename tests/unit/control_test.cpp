@@ -7,8 +7,8 @@
 #include <numbers>
 #include <random>
 
+#include "upright/base/error.hpp"
 #include "upright/control/controller.hpp"
-#include "upright/model/error.hpp"
 
 namespace upright {
 namespace {

@@ -1,6 +1,6 @@
 // Mistakes of sign, zero, unit and order in measured data are named before any search, with lines that undo
 // them; effects that a rig may have are no mistakes.
-#include "upright/analysis/data_check.hpp"
+#include "measurement/data_check.hpp"
 
 #include <gtest/gtest.h>
 
@@ -13,10 +13,10 @@
 #include <vector>
 
 #include "blind_case.hpp"
-#include "upright/analysis/dataset_file.hpp"
+#include "measurement/dataset_file.hpp"
+#include "upright/base/error.hpp"
+#include "upright/base/yaml_reader.hpp"
 #include "upright/model/effect.hpp"
-#include "upright/model/error.hpp"
-#include "upright/model/yaml_reader.hpp"
 
 namespace upright {
 namespace {

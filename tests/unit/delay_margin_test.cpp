@@ -1,4 +1,4 @@
-#include "upright/analysis/delay_margin.hpp"
+#include "design/delay_margin.hpp"
 
 #include <gtest/gtest.h>
 
@@ -7,10 +7,10 @@
 #include <numbers>
 #include <random>
 
-#include "upright/analysis/characteristic_roots.hpp"
-#include "upright/analysis/gain_design.hpp"
-#include "upright/analysis/linear_sampled_loop.hpp"
-#include "upright/analysis/overrun_limit.hpp"
+#include "design/characteristic_roots.hpp"
+#include "design/gain_design.hpp"
+#include "design/linear_sampled_loop.hpp"
+#include "runtime/overrun_limit.hpp"
 #include "upright/control/controller.hpp"
 #include "upright/model/plant_file.hpp"
 #include "upright/sim/simulator.hpp"

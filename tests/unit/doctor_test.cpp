@@ -11,11 +11,11 @@
 #include <sstream>
 #include <string>
 
-#include "upright/runtime/cpu_latency.hpp"
-#include "upright/runtime/histogram_text.hpp"
-#include "upright/runtime/machine_check.hpp"
-#include "upright/runtime/rig_check.hpp"
-#include "upright/runtime/wake_probe.hpp"
+#include "commissioning/machine_check.hpp"
+#include "commissioning/rig_check.hpp"
+#include "commissioning/wake_probe.hpp"
+#include "record/histogram_text.hpp"
+#include "runtime/cpu_latency.hpp"
 
 namespace upright {
 namespace {

@@ -1,4 +1,4 @@
-#include "upright/runtime/experiment.hpp"
+#include "experiment/experiment.hpp"
 
 #include <gtest/gtest.h>
 
@@ -6,9 +6,9 @@
 #include <filesystem>
 #include <numbers>
 
-#include "upright/model/error.hpp"
+#include "commissioning/sign_check.hpp"
+#include "upright/base/error.hpp"
 #include "upright/model/plant_file.hpp"
-#include "upright/runtime/sign_check.hpp"
 
 namespace upright {
 namespace {

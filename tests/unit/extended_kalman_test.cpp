@@ -4,10 +4,10 @@
 #include <cmath>
 #include <numbers>
 
-#include "upright/analysis/estimator_design.hpp"
+#include "design/estimator_design.hpp"
+#include "upright/base/error.hpp"
 #include "upright/control/controller.hpp"
 #include "upright/control/model_parts.hpp"
-#include "upright/model/error.hpp"
 #include "upright/model/plant_file.hpp"
 #include "upright/sim/simulator.hpp"
 

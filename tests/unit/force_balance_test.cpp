@@ -1,6 +1,6 @@
 // Direct readings against closed forms: the balance of forces, steady speeds and breakaways of a cart whose
 // numbers are known.
-#include "upright/analysis/force_balance.hpp"
+#include "identification/force_balance.hpp"
 
 #include <gtest/gtest.h>
 

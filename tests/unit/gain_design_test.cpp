@@ -1,14 +1,14 @@
-#include "upright/analysis/gain_design.hpp"
+#include "design/gain_design.hpp"
 
 #include <gtest/gtest.h>
 
 #include <Eigen/Eigenvalues>
 #include <random>
 
-#include "upright/analysis/dense_algebra.hpp"
-#include "upright/model/error.hpp"
+#include "design/dense_algebra.hpp"
+#include "model/riccati.hpp"
+#include "upright/base/error.hpp"
 #include "upright/model/plant_file.hpp"
-#include "upright/model/riccati.hpp"
 
 namespace upright {
 namespace {

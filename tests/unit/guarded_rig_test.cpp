@@ -1,4 +1,4 @@
-#include "upright/hal/guarded_rig.hpp"
+#include "hal/guarded_rig.hpp"
 
 #include <gtest/gtest.h>
 

@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "upright/model/error.hpp"
+#include "upright/base/error.hpp"
 
 namespace upright {
 namespace {

@@ -5,13 +5,13 @@
 #include <cmath>
 #include <numbers>
 
-#include "upright/analysis/delay_margin.hpp"
-#include "upright/analysis/estimator_design.hpp"
-#include "upright/analysis/linear_sampled_loop.hpp"
+#include "control/kalman_filter.hpp"
+#include "design/delay_margin.hpp"
+#include "design/estimator_design.hpp"
+#include "design/linear_sampled_loop.hpp"
+#include "upright/base/error.hpp"
 #include "upright/control/controller.hpp"
-#include "upright/control/kalman_filter.hpp"
 #include "upright/control/model_parts.hpp"
-#include "upright/model/error.hpp"
 #include "upright/model/plant_file.hpp"
 #include "upright/sim/simulator.hpp"
 

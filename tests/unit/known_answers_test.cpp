@@ -5,7 +5,7 @@
 #include <numbers>
 
 #include "plants.hpp"
-#include "upright/sim/closed_loop.hpp"
+#include "sim/loop/closed_loop.hpp"
 #include "upright/sim/cvode_engine.hpp"
 
 namespace upright {

@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
-#include "upright/live/frame_maker.hpp"
+#include "live/frame_maker.hpp"
 
 namespace upright {
 namespace {

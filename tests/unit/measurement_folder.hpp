@@ -8,8 +8,8 @@
 #include <fstream>
 #include <string>
 
-#include "upright/analysis/measurement.hpp"
-#include "upright/model/error.hpp"
+#include "upright/base/error.hpp"
+#include "upright/measurement/measurement.hpp"
 
 namespace upright {
 

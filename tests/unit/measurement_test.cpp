@@ -1,12 +1,12 @@
-#include "upright/analysis/measurement.hpp"
+#include "upright/measurement/measurement.hpp"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <random>
 
+#include "measurement/long_records.hpp"
 #include "measurement_folder.hpp"
-#include "upright/analysis/long_records.hpp"
 
 namespace upright {
 namespace {

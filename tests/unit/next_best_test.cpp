@@ -1,7 +1,7 @@
 // Which name came next to the one that was taken.
 #include <gtest/gtest.h>
 
-#include "upright/analysis/diagnosis.hpp"
+#include "upright/diagnosis/diagnosis.hpp"
 #include "upright/model/registry.hpp"
 
 namespace upright {

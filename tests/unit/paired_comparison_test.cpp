@@ -1,11 +1,11 @@
 // Paired differences against textbook numbers.
-#include "upright/analysis/paired_comparison.hpp"
+#include "comparison/paired_comparison.hpp"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "upright/analysis/student.hpp"
+#include "comparison/student.hpp"
 
 namespace upright {
 namespace {

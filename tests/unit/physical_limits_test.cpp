@@ -1,11 +1,11 @@
 // The limits that `margin` prints, against a search over gains by the characteristic roots.
-#include "upright/analysis/physical_limits.hpp"
+#include "design/physical_limits.hpp"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "upright/analysis/characteristic_roots.hpp"
+#include "design/characteristic_roots.hpp"
 #include "upright/model/plant_file.hpp"
 
 namespace upright {

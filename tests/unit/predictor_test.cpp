@@ -1,12 +1,12 @@
-#include "upright/control/predictor.hpp"
+#include "control/predictor.hpp"
 
 #include <gtest/gtest.h>
 
 #include <deque>
 #include <random>
 
+#include "upright/base/error.hpp"
 #include "upright/control/controller.hpp"
-#include "upright/model/error.hpp"
 #include "upright/model/linear_plant.hpp"
 #include "upright/model/plant_file.hpp"
 #include "upright/sim/simulator.hpp"

@@ -9,10 +9,10 @@
 
 #include "../../src/report/row_thinner.hpp"
 #include "../../src/report/ticks.hpp"
-#include "upright/model/error.hpp"
-#include "upright/report/html.hpp"
-#include "upright/report/plot.hpp"
-#include "upright/report/statistics.hpp"
+#include "report/html.hpp"
+#include "report/plot.hpp"
+#include "report/statistics.hpp"
+#include "upright/base/error.hpp"
 
 namespace upright {
 namespace {

@@ -8,7 +8,7 @@
 #include <random>
 #include <sstream>
 
-#include "upright/model/error.hpp"
+#include "upright/base/error.hpp"
 
 namespace upright {
 namespace {

@@ -1,5 +1,5 @@
 // What `upright compare` computes, on signals whose answers are known in closed form.
-#include "upright/analysis/run_behaviour.hpp"
+#include "comparison/run_behaviour.hpp"
 
 #include <gtest/gtest.h>
 
@@ -7,7 +7,7 @@
 #include <numbers>
 #include <random>
 
-#include "upright/report/compare_report.hpp"
+#include "report/compare_report.hpp"
 
 namespace upright {
 namespace {

@@ -15,10 +15,10 @@
 #include <sstream>
 #include <thread>
 
+#include "upright/base/error.hpp"
 #include "upright/hal/simulated_rig.hpp"
-#include "upright/model/error.hpp"
 #include "upright/model/plant_file.hpp"
-#include "upright/runtime/replay.hpp"
+#include "upright/record/replay.hpp"
 #include "upright/runtime/session.hpp"
 #include "upright/runtime/sleep_policy.hpp"
 

@@ -1,5 +1,5 @@
 // What is left of runs of a rig that the model is not, in words.
-#include "upright/analysis/structure.hpp"
+#include "diagnosis/structure.hpp"
 
 #include <gtest/gtest.h>
 

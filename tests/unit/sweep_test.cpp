@@ -1,5 +1,5 @@
 // Sweeps: the vector engine against the event engine, the file reader, and what a sweep leaves on disk.
-#include "upright/analysis/sweep.hpp"
+#include "sweep/sweep.hpp"
 
 #include <gtest/gtest.h>
 #include <unistd.h>
@@ -10,13 +10,13 @@
 #include <random>
 #include <sstream>
 
-#include "upright/analysis/delay_margin.hpp"
-#include "upright/model/error.hpp"
+#include "design/delay_margin.hpp"
+#include "sim/loop/closed_loop.hpp"
+#include "sim/loop/fast_loop.hpp"
+#include "sim/loop/lanes.hpp"
+#include "upright/base/error.hpp"
 #include "upright/model/plant_file.hpp"
-#include "upright/sim/closed_loop.hpp"
 #include "upright/sim/event_engine.hpp"
-#include "upright/sim/fast_loop.hpp"
-#include "upright/sim/lanes.hpp"
 
 namespace upright {
 namespace {

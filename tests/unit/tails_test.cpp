@@ -1,4 +1,4 @@
-#include "upright/analysis/tails.hpp"
+#include "diagnosis/tails.hpp"
 
 #include <gtest/gtest.h>
 

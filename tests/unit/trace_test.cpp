@@ -1,6 +1,6 @@
 // Simulation of measured segments, and the rig that makes blind data: both against each other, since one
 // follows the event engine and the other the CVODE reference.
-#include "upright/analysis/trace.hpp"
+#include "diagnosis/trace.hpp"
 
 #include <gtest/gtest.h>
 

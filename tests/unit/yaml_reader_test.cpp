@@ -1,10 +1,10 @@
-#include "upright/model/yaml_reader.hpp"
+#include "upright/base/yaml_reader.hpp"
 
 #include <gtest/gtest.h>
 
 #include <functional>
 
-#include "upright/model/error.hpp"
+#include "upright/base/error.hpp"
 
 namespace upright {
 namespace {

@@ -4,8 +4,8 @@
 
 #include <string>
 
+#include "upright/base/yaml_reader.hpp"
 #include "upright/model/plant.hpp"
-#include "upright/model/yaml_reader.hpp"
 
 namespace upright {
 

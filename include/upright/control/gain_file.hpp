@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "upright/base/yaml_reader.hpp"
 #include "upright/control/velocity_estimator.hpp"
-#include "upright/model/yaml_reader.hpp"
 
 namespace upright {
 

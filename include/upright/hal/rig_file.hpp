@@ -7,12 +7,12 @@
 #include <optional>
 #include <string>
 
+#include "upright/base/yaml_reader.hpp"
 #include "upright/control/encoder_assumptions.hpp"
 #include "upright/hal/calibration.hpp"
 #include "upright/hal/comedi_wiring.hpp"
 #include "upright/hal/gpio.hpp"
 #include "upright/hal/modbus_registers.hpp"
-#include "upright/model/yaml_reader.hpp"
 
 namespace upright {
 

@@ -26,7 +26,7 @@
 #include <span>
 #include <string_view>
 
-#include "upright/model/yaml_reader.hpp"
+#include "upright/base/yaml_reader.hpp"
 
 namespace upright {
 

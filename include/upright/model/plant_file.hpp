@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "upright/base/yaml_reader.hpp"
 #include "upright/model/plant.hpp"
-#include "upright/model/yaml_reader.hpp"
 
 namespace upright {
 

@@ -8,8 +8,9 @@
 
 #include "upright/hal/clock.hpp"
 #include "upright/hal/rig.hpp"
+#include "upright/record/run_directory.hpp"
 #include "upright/runtime/control_loop.hpp"
-#include "upright/runtime/run_directory.hpp"
+#include "upright/runtime/realtime.hpp"
 #include "upright/runtime/zero_volts.hpp"
 
 namespace upright {

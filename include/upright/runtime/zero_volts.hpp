@@ -3,7 +3,6 @@
 #pragma once
 
 #include <functional>
-#include <string>
 
 #include "upright/hal/clock.hpp"
 #include "upright/hal/rig.hpp"
@@ -24,14 +23,5 @@ struct StopWatcher {
 /// Stops the rig and waits until zero volts is confirmed, the patience is over, or somebody asks for the end
 /// once more. Not from the loop's thread.
 StopReport stop_and_wait(Rig& rig, Clock& clock, const StopWatcher& watcher);
-
-/// "confirmed" or "not_confirmed".
-const char* name_of_zero(const StopReport& report) noexcept;
-
-/// What is known, in one sentence; in capitals, and with what to do, where somebody has to act.
-std::string sentence_of(const StopReport& report);
-
-/// Why zero volts is not confirmed yet: "no reply in time", "exception 06 (device busy)", ...
-std::string reason_of(const StopReport& report);
 
 }  // namespace upright

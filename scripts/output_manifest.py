@@ -1,0 +1,157 @@
+#!/usr/bin/env python3
+"""A manifest of what upright computes: one SHA-256 for each output, to compare two builds on one machine.
+
+  output_manifest.py BUILD MATRIX WORK [--cases N] [--threads N] [--data DIR] [--only WORD]
+
+BUILD is the folder of a build (build/ci), MATRIX the build whose diagnosis_matrix makes the cases: name the same one
+for both manifests. WORK is a folder for what is made; it may be kept for the next call. Prints "SHA256  NAME" lines.
+What differs from call to call by nature (times of day, durations, the commit, folders) is taken out before.
+--cases N    diagnoses N cases of the matrix (100)
+--threads N  of each search (UPRIGHT_THREADS)
+--data DIR   diagnoses the measurements of other laboratories too (../shared/data)
+--only WORD  only outputs whose name begins so: design, margin, sweep, run, identify, diagnose, data
+Two builds compute the same if `diff` finds the same manifests:
+  scripts/output_manifest.py build/before build/before /tmp/m > before.txt
+  scripts/output_manifest.py build/after build/before /tmp/m > after.txt && diff before.txt after.txt
+"""
+import argparse
+import hashlib
+import os
+import pathlib
+import re
+import shutil
+import subprocess
+import sys
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent
+CONFIG = ROOT / "config"
+BY_NATURE = [
+    (re.compile(rb"\d{8}T\d{6}Z"), b"TIME"),
+    (re.compile(rb"\d{4}-\d\d-\d\d[T ]\d\d:\d\d:\d\dZ?( UTC)?"), b"TIME"),
+    (re.compile(rb"\b[0-9a-f]{40}\b"), b"COMMIT"),
+    (re.compile(rb"\b[0-9a-f]{7,12}\b(?=[^\n]{0,40}(changed|commit|dirty))"), b"COMMIT"),
+    (re.compile(rb'("?git_dirty"?: ?)(true|false)'), rb"\1DIRTY"),
+    (re.compile(rb'("(elapsed|cpu|search|wall)_s": ?)[0-9.e+-]+'), rb"\1SECONDS"),
+]
+
+
+class Manifest:
+    def __init__(self, arguments):
+        self.program = arguments.build.resolve() / "src" / "cli" / "upright"
+        self.matrix = arguments.matrix.resolve() / "tests" / "bench" / "diagnosis_matrix"
+        self.work = arguments.work.resolve()
+        self.only = arguments.only
+        self.environment = dict(os.environ)
+        if arguments.threads:
+            self.environment["UPRIGHT_THREADS"] = str(arguments.threads)
+
+    def wants(self, kind):
+        return not self.only or kind.startswith(self.only)
+
+    def add(self, name, data):
+        data = data.replace(str(self.program).encode(), b"upright").replace(str(self.work).encode(), b"WORK")
+        for pattern, instead in BY_NATURE:
+            data = pattern.sub(instead, data)
+        print(f"{hashlib.sha256(data).hexdigest()}  {name}", flush=True)
+
+    def call(self, name, *words, keep_output=True):
+        done = subprocess.run([self.program, *map(str, words)], capture_output=True, cwd=self.work, env=self.environment)
+        if keep_output or done.returncode not in (0, 2, 3):
+            self.add(f"{name}/stdout", done.stdout + b"exit code %d" % done.returncode)
+        return done
+
+    def fresh(self, name):
+        folder = self.work / "out" / name
+        shutil.rmtree(folder, ignore_errors=True)
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        return folder
+
+    def add_files(self, name, folder, *skip):
+        for file in sorted(folder.rglob("*")):
+            if file.is_file() and file.name not in skip:
+                inside = re.sub(r"\d{8}T\d{6}Z-?", "", file.relative_to(folder).as_posix())
+                self.add(f"{name}/{inside}", file.read_bytes())
+
+    def designs(self):
+        plants = sorted((CONFIG / "plants").glob("*.yaml"))
+        for plant in plants:
+            for options in ([], ["--delay", "0.05", "--rate", "1000"], ["--estimator", "kalman"], ["--estimator", "extended_kalman"]):
+                name = "-".join(["design", plant.stem, *[word.strip("-") for word in options]])
+                self.call(name, "design", plant, *options, "--json")
+            for gains in sorted((CONFIG / "gains").glob("*.yaml")):
+                self.call(f"margin-{plant.stem}-{gains.stem}", "margin", plant, gains, "--json")
+
+    def sweeps(self):
+        for sweep in sorted((CONFIG / "sweeps").glob("*.yaml")):
+            folder = self.fresh(f"sweep-{sweep.stem}")
+            self.call("sweep", "sweep", sweep, "--out", folder, "--overwrite", keep_output=False)
+            self.call("report", "report", folder, keep_output=False)
+            self.add_files(f"sweep-{sweep.stem}", folder)
+
+    def runs(self):
+        for gains in sorted((CONFIG / "gains").glob("*.yaml")):
+            for seed in (1, 2):
+                folder = self.fresh(f"run-{gains.stem}-{seed}")
+                self.call("run", "run", "--rig", CONFIG / "rigs" / "simulated.yaml", "--gains", gains, "--fast", "--seed", seed,
+                          "--duration", "10", "--theta0-deg", "3", "--out", folder, keep_output=False)
+                for run in folder.iterdir():
+                    self.add(f"run-{gains.stem}-{seed}/samples.csv", (run / "samples.csv").read_bytes())
+                    self.call(f"run-{gains.stem}-{seed}/replay", "replay", run)
+
+    def identifications(self):
+        for name in ("friction", "pivot"):
+            made = self.work / "experiments" / name
+            if not made.exists():
+                self.call("experiment", "experiment", CONFIG / "experiments" / f"{name}.yaml", "--rig",
+                          CONFIG / "rigs" / "simulated.yaml", "--fast", "--out", made, keep_output=False)
+            folder = self.fresh(f"identify-{name}")
+            self.call(f"identify-{name}", "identify", "--data", made, "--plant", CONFIG / "plants" / "viscous.yaml", "--out", folder)
+            self.add_files(f"identify-{name}", folder)
+
+    def diagnosis(self, name, model, data):
+        folder = self.fresh(name)
+        self.call(name, "diagnose", "--model", model, "--data", *data, "--out", folder, "--trials")
+        if folder.exists():
+            self.call("report", "report", folder, keep_output=False)
+            self.add_files(name, folder)
+
+    def cases(self, count):
+        for number in range(count):
+            made = self.work / "cases" / str(number)
+            if not made.exists():
+                subprocess.run([self.matrix, "--case", str(number), "--keep", made, "--cases", "1", "--seed", "20261123", "--out",
+                                self.work / "unused.jsonl"], check=True, capture_output=True)
+            self.diagnosis(f"diagnose-{number}", made / "believed.yaml", sorted(made.glob("run*.csv")))
+
+    def measurements(self, data):
+        made = self.work / "data"
+        if not made.exists():
+            subprocess.run([sys.executable, ROOT / "scripts" / "real_data.py", "prepare", data, made], check=True, capture_output=True)
+        for folder in sorted(made.iterdir()):
+            self.diagnosis(f"data-{folder.name}", folder / "plant.yaml", sorted(folder.glob("data*.yaml")))
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("build", type=pathlib.Path)
+    parser.add_argument("matrix", type=pathlib.Path)
+    parser.add_argument("work", type=pathlib.Path)
+    parser.add_argument("--cases", type=int, default=100)
+    parser.add_argument("--threads", type=int)
+    parser.add_argument("--data", type=pathlib.Path)
+    parser.add_argument("--only", default="")
+    arguments = parser.parse_args()
+    arguments.work.mkdir(parents=True, exist_ok=True)
+    manifest = Manifest(arguments)
+    if manifest.wants("design") or manifest.wants("margin"):
+        manifest.designs()
+    for kind, make in (("sweep", manifest.sweeps), ("run", manifest.runs), ("identify", manifest.identifications),
+                       ("diagnose", lambda: manifest.cases(arguments.cases))):
+        if manifest.wants(kind):
+            make()
+    if arguments.data and manifest.wants("data"):
+        manifest.measurements(arguments.data.resolve())
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,271 @@
+#include "fast_loop.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <optional>
+#include <vector>
+
+#include "continuous_lanes.hpp"
+#include "event_lane.hpp"
+#include "lane_model.hpp"
+#include "lane_results.hpp"
+#include "upright/control/delay_line.hpp"
+#include "upright/control/velocity_estimator.hpp"
+#include "upright/model/dynamics.hpp"
+#include "upright/sim/runge_kutta.hpp"
+
+namespace upright {
+
+namespace {
+
+/// Feedback voltages on their way, one ring for all lanes. The feedback is linear, so that delaying the
+/// voltage is delaying the state.
+class LaneDelay {
+ public:
+  LaneDelay(std::span<const LoopCase> cases, double period_s) {
+    std::size_t longest = 0;
+    std::array<double, lane_count> fraction{};
+    for (std::size_t i = 0; i < lane_count; ++i) {
+      const DelayLine line(cases[std::min(i, cases.size() - 1)].delay_s, period_s);
+      whole_[i] = line.whole_periods();
+      fraction[i] = line.fraction();
+      longest = std::max(longest, whole_[i]);
+      same_ = same_ && whole_[i] == whole_[0];
+      exact_ = exact_ && line.exact();
+    }
+    fraction_ = Lanes::load(fraction.data());
+    ring_.resize(std::bit_ceil(longest + 2) * lane_count);
+  }
+
+  void start(const Lanes& volts) {
+    for (std::size_t i = 0; i < ring_.size(); i += lane_count) volts.store(&ring_[i]);
+  }
+
+  Lanes pass(std::size_t tick, const Lanes& volts) {
+    volts.store(&ring_[slot(tick)]);
+    const Lanes later = back(tick, 0);
+    if (exact_) return later;
+    return later + fraction_ * (back(tick, 1) - later);
+  }
+
+ private:
+  std::size_t slot(std::size_t tick) const { return tick * lane_count & (ring_.size() - 1); }
+
+  Lanes back(std::size_t tick, std::size_t more) const {
+    if (same_) return Lanes::load(&ring_[slot(tick - whole_[0] - more)]);
+    std::array<double, lane_count> volts;
+    for (std::size_t i = 0; i < lane_count; ++i) volts[i] = ring_[slot(tick - whole_[i] - more) + i];
+    return Lanes::load(volts.data());
+  }
+
+  std::array<std::size_t, lane_count> whole_{};
+  Lanes fraction_;
+  std::vector<double> ring_;
+  bool same_ = true, exact_ = true;
+};
+
+/// Encoders and velocity estimate of one coordinate.
+class LaneSensor {
+ public:
+  LaneSensor(const EstimatorStep& step, double resolution) : step_(step), resolution_(resolution) {}
+
+  void start(const Lanes& value) { position = previous_ = stepped(value); }
+
+  void take(const Lanes& value) {
+    position = stepped(value);
+    const Lanes dx = position - previous_;
+    const Lanes next = Lanes(step_.p21) * lag_ + Lanes(step_.p22) * velocity + Lanes(step_.g2) * dx;
+    lag_ = Lanes(step_.p11) * lag_ + Lanes(step_.p12) * velocity + Lanes(step_.g1) * dx;
+    velocity = next;
+    previous_ = position;
+  }
+
+  Lanes position, velocity;
+
+ private:
+  Lanes stepped(const Lanes& value) const {
+    return resolution_ > 0.0 ? round(value * Lanes(1.0 / resolution_)) * Lanes(resolution_) : value;
+  }
+
+  EstimatorStep step_;
+  double resolution_;
+  Lanes previous_, lag_;
+};
+
+/// How the motion gets through one period with the voltage held: smooth friction.
+template <class Present>
+class SmoothPeriod {
+ public:
+  SmoothPeriod(const LoopSetup& setup, const PlantModel<Lanes>& model, const Present& present)
+      : physics_(model, present) {
+    const double smoothing = setup.model.smoothing;
+    if (smoothing > 0.0) {
+      // tanh(smoothing v) turns within about 3 / smoothing; a step may sweep 0.7 / smoothing of it (errors of
+      // 1e-8).
+      turning_mps_ = 3.0 / smoothing;
+      sweep_mps_ = 0.7 / smoothing;
+    } else if (physics_.cart_has_kink()) {
+      turning_mps_ = 0.0;
+      sweep_mps_ = kink_sweep_mps;
+    }
+  }
+
+  [[gnu::flatten]] void advance(PlantState<Lanes>& state, const Lanes& /*command_v*/, const Lanes& motor_v,
+                                double period_s) {
+    const auto rate = [&](const PlantState<Lanes>& s, Stage) { return physics_.derivative(s, motor_v, {}); };
+    const PlantState<Lanes> first = rate(state, Stage::end);
+    const int pieces = pieces_for(state, first, period_s);
+    const Lanes h(period_s / pieces);
+    state = runge_kutta_4(rate, state, first, h);
+    for (int i = 1; i < pieces; ++i) state = runge_kutta_4(rate, state, rate(state, Stage::end), h);
+  }
+
+ private:
+  static constexpr double kink_sweep_mps = 1e-3;
+  static constexpr int most_pieces = 16;
+
+  /// How many steps this period needs: more where the velocity sweeps over the turn of the friction.
+  int pieces_for(const PlantState<Lanes>& state, const PlantState<Lanes>& first, double period_s) const {
+    if (!(sweep_mps_ > 0.0)) return 1;
+    const Lanes reach = absolute(first.cart_mps) * Lanes(period_s);
+    const LaneMask near = absolute(state.cart_mps) - reach < Lanes(turning_mps_);
+    const Lanes swept = select(near, reach, Lanes(0.0));
+    int pieces = 1;
+    while (pieces < most_pieces && any(swept > Lanes(pieces * sweep_mps_))) pieces *= 2;
+    return pieces;
+  }
+
+  Dynamics<Lanes, Present> physics_;
+  double turning_mps_ = 0.0, sweep_mps_ = 0.0;
+};
+
+/// The same with true stick-slip: every lane has its contact; a lane with an event inside the period goes
+/// through it on the event engine.
+template <class Present>
+class StickSlipPeriod {
+ public:
+  StickSlipPeriod(const LoopSetup& setup, const PlantModel<Lanes>& model, const Present& present)
+      : physics_(model, present), event_lane_(setup.model) {}
+
+  [[gnu::flatten]] void advance(PlantState<Lanes>& state, const Lanes& command_v, const Lanes& motor_v,
+                                double period_s) {
+    const Lanes zero(0.0), one(1.0);
+    const Lanes direction = select(state.cart_mps > zero, one,
+                                   select(state.cart_mps < zero, Lanes(-1.0), broken_away(state, motor_v)));
+    const auto rate = [&](const PlantState<Lanes>& s, Stage) {
+      return physics_.derivative_by_direction(s, motor_v, direction);
+    };
+    PlantState<Lanes> next = runge_kutta_4(rate, state, rate(state, Stage::end), Lanes(period_s));
+    const LaneMask rests = direction == zero;
+    LaneMask eventful = direction * next.cart_mps < zero;
+    if (any(rests)) eventful = eventful | (rests & !(broken_away(next, motor_v) == zero));
+    if (any(eventful)) hand_over(eventful.bits(), state, command_v, period_s, next);
+    state = next;
+  }
+
+ private:
+  Lanes broken_away(const PlantState<Lanes>& state, const Lanes& motor_v) const {
+    return direction_of(excess_load(physics_, state, motor_v));
+  }
+
+  [[gnu::noinline]] void hand_over(std::uint32_t lanes, const PlantState<Lanes>& before,
+                                   const Lanes& command_v, double period_s, PlantState<Lanes>& after) {
+    const auto x0 = before.cart_m.values(), th0 = before.theta_rad.values(), v0 = before.cart_mps.values(),
+               w0 = before.theta_radps.values(), volts = command_v.values();
+    auto x = after.cart_m.values(), th = after.theta_rad.values(), v = after.cart_mps.values(),
+         w = after.theta_radps.values();
+    for (; lanes != 0; lanes &= lanes - 1) {
+      const auto i = static_cast<std::size_t>(std::countr_zero(lanes));
+      PlantState<double> state{x0[i], th0[i], v0[i], w0[i], 0.0, 0.0};
+      event_lane_.advance(state, volts[i], period_s);
+      x[i] = state.cart_m;
+      th[i] = state.theta_rad;
+      v[i] = state.cart_mps;
+      w[i] = state.theta_radps;
+    }
+    after.cart_m = Lanes::load(x.data());
+    after.theta_rad = Lanes::load(th.data());
+    after.cart_mps = Lanes::load(v.data());
+    after.theta_radps = Lanes::load(w.data());
+  }
+
+  Dynamics<Lanes, Present> physics_;
+  EventLane event_lane_;
+};
+
+template <class Period>
+void run_sampled(const LoopSetup& setup, const Dynamics<Lanes>& chain, Period& period,
+                 std::span<const LoopCase> cases, std::span<LoopResult> results) {
+  const double period_s = setup.control.period_s();
+  const EstimatorStep step = make_estimator_step(setup.control.estimator, period_s);
+  LaneSensor cart(step, setup.cart_resolution_m), pendulum(step, setup.angle_resolution_rad);
+  LaneDelay delay(cases, period_s);
+  LaneResults seen(setup, cases.size());
+  PlantState<Lanes> state{};
+  std::array<double, lane_count> theta0;
+  for (std::size_t i = 0; i < lane_count; ++i) theta0[i] = cases[std::min(i, cases.size() - 1)].theta0_rad;
+  state.theta_rad = Lanes::load(theta0.data());
+  const Gains& gains = setup.control.gains;
+  const Lanes limit(setup.amplifier_limit_v);
+  const auto ticks = static_cast<std::size_t>(std::llround(setup.duration_s * setup.control.sample_rate_hz));
+  for (std::size_t tick = 0; tick < ticks; ++tick) {
+    seen.take(static_cast<double>(tick) * period_s, state);
+    if (seen.all_fell()) break;
+    const Outputs<Lanes> shown = chain.measure(state);
+    if (tick == 0) {
+      cart.start(shown.cart_m);
+      pendulum.start(shown.theta_rad);
+    } else {
+      cart.take(shown.cart_m);
+      pendulum.take(shown.theta_rad);
+    }
+    const Lanes feedback = Lanes(gains.cart_position_v_per_m) * cart.position +
+                           Lanes(gains.pendulum_angle_v_per_rad) * pendulum.position +
+                           Lanes(gains.cart_velocity_v_per_mps) * cart.velocity +
+                           Lanes(gains.pendulum_rate_v_per_radps) * pendulum.velocity;
+    if (tick == 0) delay.start(feedback);
+    const Lanes command = smaller(larger(delay.pass(tick, feedback), -limit), limit);
+    state.motor_v = chain.actuate(command);
+    period.advance(state, command, state.motor_v, period_s);
+  }
+  seen.take(static_cast<double>(ticks) * period_s, state);
+  seen.finish(state, results);
+}
+
+template <class Present>
+void run_with(const LoopSetup& setup, const Present& present, std::span<const LoopCase> cases,
+              std::span<LoopResult> results) {
+  const PlantModel<Lanes> model = on_lanes(setup.model);
+  const Dynamics<Lanes> chain(model);
+  if (chain.cart_can_stick()) {
+    StickSlipPeriod<Present> period(setup, model, present);
+    run_sampled(setup, chain, period, cases, results);
+  } else {
+    SmoothPeriod<Present> period(setup, model, present);
+    run_sampled(setup, chain, period, cases, results);
+  }
+}
+
+}  // namespace
+
+bool lanes_can_run(const LoopSetup& setup) {
+  if (setup.make_parts || setup.model.cart_locked || !setup.model.has_pendulum) return false;
+  const Dynamics<Lanes> physics(on_lanes(setup.model));
+  if (physics.has_motor_lag() || physics.pivot_has_kink()) return false;
+  if (setup.sampled && any(physics.input_delay_s() > Lanes(0.0))) return false;
+  // Faster plants than that need steps that the lanes do not take.
+  constexpr double fastest_radps = 1e3;
+  return fastest_rate_radps(setup.model) < fastest_radps;
+}
+
+void run_on_lanes(const LoopSetup& setup, std::span<const LoopCase> cases, std::span<LoopResult> results) {
+  if (!setup.sampled) return run_continuous_on_lanes(setup, cases, results);
+  with_effects(setup.model.present, [&](const auto& present) {
+    for (std::size_t first = 0; first < cases.size(); first += lane_count) {
+      const std::size_t count = std::min(lane_count, cases.size() - first);
+      run_with(setup, present, cases.subspan(first, count), results.subspan(first, count));
+    }
+  });
+}
+
+}  // namespace upright

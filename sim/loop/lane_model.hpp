@@ -1,0 +1,78 @@
+// What the engines on SIMD lanes share: a plant's model on lanes, the sets of effects that are compiled in,
+// and which way a resting cart breaks away.
+#pragma once
+
+#include "lanes.hpp"
+#include "upright/model/dynamics.hpp"
+
+namespace upright {
+
+inline PlantModel<Lanes> on_lanes(const PlantModel<double>& model) {
+  PlantModel<Lanes> lanes;
+  lanes.base = {model.base.cart_mass_kg,      model.base.pendulum_mass_kg,
+                model.base.length_to_com_m,   model.base.inertia_about_pivot_kgm2,
+                model.base.gravity_mps2,      model.base.force_per_volt_n,
+                model.base.back_emf_n_per_mps};
+  lanes.has_pendulum = model.has_pendulum;
+  lanes.cart_locked = model.cart_locked;
+  lanes.present = model.present;
+  lanes.smoothing = model.smoothing;
+  for (std::size_t i = 0; i < all_parameter_count; ++i) lanes.parameters[i] = model.parameters[i];
+  return lanes;
+}
+
+/// The effects that the derivative knows of: not those of the actuator, the sensors and the base parameters,
+/// which act once per period or at the beginning.
+inline std::uint64_t moving_effects(const EffectSet& present) {
+  std::uint64_t mask = 0;
+  for (std::size_t i = 0; i < effect_count; ++i)
+    if (present.has(i) &&
+        (effect_registry()[i].enters == Enters::cart || effect_registry()[i].enters == Enters::pendulum))
+      mask |= std::uint64_t{1} << i;
+  return mask;
+}
+
+template <class E>
+constexpr std::uint64_t bit_of = std::uint64_t{1} << effect_index<E>();
+constexpr std::uint64_t viscous_set = bit_of<effects::ViscousFriction>;
+constexpr std::uint64_t coulomb_set = viscous_set | bit_of<effects::CoulombFriction>;
+constexpr std::uint64_t exponential_set = coulomb_set | bit_of<effects::StribeckFriction>;
+constexpr std::uint64_t dynamic_set = exponential_set | bit_of<effects::BristleFriction>;
+
+/// Calls `run` with the plant's effects: the common sets compiled in, any other looked up as it goes.
+template <class Run>
+void with_effects(const EffectSet& present, const Run& run) {
+  switch (moving_effects(present)) {
+    case viscous_set:
+      return run(StaticEffectSet<viscous_set>{});
+    case coulomb_set:
+      return run(StaticEffectSet<coulomb_set>{});
+    case exponential_set:
+      return run(StaticEffectSet<exponential_set>{});
+    case dynamic_set:
+      return run(StaticEffectSet<dynamic_set>{});
+    default:
+      return run(present);
+  }
+}
+
+/// By how much the load on a resting cart exceeds what friction holds, forward and backward [N].
+struct Excess {
+  Lanes forward, backward;
+};
+
+template <class Present>
+Excess excess_load(const Dynamics<Lanes, Present>& physics, const PlantState<Lanes>& state,
+                   const Lanes& motor_v) {
+  const Lanes load = physics.cart_load(state, motor_v, Contact::slip_forward);
+  return {load - physics.cart_dry_level(state.cart_m, Lanes(0.0), Lanes(1.0)),
+          -load - physics.cart_dry_level(state.cart_m, Lanes(0.0), Lanes(-1.0))};
+}
+
+/// Which way the load moves a resting cart; 0: friction holds it.
+inline Lanes direction_of(const Excess& excess) {
+  return select(excess.forward > Lanes(0.0), Lanes(1.0),
+                select(excess.backward > Lanes(0.0), Lanes(-1.0), Lanes(0.0)));
+}
+
+}  // namespace upright

@@ -1,0 +1,84 @@
+// What runs side by side have shown so far, lane by lane.
+#pragma once
+
+#include <span>
+
+#include "lanes.hpp"
+#include "upright/model/dynamics.hpp"
+#include "upright/sim/loop/loop_run.hpp"
+
+namespace upright {
+
+class LaneResults {
+ public:
+  LaneResults(const LoopSetup& setup, std::size_t used)
+      : fell_above_rad_(setup.fell_above_rad),
+        window_begin_s_(setup.window_begin_s()),
+        alive_((1u << used) - 1u) {
+    fall_time_s_.fill(std::numeric_limits<double>::quiet_NaN());
+  }
+
+  /// Takes the motion at a time. Lanes that fell are put to rest upright, where they stay out of the way.
+  void take(double time_s, PlantState<Lanes>& state) {
+    if (any(!(absolute(state.theta_rad) < Lanes(fell_above_rad_)))) drop_fallen(time_s, state);
+    previous_theta_ = state.theta_rad;
+    previous_s_ = time_s;
+    cart_most_ = larger(cart_most_, absolute(state.cart_m));
+    if (time_s < window_begin_s_) return;
+    theta_low_ = smaller(theta_low_, state.theta_rad);
+    theta_high_ = larger(theta_high_, state.theta_rad);
+    cart_low_ = smaller(cart_low_, state.cart_m);
+    cart_high_ = larger(cart_high_, state.cart_m);
+  }
+
+  bool all_fell() const { return alive_ == 0; }
+  bool alive(std::size_t lane) const { return (alive_ >> lane & 1u) != 0; }
+
+  void finish(const PlantState<Lanes>& state, std::span<LoopResult> results) const {
+    const auto theta = (theta_high_ - theta_low_).values(), cart = (cart_high_ - cart_low_).values();
+    const auto x = state.cart_m.values(), th = state.theta_rad.values(), v = state.cart_mps.values(),
+               w = state.theta_radps.values(), u = state.motor_v.values(), z = state.bristle_m.values();
+    for (std::size_t i = 0; i < results.size(); ++i) {
+      LoopResult& result = results[i];
+      result.fall_time_s = fall_time_s_[i];
+      result.theta_amplitude_rad = result.fell() ? fell_above_rad_ : 0.5 * theta[i];
+      result.cart_amplitude_m = result.fell() ? fallen_cart_m_[i] : 0.5 * cart[i];
+      result.end = result.fell() ? fallen_[i] : PlantState<double>{x[i], th[i], v[i], w[i], u[i], z[i]};
+    }
+  }
+
+ private:
+  void drop_fallen(double time_s, PlantState<Lanes>& state) {
+    auto x = state.cart_m.values(), th = state.theta_rad.values(), v = state.cart_mps.values(),
+         w = state.theta_radps.values(), z = state.bristle_m.values();
+    const auto before = previous_theta_.values(), cart_most = cart_most_.values();
+    for (std::size_t i = 0; i < lane_count; ++i) {
+      if (std::abs(th[i]) < fell_above_rad_) continue;
+      if (alive(i)) {
+        alive_ &= ~(1u << i);
+        const double rise = std::abs(th[i]) - std::abs(before[i]);
+        const double part = rise > 0.0 ? (fell_above_rad_ - std::abs(before[i])) / rise : 1.0;
+        fall_time_s_[i] = previous_s_ + std::clamp(part, 0.0, 1.0) * (time_s - previous_s_);
+        fallen_cart_m_[i] = std::max(cart_most[i], std::abs(x[i]));
+        fallen_[i] = {x[i], th[i], v[i], w[i], 0.0, z[i]};
+      }
+      x[i] = th[i] = v[i] = w[i] = z[i] = 0.0;
+    }
+    state.cart_m = Lanes::load(x.data());
+    state.theta_rad = Lanes::load(th.data());
+    state.cart_mps = Lanes::load(v.data());
+    state.theta_radps = Lanes::load(w.data());
+    state.bristle_m = Lanes::load(z.data());
+  }
+
+  static constexpr double infinite = std::numeric_limits<double>::infinity();
+  double fell_above_rad_, window_begin_s_;
+  std::uint32_t alive_;
+  std::array<double, lane_count> fall_time_s_, fallen_cart_m_{};
+  std::array<PlantState<double>, lane_count> fallen_{};
+  Lanes previous_theta_, cart_most_;
+  Lanes theta_low_{infinite}, theta_high_{-infinite}, cart_low_{infinite}, cart_high_{-infinite};
+  double previous_s_ = 0.0;
+};
+
+}  // namespace upright

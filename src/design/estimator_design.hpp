@@ -1,0 +1,55 @@
+// A gain file with a Kalman filter, stationary or extended: gains for the sliding plant, since the estimated
+// force takes the friction away, and a filter that bears an actuator slower than its model.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+
+#include "gain_design.hpp"
+#include "parameter_trials.hpp"
+#include "upright/control/gain_file.hpp"
+
+namespace upright {
+
+/// What `--estimator` designs with where `--q` and `--r` do not say otherwise. Half the weight on the
+/// position and a third on the angle of the paper's: lower gains bear a slower actuator, and the estimated
+/// force, not the gain, keeps the cart in its place.
+inline constexpr DesignWeights quiet_weights{{2500.0, 1000.0, 20.0, 20.0}, 1.0};
+
+/// What the loop must bear of an actuator slower than its model [s], sampled and sliding: about what a servo
+/// amplifier and its link add.
+inline constexpr double slow_actuator_s = 0.005;
+
+/// By how much the parameters may be off without the loop becoming unstable, where nobody says: what a
+/// careful identification leaves.
+inline constexpr double parameter_uncertainty = 0.05;
+
+struct EstimatorRequest {
+  StateEstimatorKind kind = StateEstimatorKind::kalman;
+  std::filesystem::path plant_file;
+  DesignWeights weights = quiet_weights;
+  double smoothing = 100.0;
+  double rate_hz = 1000.0;
+  std::optional<double> delay_s;  ///< of the loop: with a predictor
+  double uncertainty = parameter_uncertainty;
+};
+
+struct EstimatorDesign {
+  SampledDesign gains;
+  ControlConfig config;
+  double bears_delay_s = 0.0;       ///< in the delay line, sampled and sliding
+  double bears_unmodelled_s = 0.0;  ///< in the actuator, on top of the gain file's
+  /// Runs on the plant with its friction; none with a predictor, whose horizon is judged by its margin.
+  std::optional<ParameterTrials> trials;
+};
+
+/// Throws ConfigError when no force noise makes a loop that holds the plant, or when it does not hold with
+/// the parameters off by the uncertainty; names the parameter that it is sensitive to.
+EstimatorDesign design_with_estimator(const Plant& plant, const EstimatorRequest& request);
+
+/// Name and share of the first of the base parameters which, off by `uncertainty` one way or the other, makes
+/// the sliding loop unstable while the estimator keeps its model; empty where none does.
+std::string parameter_not_borne(const Plant& plant, const ControlConfig& config, double uncertainty);
+
+}  // namespace upright

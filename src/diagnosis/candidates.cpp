@@ -1,0 +1,304 @@
+#include "candidates.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+
+namespace upright {
+
+namespace {
+
+/// Standard deviation of what is believed of a number in a plant file, relative to its value: data sheets and
+/// scales are a few percent off; friction measured on another day is more.
+constexpr double base_belief = 0.05;
+constexpr double friction_belief = 0.10;
+/// A scale may be wrong, but not by any amount.
+constexpr double scale_belief = 0.25;
+/// How well a pendulum at rest shows where down is.
+constexpr double rest_belief_rad = 1e-3;
+
+bool is_named(std::size_t effect, std::string_view kind) {
+  return effect_registry()[effect].kind == kind;
+}
+
+/// Of the forces at work in these runs, whatever the size of the rig: a few percent of the motor's.
+double order_of_magnitude(const ParameterInfo& info, const DataRange& range) {
+  const double force = 0.03 * range.largest_force_n;
+  if (info.unit == "N") return std::max(info.typical, force);
+  if (info.unit == "N/(m/s)" && range.largest_speed_mps > 0.0)
+    return std::max(info.typical, force / range.largest_speed_mps);
+  return info.typical;
+}
+
+FreeParameter free_parameter(std::size_t effect, std::size_t index, const DataRange& range) {
+  const ParameterInfo& info = effect_registry()[effect].parameters[index];
+  FreeParameter p;
+  p.effect = effect;
+  p.index = index;
+  p.low = info.range.low;
+  p.high = info.range.high;
+  p.scale = order_of_magnitude(info, range);
+  if (p.scale == 0.0) p.scale = 0.1;
+  if (info.range.low_open && info.range.low == 0.0) p.low = 1e-3 * p.scale;
+  return p;
+}
+
+/// A force along the track counts as one that repeats when the run passes three of its crests.
+double longest_pitch_m(const DataRange& range) {
+  return std::max(0.002, (range.cart_high_m - range.cart_low_m) / 3.0);
+}
+
+}  // namespace
+
+DataRange range_of(const std::vector<Measurement>& runs, const Plant& plant) {
+  DataRange range;
+  bool first = true;
+  double sum = 0.0, count = 0.0;
+  range.shortest_period_s = 1.0;
+  for (const Measurement& run : runs) {
+    range.theta_measured = range.theta_measured || run.has_theta();
+    range.theta_resolution_rad = std::max(range.theta_resolution_rad, run.theta_resolution_rad);
+    range.shortest_period_s = std::min(range.shortest_period_s, run.median_period_s());
+    for (const double v : run.voltage_v)
+      range.largest_voltage_v = std::max(range.largest_voltage_v, std::abs(v));
+    if (!run.has_cart()) continue;
+    range.cart_moves = true;
+    for (const double x : run.cart_m) {
+      range.cart_low_m = first ? x : std::min(range.cart_low_m, x);
+      range.cart_high_m = first ? x : std::max(range.cart_high_m, x);
+      first = false;
+      sum += x;
+      count += 1.0;
+    }
+    const std::size_t stride =
+        std::max<std::size_t>(1, static_cast<std::size_t>(0.02 / run.median_period_s()));
+    for (std::size_t k = stride; k < run.size(); k += stride)
+      range.largest_speed_mps =
+          std::max(range.largest_speed_mps, std::abs(run.cart_m[k] - run.cart_m[k - stride]) /
+                                                (run.time_s[k] - run.time_s[k - stride]));
+  }
+  range.cart_mean_m = count > 0.0 ? sum / count : 0.0;
+  range.largest_force_n = plant.motor.force_per_volt_n * range.largest_voltage_v;
+  return range;
+}
+
+bool moves_enough(const std::vector<Measurement>& runs) {
+  constexpr double least_steps = 30.0;
+  const auto range = [](const std::vector<double>& values) {
+    const auto [low, high] = std::minmax_element(values.begin(), values.end());
+    return values.empty() ? 0.0 : *high - *low;
+  };
+  return std::any_of(runs.begin(), runs.end(), [&](const Measurement& run) {
+    return range(run.cart_m) > least_steps * std::sqrt(12.0) * run.cart_noise_m() ||
+           range(run.theta_rad) > least_steps * std::sqrt(12.0) * run.theta_noise_rad();
+  });
+}
+
+std::vector<FreeParameter> free_parameters(std::size_t effect, const DataRange& range) {
+  const EffectInfo& info = effect_registry()[effect];
+  std::vector<FreeParameter> free;
+  for (std::size_t i = 0; i < info.parameters.size(); ++i) {
+    FreeParameter p = free_parameter(effect, i, range);
+    const std::string_view name = info.parameters[i].name;
+    if (info.enters == Enters::cart && info.dry && info.parameters[i].unit == "N" &&
+        range.largest_force_n > 0.0) {
+      // Dry friction that the motor cannot overcome would hold the cart for good.
+      constexpr double beyond_motor = 2.0;
+      p.high = std::min(p.high, beyond_motor * range.largest_force_n);
+    }
+    if (name == "shape") {
+      p.prior_mean = 2.0;
+      p.prior_sigma = 0.5;
+      p.low = 0.5;
+      p.high = 4.0;
+    } else if (is_named(effect, "stribeck_friction") && name == "velocity_mps") {
+      p.low = 1e-3;
+      p.high = std::max(0.02, 0.5 * range.largest_speed_mps);
+    } else if (name == "pitch_m") {
+      p.low = 5e-4;
+      p.high = longest_pitch_m(range);
+    } else if (name == "center_m") {
+      p.prior_mean = range.cart_mean_m;
+      p.prior_sigma = 0.5;
+    } else if (name == "stiffness_n_per_m" && is_named(effect, "bristle_friction")) {
+      p.low = 5.0;
+      p.high = 3e4;
+    } else if (is_named(effect, "input_delay")) {
+      p.high = 0.2;
+    } else if (is_named(effect, "motor_lag")) {
+      p.low = 0.2 * range.shortest_period_s;  // a lag well below the sample period does not show
+      p.high = 0.5;
+    } else if (name == "scale") {
+      p.low = 0.3;
+      p.high = 3.0;
+      p.scale = 0.1;
+      p.prior_mean = 1.0;
+      p.prior_sigma = scale_belief;
+    }
+    free.push_back(p);
+  }
+  return free;
+}
+
+bool is_plainer(std::size_t a, std::size_t b) {
+  const auto one_force = [](std::size_t effect) {
+    const std::array<std::string_view, 3> names = {"constant_force", "friction_asymmetry", "voltage_offset"};
+    return std::find(names.begin(), names.end(), effect_registry()[effect].kind) - names.begin();
+  };
+  const std::size_t parameters_a = effect_registry()[a].parameters.size();
+  const std::size_t parameters_b = effect_registry()[b].parameters.size();
+  if (parameters_a != parameters_b) return parameters_a < parameters_b;
+  if (one_force(a) < 3 && one_force(b) < 3) return one_force(a) < one_force(b);
+  return a < b;
+}
+
+std::vector<FreeParameter> believed_parameters(const Plant& plant, std::size_t effect,
+                                               const DataRange& range) {
+  const EffectInfo& info = effect_registry()[effect];
+  const PlantEffect* have = plant.find(effect);
+  std::vector<FreeParameter> free;
+  for (std::size_t i = 0; i < info.parameters.size(); ++i) {
+    FreeParameter p = free_parameter(effect, i, range);
+    p.prior_mean = have != nullptr ? have->values[i] : info.parameters[i].neutral;
+    const double belief = info.enters == Enters::parameter ? base_belief : friction_belief;
+    p.prior_sigma = belief * std::max(std::abs(p.prior_mean), 0.2 * info.parameters[i].typical);
+    p.scale = std::max(std::abs(p.prior_mean), 0.2 * info.parameters[i].typical);
+    if (is_named(effect, "angle_offset") && have == nullptr) {
+      // An incremental encoder knows its zero to a count, and friction lets a pendulum rest a little off.
+      p.prior_sigma = std::max(range.theta_resolution_rad, rest_belief_rad);
+      p.scale = p.prior_sigma;
+    }
+    if (info.enters == Enters::parameter) {
+      p.low = 0.3;
+      p.high = 3.0;
+      p.scale = 0.1;
+    }
+    free.push_back(p);
+  }
+  return free;
+}
+
+std::vector<std::size_t> base_corrections(const Plant& plant, const DataRange& range) {
+  std::vector<std::size_t> effects;
+  for (std::size_t i = 0; i < effect_count; ++i) {
+    const EffectInfo& info = effect_registry()[i];
+    if (info.enters != Enters::parameter || plant.find(i) != nullptr) continue;
+    const bool of_pendulum = info.kind.starts_with("pendulum_");
+    if (of_pendulum && !plant.pendulum) continue;
+    if (of_pendulum && !range.theta_measured && !range.cart_moves) continue;
+    // With the cart held, the mass of the pendulum divides out of its motion but for friction in the pivot,
+    // which is known no better than the mass.
+    const bool needs_cart = !of_pendulum;
+    if (needs_cart && !range.cart_moves) continue;
+    effects.push_back(i);
+  }
+  const std::size_t zero = effect_number("angle_offset");
+  if (plant.pendulum && range.theta_measured && plant.find(zero) == nullptr) effects.push_back(zero);
+  return effects;
+}
+
+std::vector<std::size_t> candidate_effects(const Plant& plant, const DataRange& range) {
+  std::vector<std::size_t> effects;
+  for (std::size_t i = 0; i < effect_count; ++i) {
+    const EffectInfo& info = effect_registry()[i];
+    if (plant.find(i) != nullptr || info.enters == Enters::parameter) continue;
+    const bool angle = info.kind.starts_with("angle_");
+    if ((info.enters == Enters::pendulum || angle) && !plant.pendulum) continue;
+    if ((info.enters == Enters::pendulum || angle) && !range.theta_measured) continue;
+    const bool of_motor = info.enters == Enters::actuator || info.kind == "drive_compliance";
+    if ((info.enters == Enters::cart || info.kind == "cart_scale") && !range.cart_moves) continue;
+    if (of_motor && (!range.cart_moves || range.largest_voltage_v == 0.0)) continue;
+    Plant with = plant;
+    std::vector<double> typical;
+    for (const ParameterInfo& parameter : info.parameters) typical.push_back(parameter.typical);
+    with.set(i, typical);
+    if (fault_of(with).empty()) effects.push_back(i);
+  }
+  return effects;
+}
+
+namespace {
+
+/// As many as 5 m of track need down to a pitch of 1 mm. Over a longer one (or in another unit) the shortest
+/// pitches are not looked for: the time that would take grows with the travel without end.
+constexpr double most_frequencies = 20000.0;
+
+/// Pitches at which a sine over the track explains most of the residual force: a periodogram over x.
+std::vector<std::vector<double>> cogging_starts(const std::vector<std::pair<double, double>>& force_residual,
+                                                const DataRange& range) {
+  std::vector<std::pair<double, std::vector<double>>> found;
+  const double travel = range.cart_high_m - range.cart_low_m;
+  if (force_residual.size() < 50 || travel <= 0.0) return {{0.3, 0.02, 0.0}};
+  const double largest = longest_pitch_m(range);
+  // Frequencies over the track one half-cycle apart, so that no crest is missed.
+  const double spacing = 0.25 / travel;
+  const double smallest = std::max(0.001, 1.0 / (1.0 / largest + most_frequencies * spacing));
+  for (double f = 1.0 / largest; f <= 1.0 / smallest; f += spacing) {
+    double ss = 0.0, sc = 0.0, cc = 0.0, sy = 0.0, cy = 0.0, s1 = 0.0, c1 = 0.0, y1 = 0.0;
+    for (const auto& [x, y] : force_residual) {
+      const double s = std::sin(2.0 * std::numbers::pi * f * x), c = std::cos(2.0 * std::numbers::pi * f * x);
+      ss += s * s;
+      sc += s * c;
+      cc += c * c;
+      sy += s * y;
+      cy += c * y;
+      s1 += s;
+      c1 += c;
+      y1 += y;
+    }
+    const double n = static_cast<double>(force_residual.size());
+    ss -= s1 * s1 / n;
+    sc -= s1 * c1 / n;
+    cc -= c1 * c1 / n;
+    sy -= s1 * y1 / n;
+    cy -= c1 * y1 / n;
+    const double det = ss * cc - sc * sc;
+    if (det < 1e-6 * n * n * 0.01) continue;
+    const double a = (cc * sy - sc * cy) / det, b = (ss * cy - sc * sy) / det;
+    found.push_back({a * sy + b * cy, {std::hypot(a, b), 1.0 / f, std::atan2(b, a)}});
+  }
+  std::sort(found.begin(), found.end(), [](const auto& l, const auto& r) { return l.first > r.first; });
+  std::vector<std::vector<double>> starts;
+  for (const auto& candidate : found) {
+    const std::vector<double>& start = candidate.second;
+    const bool near = std::any_of(starts.begin(), starts.end(), [&](const auto& s) {
+      return std::abs(1.0 / s[1] - 1.0 / start[1]) < 4.0 * spacing;
+    });
+    if (!near) starts.push_back(start);
+    if (starts.size() == 2) break;
+  }
+  return starts.empty() ? std::vector<std::vector<double>>{{0.3, 0.02, 0.0}} : starts;
+}
+
+}  // namespace
+
+std::vector<std::vector<double>> search_starts(std::size_t effect, const DataRange& range,
+                                               const std::vector<std::pair<double, double>>& force_residual) {
+  const EffectInfo& info = effect_registry()[effect];
+  const double speed = range.largest_speed_mps, volts = range.largest_voltage_v;
+  if (is_named(effect, "cogging_force")) return cogging_starts(force_residual, range);
+  if (is_named(effect, "voltage_saturation"))
+    return {{0.9 * volts}, {0.7 * volts}, {0.5 * volts}, {0.3 * volts}};
+  if (is_named(effect, "voltage_dead_zone")) return {{0.1}, {0.4}};
+  if (is_named(effect, "stribeck_friction"))
+    return {{0.2, std::max(0.005, std::min(0.1, 0.2 * speed)), 2.0},
+            {0.2, std::max(0.003, 0.03 * speed), 2.0}};
+  if (is_named(effect, "cable_spring")) return {{0.5, range.cart_mean_m}};
+  if (is_named(effect, "bristle_friction")) return {{120.0, 20.0}, {2000.0, 20.0}};
+  if (is_named(effect, "input_delay")) return {{0.5 * range.shortest_period_s}, {0.01}};
+  if (is_named(effect, "motor_lag")) return {{std::max(0.001, 0.5 * range.shortest_period_s)}, {0.01}};
+  if (info.enters == Enters::sensor) return {{info.parameters[0].neutral}};
+  std::vector<double> start;
+  for (const ParameterInfo& parameter : info.parameters)
+    start.push_back(std::isfinite(parameter.neutral)
+                        ? (parameter.neutral == 1.0 ? 1.0 : 0.1 * order_of_magnitude(parameter, range))
+                        : parameter.typical);
+  if (info.parameters.size() > 1 || !(info.parameters[0].range.low < 0.0)) return {start};
+  // A dry level is not below zero: where no other friction is known, nothing grows from nothing.
+  if (info.dry) return {{start[0]}, {-start[0]}};
+  // Other effects of either sign start at nothing, so that the sign is the data's.
+  return {{0.0}};
+}
+
+}  // namespace upright

@@ -1,0 +1,53 @@
+// The bank of candidate effects: every effect of the registry that the plant and the data can have, with what
+// is believed of its parameters beforehand and where a search for them starts.
+#pragma once
+
+#include <vector>
+
+#include "upright/estimation/fit.hpp"
+
+namespace upright {
+
+/// What the runs can show at all: decides which effects are candidates and where searches start.
+struct DataRange {
+  bool cart_moves = false;  ///< some run has a free cart that is measured
+  bool theta_measured = false;
+  double largest_voltage_v = 0.0;
+  double largest_force_n = 0.0;  ///< of the motor at that voltage
+  double largest_speed_mps = 0.0;
+  double cart_low_m = 0.0, cart_high_m = 0.0;
+  double cart_mean_m = 0.0;
+  double shortest_period_s = 0.0;
+  double theta_resolution_rad = 0.0;
+};
+
+DataRange range_of(const std::vector<Measurement>& runs, const Plant& plant);
+
+/// Whether anything moved far enough to show an effect: well beyond the sensors' steps.
+bool moves_enough(const std::vector<Measurement>& runs);
+
+/// The parameters of an effect as free ones.
+std::vector<FreeParameter> free_parameters(std::size_t effect, const DataRange& range);
+
+/// A correction of something the plant file already says, with the belief that it is a few percent off at
+/// most.
+std::vector<FreeParameter> believed_parameters(const Plant& plant, std::size_t effect,
+                                               const DataRange& range);
+
+/// Corrections that every fit leaves room for: the base parameters (cart_mass, ...) that these data can show,
+/// and the zero of the angle within a count.
+std::vector<std::size_t> base_corrections(const Plant& plant, const DataRange& range);
+
+/// Effects that could be added to the plant, in the registry's order: those it does not have.
+std::vector<std::size_t> candidate_effects(const Plant& plant, const DataRange& range);
+
+/// Whether `a` is the plainer of two effects that explain the same: fewer parameters; of the names of one and
+/// the same force (interface.md, Semantics) the one that supposes least; else the one registered first.
+bool is_plainer(std::size_t a, std::size_t b);
+
+/// Parameter values from which to search for an effect; several where the misfit has several valleys.
+/// `force_residual` pairs of (x, residual force) point at the pitch of periodic forces.
+std::vector<std::vector<double>> search_starts(std::size_t effect, const DataRange& range,
+                                               const std::vector<std::pair<double, double>>& force_residual);
+
+}  // namespace upright

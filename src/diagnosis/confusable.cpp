@@ -1,0 +1,87 @@
+#include "confusable.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace upright {
+
+namespace {
+
+/// An effect that is fewer standard errors than this from nothing, once another is left open, may be that
+/// other: as much as evidence of 16.
+constexpr double least_distance = 4.0;
+/// And the other must be what takes the certainty away.
+constexpr double least_loss = 0.5;
+
+/// Place of the size of an effect among the free parameters; -1 where it has none.
+Eigen::Index size_place(const Hypothesis& h, std::size_t effect) {
+  for (std::size_t j = 0; j < h.free.size(); ++j)
+    if (h.free[j].effect == effect && h.free[j].index == 0) return static_cast<Eigen::Index>(j);
+  return -1;
+}
+
+double value_of(const Hypothesis& h, Eigen::Index place) {
+  const FreeParameter& p = h.free[static_cast<std::size_t>(place)];
+  return h.train.point.plant.find(p.effect)->values[p.index];
+}
+
+/// What the size of an effect is when there is nothing to find.
+double nothing_of(const Hypothesis& h, Eigen::Index place) {
+  const FreeParameter& p = h.free[static_cast<std::size_t>(place)];
+  return p.prior_sigma > 0.0 ? p.prior_mean : effect_registry()[p.effect].parameters[p.index].neutral;
+}
+
+double distance(const Hypothesis& h, Eigen::Index place) {
+  const double off = std::abs(value_of(h, place) - nothing_of(h, place));
+  const double sigma = std::sqrt(std::max(h.train.covariance(place, place), 0.0));
+  return sigma > 0.0 ? off / sigma : std::numeric_limits<double>::infinity();
+}
+
+/// The plant when the data are explained without the effect at `place`: the others follow as far as they go
+/// together with it.
+Plant without(const Hypothesis& h, Eigen::Index place) {
+  Plant plant = h.train.point.plant;
+  const double moved = nothing_of(h, place) - value_of(h, place);
+  const double variance = h.train.covariance(place, place);
+  for (std::size_t j = 0; j < h.free.size(); ++j) {
+    const FreeParameter& p = h.free[j];
+    const ParameterInfo& info = effect_registry()[p.effect].parameters[p.index];
+    auto values = plant.find(p.effect)->values;
+    const double share = h.train.covariance(static_cast<Eigen::Index>(j), place) / variance;
+    values[p.index] = std::clamp(values[p.index] + moved * share, info.range.low, info.range.high);
+    plant.set(p.effect, values);
+  }
+  return plant;
+}
+
+bool is_proportional(std::size_t effect) {
+  const EffectInfo& info = effect_registry()[effect];
+  const bool repeats = info.kind == "cogging_force";  // its pitch would have to be known
+  return std::isfinite(info.parameters[0].neutral) && !repeats;
+}
+
+}  // namespace
+
+std::vector<Rival> linear_rivals(const Search& search, const Hypothesis& h,
+                                 const std::vector<std::size_t>& listed) {
+  std::vector<Rival> rivals;
+  std::vector<std::size_t> others = candidate_effects(h.train.point.plant, search.range());
+  others.insert(others.end(), search.nuisances().begin(), search.nuisances().end());
+  for (const std::size_t other : others) {
+    if (!is_proportional(other)) continue;
+    if (std::find(listed.begin(), listed.end(), other) != listed.end()) continue;
+    const Hypothesis open = search.opened(h, other);
+    if (!open.valid) continue;
+    for (const std::size_t effect : listed) {
+      const Eigen::Index before = size_place(h, effect), after = size_place(open, effect);
+      if (before < 0 || after < 0 || !std::isfinite(nothing_of(h, before))) continue;
+      const double doubt = distance(open, after);
+      if (doubt < least_distance && doubt < least_loss * distance(h, before))
+        rivals.push_back({effect, other, without(open, after)});
+    }
+  }
+  return rivals;
+}
+
+}  // namespace upright

@@ -1,0 +1,551 @@
+#include "upright/diagnosis/diagnosis.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <sstream>
+#include <tuple>
+
+#include "adequacy.hpp"
+#include "base/parallel.hpp"
+#include "confusable.hpp"
+#include "estimation/held_out.hpp"
+#include "growth.hpp"
+#include "next_experiment.hpp"
+#include "residual.hpp"
+#include "search.hpp"
+#include "upright/base/error.hpp"
+
+namespace upright {
+
+namespace {
+
+constexpr double infinity = std::numeric_limits<double>::infinity();
+
+/// However much it scatters, by this at most.
+constexpr double most_scattered = 10.0 * confusable_evidence;
+/// A correction of the plant file is there when it is this many standard errors from nothing.
+constexpr double least_correction_z = 4.0;
+
+class Diagnostician {
+ public:
+  Diagnostician(const Plant& plant, const std::vector<Measurement>& runs, const DiagnosisOptions& options,
+                HeldOut which)
+      : plant_(plant),
+        runs_(runs),
+        options_(options),
+        data_(checked(split(runs, which))),
+        work_samples_(options.search_bound * samples_of(data_)),
+        bound_(work_samples_),
+        search_(plant_, runs_, bounded(data_.train), bounded(data_.held)),
+        growth_(search_, options, result_) {}
+
+  Diagnosis run() {
+    try {
+      growth_.begin();
+      growth_.find();
+      ResidualStructure left = settle();
+      if (left.structured && growth_.begin_anew()) left = settle();
+      if (left.structured && growth_.find_pairs_of_all()) left = settle();
+      if (left.beyond_sensors && growth_.find_thoroughly(left.structured)) left = settle();
+      conclude(left);
+    } catch (const Interrupted&) {
+      result_.interrupted = true;
+    } catch (const BoundReached&) {
+      examine_what_was_found();
+    }
+    if (!decided_) report_so_far();
+    return std::move(result_);
+  }
+  /// Whether an effect was found that the plant file lacks, not only numbers of it that are off.
+  bool found_what_was_lacking() const {
+    return std::any_of(growth_.found().begin(), growth_.found().end(),
+                       [&](std::size_t effect) { return !search_.is_nuisance(effect); });
+  }
+  /// Of what is unexplained: whether held-out runs excite what is missing still, and the others do not. They
+  /// alone show it, or spoke to the end against what the others show beyond doubt.
+  bool lacks_what_was_held_out() const {
+    return growth_.contradicted() || !examine_fit(data_.train, final_.train.point).structured;
+  }
+
+ private:
+  static DataSplit checked(DataSplit data) {
+    if (data.train.segments.empty())
+      throw ConfigError("no stretch of the data is long enough to simulate: record longer runs");
+    return data;
+  }
+
+  const FitData& bounded(FitData& data) {
+    data.bound = &bound_;
+    return data;
+  }
+
+  static double samples_of(const DataSplit& data) {
+    double samples = 0.0;
+    for (const FitData* part : {&data.train, &data.held})
+      for (const Segment& s : part->segments) samples += static_cast<double>(s.last - s.first + 1);
+    return samples;
+  }
+
+  /// After the bound ended the search: what it found is examined as if it had ended by itself, within a bound
+  /// of its own.
+  void examine_what_was_found() {
+    result_.bound_reached = true;
+    if (decided_) return;
+    constexpr double share = 0.25;  // of the search's bound: examining takes about a tenth of a usual search
+    bound_.grant(share * work_samples_);
+    try {
+      conclude(settle());
+    } catch (const Interrupted&) {
+      result_.interrupted = true;
+    } catch (const BoundReached&) {
+      // What is known until here is reported.
+    }
+  }
+
+  /// What a search that was given up has found, unexamined: nothing is claimed of it.
+  void report_so_far() {
+    constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
+    const Hypothesis& h = growth_.current();
+    const auto known_gap = [&](const Hypothesis& of) { return of.simulation ? of.simulation->gap : unknown; };
+    note_runs();
+    result_.examined = false;
+    for (const std::size_t effect : growth_.found()) {
+      FoundEffect found;
+      found.effect = effect;
+      found.gap_before = found.gap_after = unknown;
+      found.parameters = estimates_of(effect, h);
+      found.where = growth_.where(effect);
+      result_.effects.push_back(found);
+    }
+    for (CandidateScore& candidate : result_.candidates) candidate.gap_after = unknown;
+    result_.gap_before = known_gap(growth_.given());
+    result_.gap_after = known_gap(h);
+    result_.noise = h.train.point.noise;
+    result_.model = growth_.found().empty() ? plant_ : model_with(growth_.found(), h.train.point.plant);
+    result_.residual = "not examined: the search was not finished";
+    result_.verdict = moves_enough(runs_) ? Verdict::unexplained : Verdict::not_excited;
+  }
+
+  /// Begins the account of what was found.
+  void note_runs() {
+    result_.notes.clear();
+    result_.effects.clear();
+    for (const Measurement& run : runs_)
+      result_.notes.insert(result_.notes.end(), run.notes.begin(), run.notes.end());
+    if (runs_.size() == 1) result_.notes.push_back("one run only: a third of its segments is held out");
+    result_.held_out_runs = data_.held_out_runs;
+  }
+
+  /// Settles the corrections, and looks at what is left.
+  ResidualStructure settle() {
+    settle_corrections();
+    options_.tell(0.92, "measuring the gap");
+    FitData all = data_.train;
+    all.segments.insert(all.segments.end(), data_.held.segments.begin(), data_.held.segments.end());
+    // At what all runs say, so that what few training runs left uncertain is not taken for something missing.
+    ResidualStructure left = examine_fit(all, known_.train.point);
+    if (!left.structured) compare_held_out(search_, final_, left);
+    if (!left.structured) doubt_what_cannot_be(left);
+    return left;
+  }
+
+  /// Which of the corrections that every fit was left room for are really there: the least certain is set
+  /// back to what the plant file says, the others follow (a Gaussian approximation of the likelihood), until
+  /// all that are left are certain.
+  void settle_corrections() {
+    const Hypothesis& h = growth_.current();
+    std::vector<std::size_t> open;
+    for (std::size_t j = 0; j < h.free.size(); ++j) open.push_back(j);
+    Eigen::VectorXd value(static_cast<Eigen::Index>(h.free.size()));
+    for (std::size_t j = 0; j < h.free.size(); ++j)
+      value[static_cast<Eigen::Index>(j)] =
+          h.train.point.plant.find(h.free[j].effect)->values[h.free[j].index];
+    Eigen::MatrixXd covariance = h.train.covariance;
+    const auto is_correction = [&](std::size_t j) {
+      return std::find(growth_.found().begin(), growth_.found().end(), h.free[j].effect) ==
+             growth_.found().end();
+    };
+    for (;;) {
+      double least = infinity;
+      std::size_t place = 0;
+      for (std::size_t a = 0; a < open.size(); ++a) {
+        if (!is_correction(open[a])) continue;
+        const auto at = static_cast<Eigen::Index>(a);
+        const double z = std::abs(value[at] - h.free[open[a]].prior_mean) /
+                         std::sqrt(std::max(covariance(at, at), 1e-300));
+        if (z < least) {
+          least = z;
+          place = a;
+        }
+      }
+      if (!(least < least_correction_z)) break;
+      const auto at = static_cast<Eigen::Index>(place);
+      const double step = h.free[open[place]].prior_mean - value[at];
+      const Eigen::VectorXd column = covariance.col(at) / std::max(covariance(at, at), 1e-300);
+      value += column * step;
+      covariance -= column * covariance.row(at).eval();
+      const Eigen::Index n = value.size();
+      Eigen::VectorXd smaller_value(n - 1);
+      Eigen::MatrixXd smaller(n - 1, n - 1);
+      for (Eigen::Index i = 0, a = 0; i < n; ++i) {
+        if (i == at) continue;
+        smaller_value[a] = value[i];
+        for (Eigen::Index j = 0, b = 0; j < n; ++j)
+          if (j != at) smaller(a, b++) = covariance(i, j);
+        ++a;
+      }
+      value = smaller_value;
+      covariance = smaller;
+      open.erase(open.begin() + static_cast<std::ptrdiff_t>(place));
+    }
+    std::vector<std::size_t> corrections;
+    for (const std::size_t j : open)
+      if (is_correction(j) && !is_within_belief(h, j) && search_.is_plausible(h, h.free[j].effect) &&
+          std::find(corrections.begin(), corrections.end(), h.free[j].effect) == corrections.end())
+        corrections.push_back(h.free[j].effect);
+    fit_last(corrections);
+    order_corrections(corrections);
+  }
+
+  /// The last fits, of training runs and of all. A correction that these leave uncertain is none: it goes.
+  void fit_last(std::vector<std::size_t>& corrections) {
+    const Hypothesis* from = &growth_.current();
+    for (;;) {
+      options_.tell(0.88, "fitting what is left");
+      std::vector<std::size_t> all = growth_.found();
+      all.insert(all.end(), corrections.begin(), corrections.end());
+      final_ = search_.only(all, *from, nullptr, true);
+      search_.judge(final_, final_.train.point.noise);
+      from = &final_;
+      options_.tell(0.9, "fitting all runs");
+      known_ = search_.on_all(final_);
+      const auto includes_nothing = [&](std::size_t effect) {
+        return search_.certainty(known_, effect) < 2.0;
+      };
+      const auto gone = std::remove_if(corrections.begin(), corrections.end(), includes_nothing);
+      if (gone == corrections.end()) return;
+      corrections.erase(gone, corrections.end());
+    }
+  }
+
+  /// A coefficient of the plant file that moved no further than such coefficients do from day to day: the
+  /// number is set right, but nothing was missing.
+  bool is_within_belief(const Hypothesis& h, std::size_t j) const {
+    const FreeParameter& p = h.free[j];
+    if (effect_registry()[p.effect].enters == Enters::parameter || plant_.find(p.effect) == nullptr)
+      return false;
+    constexpr double far = 3.0;
+    return std::abs(h.train.point.plant.find(p.effect)->values[p.index] - p.prior_mean) < far * p.prior_sigma;
+  }
+
+  /// Corrections in the order of how much each closes: of sensors first, then of the plant's numbers, which
+  /// are always a little off.
+  void order_corrections(const std::vector<std::size_t>& corrections) {
+    const Noise noise = final_.train.point.noise;
+    std::vector<std::tuple<bool, double, std::size_t>> opened;
+    for (const std::size_t effect : corrections) {
+      std::vector<std::size_t> others = growth_.found();
+      for (const std::size_t other : corrections)
+        if (other != effect) others.push_back(other);
+      Hypothesis h = search_.only(others, final_, &noise);
+      search_.judge(h, noise);
+      opened.emplace_back(effect_registry()[effect].enters == Enters::parameter, -search_.gap_of(h), effect);
+    }
+    std::sort(opened.begin(), opened.end());
+    corrections_.clear();
+    for (const auto& [number, gap, effect] : opened) corrections_.push_back(effect);
+  }
+
+  void conclude(const ResidualStructure& structure) {
+    options_.tell(0.93, "measuring the gap");
+    note_runs();
+    result_.noise = known_.train.point.noise;
+    const std::vector<std::size_t> all = all_found();
+    const Noise& fitted_noise = final_.train.point.noise;
+    const Noise quiet = sensors_only(final_.train.point.noise);
+    // Of what is left but cannot be told from noise, the floor is what such noise makes; else the sensors
+    // alone.
+    const double floor = structure.structured ? 1.0 : held_out_floor(search_, final_, structure).usual;
+    const auto gap_with = [&](const std::vector<std::size_t>& effects, const Hypothesis& from, bool settled) {
+      Hypothesis h = search_.only(effects, from, &fitted_noise, settled);
+      search_.judge(h, quiet);
+      return search_.gap_of(h) / floor;
+    };
+    double gap = result_.gap_before = gap_with({}, final_, false);
+    for (std::size_t i = 0; i < all.size(); ++i) {
+      const std::vector<std::size_t> first(all.begin(), all.begin() + static_cast<std::ptrdiff_t>(i) + 1);
+      FoundEffect found;
+      found.effect = all[i];
+      found.gap_before = gap;
+      gap = gap_with(first, final_, i + 1 == all.size());
+      found.gap_after = gap;
+      found.parameters = estimates_of(all[i], known_);
+      found.where = growth_.where(all[i]);
+      result_.effects.push_back(found);
+    }
+    result_.gap_after = gap;
+    result_.residual = structure.sentence;
+    result_.model = all.empty() ? plant_ : model_with(all, known_.train.point.plant);
+    for (auto& candidate : result_.candidates) {
+      candidate.gap_after = result_.gap_before;
+      for (auto& [effect, h] : growth_.finalists()) {
+        if (effect != candidate.effect) continue;
+        candidate.evidence = compare(growth_.given(), h).train;
+        candidate.gap_after = search_.simulate(h).gap / floor;
+      }
+    }
+    std::stable_sort(result_.candidates.begin(), result_.candidates.end(),
+                     [](const auto& a, const auto& b) { return a.evidence > b.evidence; });
+    note_doubtful_numbers();
+    decide(structure);
+    trace_residuals();
+    find_confusable();
+  }
+
+  void trace_residuals() {
+    if (data_.held.segments.empty()) return;
+    const Noise noise = final_.train.point.noise;
+    result_.residual_after = smooth_residuals(data_.held, final_.held.point);
+    Hypothesis as_given = search_.only({}, final_, &noise);
+    search_.judge(as_given, noise);
+    result_.residual_before = smooth_residuals(data_.held, as_given.held.point);
+  }
+
+  /// A scale at the end of what it may be stands for something else.
+  void doubt_what_cannot_be(ResidualStructure& structure) const {
+    constexpr double nearly = 1e-3;
+    for (const std::size_t effect : all_found()) {
+      const auto [scale, parameter] = scale_of(effect);
+      if (parameter == nullptr) continue;
+      const bool low = scale < parameter->low * (1.0 + nearly);
+      if (!low && scale < parameter->high * (1.0 - nearly)) continue;
+      structure.structured = true;
+      std::ostringstream text;
+      text.precision(3);
+      text << "it takes a " << kind_of(effect) << " of " << scale << (low ? " or less" : " or more")
+           << ", which cannot be: something else is missing";
+      structure.sentence = text.str();
+    }
+  }
+
+  /// A scale among what was fitted, and how far it may go; else none.
+  std::pair<double, const FreeParameter*> scale_of(std::size_t effect) const {
+    for (const FreeParameter& p : known_.free)
+      if (p.effect == effect && effect_registry()[effect].parameters[p.index].name == "scale")
+        return {known_.train.point.plant.find(effect)->values[p.index], &p};
+    return {1.0, nullptr};
+  }
+
+  /// Numbers of the plant file that are off by more than a data sheet is.
+  void note_doubtful_numbers() {
+    constexpr double far = 0.2;
+    for (const std::size_t effect : all_found()) {
+      const double scale = scale_of(effect).first;
+      if (effect_registry()[effect].enters != Enters::parameter || std::abs(std::log(scale)) < far) continue;
+      std::ostringstream text;
+      text.precision(3);
+      text << "check " << kind_of(effect) << " another way: " << scale
+           << " times what the plant file says is far off; what was found beside it is no more certain";
+      result_.notes.push_back(text.str());
+    }
+  }
+
+  std::vector<std::size_t> all_found() const {
+    std::vector<std::size_t> all = growth_.found();
+    all.insert(all.end(), corrections_.begin(), corrections_.end());
+    return all;
+  }
+
+  /// The plant file with the effects added. What moved within what is believed of it goes into the numbers
+  /// that were there.
+  Plant model_with(const std::vector<std::size_t>& all, const Plant& fitted) const {
+    Plant model = plant_;
+    for (const std::size_t effect : search_.nuisances()) {
+      if (std::find(all.begin(), all.end(), effect) != all.end()) continue;
+      if (plant_.find(effect) != nullptr) {
+        model.set(effect, fitted.find(effect)->values);
+      } else if (effect_registry()[effect].enters == Enters::parameter) {
+        fold(model, effect, fitted.find(effect)->values[0]);
+      }
+    }
+    for (const std::size_t effect : all) model.set(effect, fitted.find(effect)->values);
+    return model;
+  }
+
+  /// Puts the scale of a base parameter into the plant's own numbers.
+  static void fold(Plant& plant, std::size_t effect, double scale) {
+    Plant scaled = plant;
+    scaled.set(effect, std::vector<double>{scale});
+    const BaseParameters<double> base = make_model<double>(scaled).corrected();
+    plant.cart_mass_kg = base.cart_mass_kg;
+    plant.motor.back_emf_n_per_mps = base.back_emf_n_per_mps;
+    if (!plant.pendulum) return;
+    const bool rod = !plant.pendulum->given_inertia_kgm2;
+    plant.pendulum->mass_kg = base.pendulum_mass_kg;
+    plant.pendulum->length_to_com_m = base.length_to_com_m;
+    if (!rod) plant.pendulum->given_inertia_kgm2 = base.inertia_about_pivot_kgm2;
+  }
+
+  void decide(const ResidualStructure& structure) {
+    // What held-out data show of an effect that they hardly excite may be so much chance.
+    constexpr double chance = 0.01;
+    const bool worse = result_.gap_after > (1.0 + chance) * result_.gap_before;
+    if (worse)
+      result_.notes.emplace_back(
+          "what was found takes held-out data further from the model, so it explains nothing: check the "
+          "data and the plant file first");
+    if (structure.structured || worse) {
+      result_.verdict = Verdict::unexplained;
+    } else if (!result_.effects.empty()) {
+      result_.verdict = Verdict::explained;
+    } else {
+      result_.verdict = moves_enough(runs_) ? Verdict::no_discrepancy : Verdict::not_excited;
+    }
+    decided_ = true;
+  }
+
+  /// Other effects that do as well in the place of one that was found: from sensitivities, or fitted where an
+  /// effect does not act in proportion to its size.
+  void find_confusable() {
+    options_.tell(0.94, "what else could it be");
+    std::vector<std::pair<std::size_t, Plant>> rivals;
+    for (const Rival& rival : linear_rivals(search_, final_, all_found())) {
+      declare(rival.instead_of, rival.effect);
+      rivals.emplace_back(rival.effect, rival.plant);
+    }
+    std::optional<double> sieved;
+    for (const std::size_t effect : growth_.found()) {
+      std::optional<Hypothesis> without;
+      for (const std::size_t other : growth_.near(effect)) {
+        if (is_listed(other) || is_declared(effect, other)) continue;
+        options_.tell(0.95, "is it " + kind_of(other) + " instead of " + kind_of(effect));
+        if (!without) without = search_.without(growth_.current(), effect);
+        if (!std::isfinite(without->train.objective)) break;
+        Hypothesis rival = search_.screened(*without, other);
+        search_.settle_on_sieve(rival);
+        if (!sieved) sieved = search_.sieved(growth_.current()).train.objective;
+        // So much worse on a part, it is no better on the whole.
+        if (!(rival.train.objective - *sieved < most_scattered)) continue;
+        rival.train.point.noise = growth_.current().train.point.noise;
+        search_.refit(*without, rival);
+        const Improvement worse = compare(rival, growth_.current());
+        if (!search_.is_plausible(rival, other)) continue;
+        const bool same =
+            worse.train < confusable_evidence || (worse.train < most_scattered && worse.t_value < 2.0);
+        if (!same) continue;
+        declare(effect, other);
+        rivals.emplace_back(other, rival.train.point.plant);
+      }
+    }
+    if (!rivals.empty()) result_.next_experiment = choose_experiment(final_.train.point.plant, rivals, runs_);
+  }
+
+  FoundEffect& listed(std::size_t effect) {
+    return *std::find_if(result_.effects.begin(), result_.effects.end(),
+                         [&](const FoundEffect& found) { return found.effect == effect; });
+  }
+  bool is_listed(std::size_t effect) const {
+    const std::vector<std::size_t> all = all_found();
+    return std::find(all.begin(), all.end(), effect) != all.end();
+  }
+  bool is_declared(std::size_t effect, std::size_t other) {
+    const std::vector<std::size_t>& others = listed(effect).confusable_with;
+    return std::find(others.begin(), others.end(), other) != others.end();
+  }
+  void declare(std::size_t effect, std::size_t other) { listed(effect).confusable_with.push_back(other); }
+
+  const Plant plant_;
+  const std::vector<Measurement>& runs_;
+  const DiagnosisOptions& options_;
+  Diagnosis result_;
+  DataSplit data_;
+  const double work_samples_;  ///< of the search at most
+  WorkBound bound_;
+  bool decided_ = false;  ///< the verdict stands
+  Search search_;
+  Growth growth_;
+  Hypothesis final_;  ///< fitted to the training runs, judged on the others
+  Hypothesis known_;  ///< the same effects fitted to all runs: what the model says in the end
+  std::vector<std::size_t> corrections_;
+};
+
+}  // namespace
+
+std::string kind_of(std::size_t effect) {
+  return std::string(effect_registry()[effect].kind);
+}
+
+std::string_view name_of(Verdict verdict) {
+  switch (verdict) {
+    case Verdict::explained:
+      return "explained";
+    case Verdict::no_discrepancy:
+      return "no_discrepancy";
+    case Verdict::unexplained:
+      return "unexplained";
+    case Verdict::not_excited:
+      return "not_excited";
+  }
+  return "";
+}
+
+NextBest next_best(const Diagnosis& diagnosis, const FoundEffect& effect) {
+  constexpr double near = 1.0 / 3.0;
+  constexpr std::size_t most = 3;
+  NextBest best;
+  for (const Trial& trial : diagnosis.trials)
+    if (trial.taken && trial.effect == effect.effect) best.taken = &trial;
+  if (best.taken == nullptr) return best;
+  for (const Trial& trial : diagnosis.trials) {
+    const std::vector<std::size_t>& same = effect.confusable_with;
+    const double share = trial.evidence / best.taken->evidence;
+    if (trial.round == best.taken->round && share > near && share < 1.0 &&
+        std::find(same.begin(), same.end(), trial.effect) == same.end())
+      best.others.push_back(&trial);
+  }
+  std::stable_sort(best.others.begin(), best.others.end(),
+                   [](const Trial* a, const Trial* b) { return a->evidence > b->evidence; });
+  if (best.others.size() > most) best.others.resize(most);
+  return best;
+}
+
+Diagnosis diagnose(const Plant& plant, const std::vector<Measurement>& runs,
+                   const DiagnosisOptions& options) {
+  if (runs.empty()) throw ConfigError("no run was named: name at least one with --data");
+  const std::string fault = fault_of(plant);
+  if (!fault.empty()) throw ConfigError(fault);
+  const bool shared = std::any_of(runs.begin(), runs.end(), [&](const Measurement& run) {
+    return run.has_cart() || (run.has_theta() && plant.pendulum);
+  });
+  if (!shared)
+    throw ConfigError(
+        "the runs hold theta_rad only, and the model is a cart alone: add the pendulum to the plant file");
+  const InterruptibleWork watch(options.signal);
+  Diagnostician first(plant, runs, options, HeldOut::middle);
+  Diagnosis diagnosis = first.run();
+  if (diagnosis.verdict == Verdict::not_excited || diagnosis.interrupted || diagnosis.bound_reached)
+    return diagnosis;
+  const bool unexplained = diagnosis.verdict == Verdict::unexplained;
+  try {
+    // A weak effect may show too little in the runs that are left once one is held out.
+    if (unexplained ? !first.lacks_what_was_held_out() : first.found_what_was_lacking()) return diagnosis;
+    options.tell(0.02, "looking again, with other runs held out");
+    Diagnostician second(plant, runs, options, HeldOut::other);
+    Diagnosis other = second.run();
+    if (other.verdict == Verdict::explained && (unexplained || second.found_what_was_lacking())) {
+      other.notes.emplace_back(
+          "the runs held out at first show what the others alone do not: others were held out instead");
+      return other;
+    }
+    diagnosis.interrupted = other.interrupted;
+    diagnosis.bound_reached = other.bound_reached;
+  } catch (const Interrupted&) {
+    diagnosis.interrupted = true;
+  } catch (const BoundReached&) {
+    diagnosis.bound_reached = true;
+  }
+  return diagnosis;
+}
+
+}  // namespace upright

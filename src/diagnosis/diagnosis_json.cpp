@@ -1,0 +1,111 @@
+#include "diagnosis_json.hpp"
+
+#include <cmath>
+
+namespace upright {
+
+namespace {
+
+using nlohmann::json;
+
+json number(double value) {
+  return std::isfinite(value) ? json(value) : json(nullptr);
+}
+
+json parameters_json(const std::vector<ParameterEstimate>& estimates) {
+  json parameters = json::object();
+  for (const ParameterEstimate& p : estimates)
+    parameters[p.name] = {
+        {"value", number(p.value)}, {"ci95", {number(p.low), number(p.high)}}, {"unit", p.unit}};
+  return parameters;
+}
+
+json noise_json(const Noise& noise) {
+  return {{"force_n_sqrt_s", number(noise.force)},
+          {"torque_nm_sqrt_s", number(noise.torque)},
+          {"jitter_s", number(noise.jitter_s)},
+          {"sensors", number(noise.sensors)}};
+}
+
+json trial_json(const Trial& trial) {
+  return {{"round", trial.round + 1},
+          {"kind", kind_of(trial.effect)},
+          {"evidence", number(trial.evidence)},
+          {"held_out", number(trial.held)},
+          {"t", number(trial.t_value)},
+          {"standard_errors", number(trial.certainty)},
+          {"parameters", parameters_json(trial.parameters)},
+          {"noise", noise_json(trial.noise)},
+          {"taken", trial.taken}};
+}
+
+json step_json(const Step& step) {
+  json effects = json::array();
+  for (const Step::Effect& effect : step.effects)
+    effects.push_back({{"kind", kind_of(effect.effect)}, {"parameters", parameters_json(effect.parameters)}});
+  return effects;
+}
+
+json next_best_json(const NextBest& best) {
+  json others = json::array();
+  for (const Trial* other : best.others)
+    others.push_back({{"kind", kind_of(other->effect)},
+                      {"evidence", number(other->evidence)},
+                      {"of", number(best.taken->evidence)},
+                      {"parameters", parameters_json(other->parameters)}});
+  return others;
+}
+
+json effect_json(const Diagnosis& diagnosis, const FoundEffect& effect) {
+  json confusable = json::array();
+  for (const std::size_t other : effect.confusable_with) confusable.push_back(kind_of(other));
+  return {{"kind", kind_of(effect.effect)},
+          {"enters", std::string(name_of(effect_registry()[effect.effect].enters))},
+          {"gap_before", number(effect.gap_before)},
+          {"gap_after", number(effect.gap_after)},
+          {"parameters", parameters_json(effect.parameters)},
+          {"confusable_with", confusable},
+          {"next_best", next_best_json(next_best(diagnosis, effect))},
+          {"where", effect.where}};
+}
+
+}  // namespace
+
+json diagnosis_json(const Diagnosis& diagnosis) {
+  json effects = json::array();
+  for (const FoundEffect& effect : diagnosis.effects) effects.push_back(effect_json(diagnosis, effect));
+  json candidates = json::array();
+  for (const CandidateScore& candidate : diagnosis.candidates)
+    candidates.push_back({{"kind", kind_of(candidate.effect)},
+                          {"gap_after", number(candidate.gap_after)},
+                          {"evidence", number(candidate.evidence)}});
+  json trials = json::array();
+  for (const Trial& trial : diagnosis.trials) trials.push_back(trial_json(trial));
+  json steps = json::array();
+  for (const Step& step : diagnosis.steps) steps.push_back(step_json(step));
+  json next = nullptr;
+  if (diagnosis.next_experiment)
+    next = {{"name", diagnosis.next_experiment->name},
+            {"description", diagnosis.next_experiment->description},
+            {"file", diagnosis.next_experiment->file},
+            {"distance", number(diagnosis.next_experiment->distance)}};
+  json document = {{"verdict", std::string(name_of(diagnosis.verdict))},
+                   {"gap",
+                    {{"measure", "held-out simulation error / noise floor"},
+                     {"before", number(diagnosis.gap_before)},
+                     {"after", number(diagnosis.gap_after)}}},
+                   {"effects", effects},
+                   {"candidates", candidates},
+                   {"next_experiment", next},
+                   {"residual", diagnosis.residual},
+                   {"noise", noise_json(diagnosis.noise)},
+                   {"steps", steps},
+                   {"trials", trials},
+                   {"notes", diagnosis.notes}};
+  // Of a search that was not finished only.
+  if (diagnosis.interrupted) document["interrupted"] = true;
+  if (diagnosis.bound_reached) document["bound_reached"] = true;
+  return document;
+}
+
+}  // namespace upright

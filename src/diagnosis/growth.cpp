@@ -1,0 +1,560 @@
+#include "growth.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <sstream>
+
+#include "structure.hpp"
+#include "upright/base/error.hpp"
+
+namespace upright {
+
+namespace {
+
+constexpr double infinity = std::numeric_limits<double>::infinity();
+
+/// Minus twice the log likelihood that an effect must save on the training data before it is believed. About
+/// 30 candidates with up to three parameters are tried; 25 keeps chance below one in a thousand when noise is
+/// white.
+constexpr double least_evidence = 25.0;
+/// The same as a t value of the saving per quarter of a second, which stays honest where the noise is not
+/// white.
+constexpr double least_t = 3.0;
+/// Evidence so large that coloured noise cannot have made it, however few the segments are that hold it.
+constexpr double overwhelming_evidence = 1000.0;
+/// And its size must be this many of its robust standard errors from nothing.
+constexpr double least_certainty = 4.0;
+/// What each parameter beyond the first must save on top: a simpler effect that does nearly as well is
+/// preferred.
+constexpr double parameter_price = 10.0;
+/// Evidence by which two do equally well: the plainer one is taken.
+constexpr double equally_good = 4.0;
+constexpr int most_rounds = 4;
+constexpr std::size_t most_finalists = 4;
+/// What gains this share of what the best does may be the same thing by another name, or half of it.
+constexpr double resembles = 0.3;
+constexpr std::size_t most_resembling = 8;
+
+}  // namespace
+
+Growth::Growth(Search& search, const DiagnosisOptions& options, Diagnosis& record)
+    : search_(search), options_(options), record_(record) {}
+
+void Growth::begin() {
+  options_.tell(0.02, "comparing the model as given");
+  given_ = search_.baseline();
+  if (!std::isfinite(given_.train.objective))
+    throw ConfigError("the model cannot be simulated with these runs: check the plant file");
+  current_ = given_;
+}
+
+void Growth::find() {
+  grow(0, most_rounds, false);
+  try_pairs(finalists_);
+  prune();
+}
+
+bool Growth::begin_anew() {
+  options_.tell(0.83, "beginning anew");
+  Hypothesis h = search_.begun_anew(current_);
+  if (!(h.train.objective < current_.train.objective - equally_good)) return false;
+  current_ = std::move(h);
+  return true;
+}
+
+bool Growth::find_pairs_of_all() {
+  if (!try_pairs(resembling_)) return false;
+  prune();
+  return true;
+}
+
+bool Growth::find_thoroughly(bool certainly_missing) {
+  const std::vector<std::size_t> before = found_;
+  const double objective = current_.train.objective;
+  grow(most_rounds, 2 * most_rounds, true);
+  // What certainly is missing shows on a part of many data too.
+  constexpr double few = 0.5;
+  const double share = search_.sieve_share();
+  if (share < 1.0 && !(certainly_missing && share < few)) {
+    search_.sieve_all();
+    grow(2 * most_rounds, 3 * most_rounds, false);
+  }
+  // On the way a better place may have been found for the noise alone.
+  if (found_ == before) return current_.train.objective < objective - equally_good;
+  prune();
+  return true;
+}
+
+std::vector<std::size_t> Growth::open_candidates() const {
+  std::vector<std::size_t> candidates = candidate_effects(current_.train.point.plant, search_.range());
+  for (const std::size_t effect : search_.nuisances())
+    if (!current_.added.contains(effect)) candidates.push_back(effect);
+  return candidates;
+}
+
+std::vector<std::size_t> Growth::promising(const Hypothesis& from, const std::vector<std::size_t>& candidates,
+                                           int round) {
+  constexpr double share = 0.1;
+  constexpr std::size_t least_count = 8;
+  const std::vector<double> promised = search_.promised_gains(from, candidates);
+  std::vector<std::size_t> ranking(candidates.size());
+  std::iota(ranking.begin(), ranking.end(), std::size_t{0});
+  std::stable_sort(ranking.begin(), ranking.end(),
+                   [&](std::size_t a, std::size_t b) { return promised[a] > promised[b]; });
+  double best = 0.0;
+  for (const double gain : promised)
+    if (std::isfinite(gain)) best = std::max(best, gain);
+  std::vector<std::size_t> chosen;
+  std::size_t kept = 0;
+  for (const std::size_t i : ranking) {
+    const bool unknown = !std::isfinite(promised[i]);
+    if (unknown || kept < least_count || promised[i] > share * best) {
+      chosen.push_back(candidates[i]);
+      kept += unknown ? 0 : 1;
+    } else if (round == 0) {
+      record_.candidates.push_back({candidates[i], 0.0, std::max(promised[i], 0.0)});
+    }
+  }
+  return chosen;
+}
+
+double Growth::price_of(std::size_t effect) {
+  return parameter_price * static_cast<double>(effect_registry()[effect].parameters.size() - 1);
+}
+
+double Growth::price_of_change(const Hypothesis& from, const Hypothesis& to) {
+  return parameter_price * (static_cast<double>(to.free.size()) - static_cast<double>(from.free.size()));
+}
+
+bool Growth::is_believed(Hypothesis& h, const Improvement& improvement, std::size_t effect) {
+  const double evidence = improvement.train - price_of(effect);
+  const double t = witnessed_t(improvement);
+  if (is_borne_out(improvement, effect) && t > least_t) return true;
+  // Held-out data that do not excite the effect say nothing: odds of less than 2 to 1 against it.
+  constexpr double indifferent = 1.4;
+  if (evidence < least_evidence || !(improvement.held > -indifferent)) return false;
+  if (t > least_t || evidence > overwhelming_evidence) return true;
+  // Numbers of the plant that need not be so far off are no matter of noise.
+  if (improvement.belief - price_of(effect) > least_evidence) return true;
+  // Nothing but the sensors' noise is left: its evidence needs no other witness.
+  constexpr double least_t_of_sensors = 1.5, as_sensors = 1.05;
+  return improvement.t_value > least_t_of_sensors && improvement.held > equally_good &&
+         search_.simulate(h).gap < as_sensors;
+}
+
+double Growth::witnessed_t(const Improvement& improvement) {
+  constexpr double chance = 1.0;
+  if (!(improvement.t_value > chance)) return improvement.t_value;
+  return std::sqrt(improvement.t_value * improvement.t_value + std::max(improvement.held, 0.0));
+}
+
+bool Growth::is_borne_out(const Improvement& improvement, std::size_t effect) {
+  const double evidence = improvement.train - price_of(effect);
+  constexpr double least_share = 8.0, least_together = 40.0;
+  return std::min(evidence, improvement.held) > least_share && evidence + improvement.held > least_together;
+}
+
+bool Growth::is_overwhelming(const Improvement& improvement, std::size_t effect) {
+  return improvement.train - price_of(effect) > overwhelming_evidence && improvement.t_value > least_t;
+}
+
+bool Growth::is_certain(Hypothesis& h, std::size_t effect) {
+  const double so_far = search_.certainty(h, effect);
+  if (so_far >= least_certainty) return true;
+  const Improvement improvement = compare(current_, h);
+  if (is_borne_out(improvement, effect) && search_.certainty(search_.on_all(h), effect) >= least_certainty)
+    return true;
+  constexpr double of_noise_not_white = 4.0;
+  if (improvement.train < of_noise_not_white * std::max(so_far * so_far, 1.0)) return false;
+  // Much noise hides what a poor fit leaves, and each gives way to the other by and by.
+  constexpr int most_turns = 6;
+  constexpr double helps = 10.0;
+  for (int turn = 0; turn < most_turns; ++turn) {
+    Hypothesis further = h;
+    search_.refine(h, further);
+    const double gain = h.train.objective - further.train.objective;
+    if (gain > 0.0) h = std::move(further);
+    if (!(gain > helps)) break;
+  }
+  return search_.certainty(h, effect) >= least_certainty;
+}
+
+bool Growth::simulates_as_well(Hypothesis& h) {
+  if (search_.held_data().segments.empty()) return true;
+  const std::vector<double>& now = search_.simulate(h).segment_gap;
+  const std::vector<double>& before = search_.simulate(current_).segment_gap;
+  if (found_.empty()) given_.simulation = current_.simulation;
+  const auto n = static_cast<double>(now.size());
+  double mean = 0.0, square = 0.0;
+  for (std::size_t s = 0; s < now.size(); ++s) {
+    const double worse = std::log(std::max(now[s], 1e-9) / std::max(before[s], 1e-9));
+    mean += worse / n;
+    square += worse * worse / n;
+  }
+  constexpr double by_chance = 0.1, least_scatter = 0.5;
+  const double scatter = std::max(least_scatter, std::sqrt(std::max(square - mean * mean, 0.0)));
+  return mean < by_chance + scatter / std::sqrt(n);
+}
+
+void Growth::end_doubt() {
+  if (!standing_) return;
+  // What stood before is the answer until the held-out runs are on the side of what was added.
+  Standing grown = std::move(*standing_);
+  standing_.reset();
+  std::swap(current_, grown.hypothesis);
+  std::swap(found_, grown.found);
+  if (compare(current_, grown.hypothesis).held > 0.0 && simulates_as_well(grown.hypothesis)) {
+    current_ = std::move(grown.hypothesis);
+    found_ = std::move(grown.found);
+  } else {
+    contradicted_ = true;
+    record_step();
+  }
+}
+
+void Growth::level_noise(const Hypothesis& richer) {
+  Hypothesis again = current_;
+  again.train.point.noise = richer.train.point.noise;
+  search_.refine(again, again);
+  if (again.train.objective < current_.train.objective) current_ = std::move(again);
+}
+
+std::string Growth::locate(const Hypothesis& h) const {
+  const FitData& train = search_.train_data();
+  const ResidualPlace place = locate_residual(train, h.train.point);
+  std::size_t worst = 0;
+  double largest = 0.0;
+  for (std::size_t s = 0; s < h.train.segment_chi_square.size(); ++s) {
+    const double mean = h.train.segment_chi_square[s] / std::max(h.train.segment_samples[s], 1.0);
+    if (mean <= largest) continue;
+    largest = mean;
+    worst = s;
+  }
+  const Segment& segment = train.segments[worst];
+  const Measurement& run = (*train.runs)[segment.run];
+  std::ostringstream text;
+  text.precision(3);
+  text << "in the " << (place.in_pendulum ? "pendulum" : "cart") << " equation: the residual "
+       << (place.in_pendulum ? "torque" : "force") << " goes with " << place.goes_with << " ("
+       << std::lround(100.0 * place.share) << " percent of it can be predicted); the worst stretch is "
+       << run.name << " from " << run.time_s[segment.first] << " to " << run.time_s[segment.last] << " s";
+  return text.str();
+}
+
+void Growth::record_trial(int round, std::size_t effect, const Hypothesis& h,
+                          const Improvement& improvement) {
+  Trial trial;
+  trial.round = static_cast<std::size_t>(round);
+  trial.effect = effect;
+  trial.evidence = improvement.train;
+  trial.held = improvement.held;
+  trial.t_value = improvement.t_value;
+  trial.certainty = search_.certainty(h, effect);
+  trial.noise = h.train.point.noise;
+  if (std::isfinite(h.train.objective)) trial.parameters = estimates_of(effect, h);
+  record_.trials.push_back(trial);
+}
+
+void Growth::record_step() {
+  Step step;
+  for (const std::size_t effect : found_) step.effects.push_back({effect, estimates_of(effect, current_)});
+  record_.steps.push_back(std::move(step));
+}
+
+void Growth::grow(int first_round, int last_round, bool calmly) {
+  for (int round = first_round; round < last_round && add_best(round, calmly); ++round) {
+  }
+  end_doubt();
+}
+
+bool Growth::add_best(int round, bool calmly) {
+  const double done = std::min(0.05 + 0.2 * round, 0.7);
+  const std::vector<Screened> screened = screen(round, calmly, done);
+  std::vector<Believed> believed = believe(round, screened, calmly, done);
+  if (believed.empty()) return false;
+  take(round, believed[choose(believed)], screened);
+  while (exchange() || simplify()) {
+  }
+  return true;
+}
+
+std::vector<Growth::Screened> Growth::screen(int round, bool calmly, double done) {
+  options_.tell(done, "looking for what is missing");
+  Hypothesis from = current_;
+  if (calmly) from.train.point.noise = calmed(from.train.point.noise);
+  const std::vector<std::size_t> candidates = promising(from, open_candidates(), round);
+  const double sieved = search_.sieved(from).train.objective;
+  std::vector<Screened> screened;
+  for (std::size_t c = 0; c < candidates.size(); ++c) {
+    options_.tell(done + 0.02 + 0.1 * static_cast<double>(c) / static_cast<double>(candidates.size()),
+                  "trying " + kind_of(candidates[c]));
+    Hypothesis h = search_.screened(from, candidates[c]);
+    const double gain = sieved - h.train.objective - price_of(candidates[c]);
+    if (round == 0) record_.candidates.push_back({candidates[c], 0.0, std::max(gain, 0.0)});
+    screened.push_back({candidates[c], std::move(h), gain});
+  }
+  return screened;
+}
+
+std::vector<Growth::Believed> Growth::believe(int round, const std::vector<Screened>& screened, bool calmly,
+                                              double done) {
+  std::vector<const Screened*> ranking;
+  ranking.reserve(screened.size());
+  for (const Screened& s : screened) ranking.push_back(&s);
+  std::stable_sort(ranking.begin(), ranking.end(),
+                   [](const Screened* a, const Screened* b) { return a->gain > b->gain; });
+  if (round == 0)
+    for (const Screened* s : ranking)
+      if (resembling_.size() < most_resembling && s->gain > resembles * ranking[0]->gain)
+        resembling_.emplace_back(s->effect, s->hypothesis);
+  std::vector<Believed> believed, doubtful;
+  constexpr double of_best = 0.05;  // what a whole fit does not make up for
+  const double least_gain = 0.4 * least_evidence * search_.sieve_share();
+  for (std::size_t place = 0; place < std::min(most_finalists, ranking.size()); ++place) {
+    const auto& [effect, start, gain] = *ranking[place];
+    if (gain < std::max(least_gain, of_best * ranking[0]->gain)) break;
+    options_.tell(done + 0.12 + 0.08 * static_cast<double>(place) / most_finalists,
+                  "fitting " + kind_of(effect));
+    Hypothesis h = start;
+    search_.refine(current_, h);
+    if (round == 0) search_.simulate(h);
+    if (round == 0) finalists_.emplace_back(effect, h);
+    Improvement improvement = compare(current_, h);
+    record_trial(round, effect, h, improvement);
+    if (!search_.is_plausible(h, effect) || bends_another(h, effect, &Search::can_be)) continue;
+    const bool overwhelming = is_overwhelming(improvement, effect);
+    if (!is_believed(h, improvement, effect)) {
+      if (overwhelming && is_certain(h, effect))
+        doubtful.push_back({effect, h, improvement.train - price_of(effect)});
+      continue;
+    }
+    if (calmly || improvement.train < overwhelming_evidence) {
+      level_noise(h);
+      improvement = compare(current_, h);
+      if (!is_believed(h, improvement, effect)) continue;
+    }
+    const bool correction = current_.train.point.plant.find(effect) != nullptr;
+    if (!correction && !is_certain(h, effect)) continue;
+    const double score = compare(current_, h).train - price_of(effect);
+    if (simulates_as_well(h)) {
+      believed.push_back({effect, std::move(h), score});
+    } else if (overwhelming) {
+      doubtful.push_back({effect, std::move(h), score});
+    }
+  }
+  if (!believed.empty() || doubtful.empty()) return believed;
+  if (!standing_) standing_.emplace(Standing{current_, found_});
+  return doubtful;
+}
+
+std::size_t Growth::choose(std::vector<Believed>& believed) {
+  constexpr double close = 0.05;
+  const auto largest = [&] {
+    double score = -infinity;
+    for (const Believed& b : believed) score = std::max(score, b.score);
+    return score;
+  };
+  const double to_reach = (1.0 - close) * largest();
+  if (std::count_if(believed.begin(), believed.end(), [&](const Believed& b) { return b.score > to_reach; }) >
+      1)
+    for (Believed& b : believed) {
+      if (b.score <= to_reach) continue;
+      options_.tell(0.8, "fitting " + kind_of(b.effect) + " to the end");
+      Hypothesis further = b.hypothesis;
+      search_.refine(b.hypothesis, further);
+      const double gain = b.hypothesis.train.objective - further.train.objective;
+      if (!(gain > 0.0)) continue;
+      b.hypothesis = std::move(further);
+      b.score += gain;
+    }
+  const double best = largest();
+  const auto on_all = [&](const Believed& b) { return b.score + compare(current_, b.hypothesis).held; };
+  double best_on_all = -infinity;
+  for (const Believed& b : believed)
+    if (b.score > best - equally_good) best_on_all = std::max(best_on_all, on_all(b));
+  std::size_t chosen = believed.size();
+  for (std::size_t i = 0; i < believed.size(); ++i)
+    if (believed[i].score > best - equally_good && !(on_all(believed[i]) < best_on_all - equally_good) &&
+        (chosen == believed.size() || is_plainer(believed[i].effect, believed[chosen].effect)))
+      chosen = i;
+  return chosen;
+}
+
+void Growth::take(int round, Believed& best, const std::vector<Screened>& screened) {
+  const std::size_t effect = best.effect;
+  where_[effect] = locate(current_);
+  for (Trial& trial : record_.trials)
+    if (trial.round == static_cast<std::size_t>(round) && trial.effect == effect) trial.taken = true;
+  current_ = std::move(best.hypothesis);
+  found_.push_back(effect);
+  const auto winner =
+      std::find_if(screened.begin(), screened.end(), [&](const Screened& s) { return s.effect == effect; });
+  for (const Screened& s : screened)
+    if (s.effect != effect && (s.gain > resembles * winner->gain || is_half_of(s.effect, effect)))
+      near_[effect].push_back(s.effect);
+  record_step();
+}
+
+bool Growth::is_half_of(std::size_t half, std::size_t effect) {
+  return kind_of(effect) == "friction_asymmetry" && kind_of(half) == "coulomb_friction";
+}
+
+bool Growth::exchange() {
+  for (std::size_t i = 0; i + 1 < found_.size(); ++i) {
+    const std::size_t effect = found_[i];
+    std::vector<std::size_t> others;
+    for (const std::size_t other : near_[effect])
+      if (!is_found(other) && !exchanged_.contains({effect, other})) others.push_back(other);
+    if (others.empty()) continue;
+    options_.tell(0.8, "is it still " + kind_of(effect));
+    const Hypothesis without = search_.without(current_, effect);
+    if (!std::isfinite(without.train.objective)) continue;
+    const double to_beat = search_.sieved(current_).train.objective - price_of(effect);
+    const double worth = search_.sieved(without).train.objective - to_beat;
+    for (const std::size_t other : others) {
+      // The other half of the force may be found later.
+      if (!is_half_of(other, effect)) exchanged_.insert({effect, other});
+      Hypothesis h = search_.screened(without, other);
+      // What was found beside the one is of the wrong size for the other: the way is longer than a few steps.
+      constexpr double may_do = 0.5;
+      if (h.train.objective + price_of(other) < to_beat + may_do * worth) search_.settle_on_sieve(h);
+      if (!(h.train.objective + price_of(other) < to_beat + confusable_evidence)) continue;
+      search_.refine(without, h);
+      const Improvement improvement = compare(current_, h);
+      const double evidence = improvement.train + price_of(effect) - price_of(other);
+      const bool as_good =
+          std::min({evidence, improvement.held, evidence + improvement.held}) > -equally_good;
+      const bool better = evidence > confusable_evidence && improvement.held > 0.0;
+      if (!better && !(as_good && is_plainer(other, effect))) continue;
+      if (!search_.is_plausible(h, other) || search_.certainty(h, other) < least_certainty ||
+          !simulates_as_well(h))
+        continue;
+      where_[other] = where_.at(effect);
+      near_[other] = near_[effect];
+      near_[other].push_back(effect);
+      current_ = std::move(h);
+      found_[i] = other;
+      record_step();
+      return true;
+    }
+  }
+  return false;
+}
+
+std::vector<Growth::Simpler> Growth::simpler_forms() const {
+  const std::size_t one_way = effect_number("friction_asymmetry"), spring = effect_number("cable_spring");
+  const std::size_t level = effect_number("coulomb_friction"), force = effect_number("constant_force");
+  const Plant& plant = current_.train.point.plant;
+  const auto is_new = [&](std::size_t effect) { return is_found(effect) && !search_.is_nuisance(effect); };
+  std::vector<Simpler> forms;
+  if (plant.find(force) != nullptr) return forms;
+  if (is_new(one_way) && plant.find(level) == nullptr) {
+    const double size = plant.find(one_way)->values[0];
+    forms.push_back({one_way, {{level, {0.5 * std::abs(size)}}, {force, {-0.5 * size}}}});
+  }
+  if (is_new(spring)) {
+    const auto [stiffness, center_m, unused] = plant.find(spring)->values;
+    const DataRange& range = search_.range();
+    const double off_m = center_m - range.cart_mean_m;
+    if (std::abs(off_m) > range.cart_high_m - range.cart_low_m)
+      forms.push_back({spring, {{force, {stiffness * off_m}}}});
+  }
+  return forms;
+}
+
+bool Growth::simplify() {
+  for (const Simpler& form : simpler_forms()) {
+    if (!simplified_.insert({form.effect, found_.size()}).second) continue;
+    options_.tell(0.8, "is it simpler than " + kind_of(form.effect));
+    Hypothesis h = search_.exchanged(current_, form.effect, form.others);
+    const Improvement improvement = compare(current_, h);
+    if (!(improvement.train > price_of_change(current_, h)) || !(improvement.held > -equally_good)) continue;
+    if (std::any_of(form.others.begin(), form.others.end(), [&](const PlantEffect& other) {
+          return !search_.is_plausible(h, other.number) ||
+                 search_.certainty(h, other.number) < least_certainty;
+        }))
+      continue;
+    if (!simulates_as_well(h)) continue;
+    current_ = std::move(h);
+    auto place = found_.erase(std::find(found_.begin(), found_.end(), form.effect));
+    for (const PlantEffect& other : form.others) {
+      where_[other.number] = where_.at(form.effect);
+      near_[other.number] = near_[form.effect];
+      place = std::next(found_.insert(place, other.number));
+    }
+    record_step();
+    return true;
+  }
+  return false;
+}
+
+bool Growth::try_pairs(const std::vector<std::pair<std::size_t, Hypothesis>>& contenders) {
+  std::optional<Hypothesis> best;
+  std::vector<std::size_t> best_found;
+  std::optional<double> to_beat;  // on the sieve, by the best so far
+  for (std::size_t a = 0; a < contenders.size(); ++a)
+    for (std::size_t b = a + 1; b < contenders.size(); ++b) {
+      const std::size_t first = contenders[a].first, second = contenders[b].first;
+      if (found_.size() > 2 || (found_.size() == 2 && is_found(first) && is_found(second))) continue;
+      if (!paired_.insert(std::minmax(first, second)).second) continue;
+      options_.tell(0.83, "trying " + kind_of(first) + " with " + kind_of(second));
+      const Hypothesis& so_far = best ? *best : current_;
+      const Hypothesis quick = search_.screened_pair(given_, contenders[a].second, contenders[b].second);
+      if (!to_beat) to_beat = search_.sieved(so_far).train.objective;
+      if (!(quick.train.objective < *to_beat)) continue;
+      Hypothesis h = search_.with_pair(given_, contenders[a].second, contenders[b].second);
+      const Improvement improvement = compare(so_far, h);
+      if (improvement.train - price_of_change(so_far, h) < least_evidence || improvement.held < 0.0) continue;
+      if (!search_.is_plausible(h, first) || !search_.is_plausible(h, second)) continue;
+      if (search_.certainty(h, first) < least_certainty || search_.certainty(h, second) < least_certainty)
+        continue;
+      if (!simulates_as_well(h)) continue;
+      best = std::move(h);
+      best_found = {first, second};
+      to_beat.reset();
+    }
+  if (!best) return false;
+  for (const std::size_t effect : best_found)
+    if (!where_.contains(effect)) where_[effect] = where_.empty() ? locate(given_) : where_.begin()->second;
+  current_ = std::move(*best);
+  found_ = best_found;
+  record_step();
+  return true;
+}
+
+void Growth::prune() {
+  bool again = found_.size() > 1;
+  while (again) {
+    again = false;
+    for (std::size_t i = 0; i < found_.size(); ++i) {
+      options_.tell(0.85, "is " + kind_of(found_[i]) + " still needed");
+      Hypothesis h = search_.without(current_, found_[i]);
+      if (!std::isfinite(h.train.objective)) continue;
+      const Improvement improvement = compare(h, current_);
+      const bool still_shown =
+          improvement.train - price_of(found_[i]) > least_evidence && improvement.t_value > 0.7 * least_t;
+      if (still_shown || is_believed(current_, improvement, found_[i])) continue;
+      // What does without it by becoming what cannot be does not do without it.
+      if (bends_another(h, found_[i], &Search::is_plausible)) continue;
+      current_ = std::move(h);
+      found_.erase(found_.begin() + static_cast<std::ptrdiff_t>(i));
+      record_step();
+      again = found_.size() > 1;
+      break;
+    }
+  }
+}
+
+bool Growth::bends_another(const Hypothesis& h, std::size_t effect, Holds holds) const {
+  return std::any_of(found_.begin(), found_.end(), [&](std::size_t other) {
+    return other != effect && (search_.*holds)(current_, other) && !(search_.*holds)(h, other);
+  });
+}
+
+bool Growth::is_found(std::size_t effect) const {
+  return std::find(found_.begin(), found_.end(), effect) != found_.end();
+}
+
+}  // namespace upright

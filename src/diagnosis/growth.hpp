@@ -1,0 +1,169 @@
+// How the model grows: effects are added one at a time for as long as the data ask for one, exchanged for
+// what resembles them, tried in pairs, and dropped when they are not needed.
+#pragma once
+
+#include <map>
+#include <optional>
+#include <set>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "search.hpp"
+#include "upright/diagnosis/diagnosis.hpp"
+
+namespace upright {
+
+/// Works on one Search, which must outlive it. What was tried is written to `record`: candidates, trials,
+/// steps.
+class Growth {
+ public:
+  Growth(Search& search, const DiagnosisOptions& options, Diagnosis& record);
+
+  /// Fits the plant file as given: before everything else. Throws ConfigError when that cannot be simulated.
+  /// This and what follows throw Interrupted and BoundReached; what was found until then stays readable.
+  void begin();
+  /// From the plant file: one effect after the other, and pairs in their place.
+  void find();
+  /// What is left is more than noise: the same model from initial states as the data show them. Whether that
+  /// is better.
+  bool begin_anew();
+  /// What is left is more than noise: pairs of all that resembled the best effect. Whether the model changed.
+  bool find_pairs_of_all();
+  /// What is left is more than the sensors' noise: as the data show with little noise beyond it, and, unless
+  /// something is `certainly_missing` of many data, as all of the training data show. Whether the model
+  /// changed.
+  bool find_thoroughly(bool certainly_missing);
+
+  const Hypothesis& given() const { return given_; }
+  const Hypothesis& current() const { return current_; }
+  /// In the order in which they were found.
+  const std::vector<std::size_t>& found() const { return found_; }
+  /// Whether something was dropped in the end that training runs show beyond doubt, for held-out runs spoke
+  /// against it.
+  bool contradicted() const { return contradicted_; }
+  /// What gained a fair share of what this one did, when it was added.
+  const std::vector<std::size_t>& near(std::size_t effect) { return near_[effect]; }
+  /// Where model and data disagreed before this one was added.
+  const std::string& where(std::size_t effect) { return where_[effect]; }
+  /// The best effects of the first round, each fitted by itself.
+  std::vector<std::pair<std::size_t, Hypothesis>>& finalists() { return finalists_; }
+
+ private:
+  /// A candidate after a few steps on a part of the data, and what it saves beyond its price.
+  struct Screened {
+    std::size_t effect = 0;
+    Hypothesis hypothesis;
+    double gain = 0.0;
+  };
+
+  /// An effect that might be added, and what it saves beyond its price.
+  struct Believed {
+    std::size_t effect = 0;
+    Hypothesis hypothesis;
+    double score = 0.0;
+  };
+
+  /// What was found before an effect was added that held-out runs spoke against.
+  struct Standing {
+    Hypothesis hypothesis;
+    std::vector<std::size_t> found;
+  };
+
+  std::vector<std::size_t> open_candidates() const;
+  /// Those that promise a share of what the best one does, some at least, and all that cannot promise. A
+  /// promise is kept within a factor of a few (measured on the matrix), so that the best is among them.
+  std::vector<std::size_t> promising(const Hypothesis& from, const std::vector<std::size_t>& candidates,
+                                     int round);
+
+  static double price_of(std::size_t effect);
+  /// What the parameters must save that one hypothesis has beyond the other; negative where it has fewer.
+  static double price_of_change(const Hypothesis& from, const Hypothesis& to);
+  /// Whether training and held-out runs both speak for it, and together beyond doubt.
+  static bool is_borne_out(const Improvement& improvement, std::size_t effect);
+  bool is_believed(Hypothesis& h, const Improvement& improvement, std::size_t effect);
+  /// What a few moments hold has a small t on the training runs. Held-out runs are a witness of their own,
+  /// whose evidence adds to its square, unless the training runs say no more than chance does.
+  static double witnessed_t(const Improvement& improvement);
+  /// Evidence on the training runs that only something missing can hold against: held-out runs may excite
+  /// what is missing still, and speak against a right effect until it is found too.
+  static bool is_overwhelming(const Improvement& improvement, std::size_t effect);
+  /// Whether the size of an effect is certain. A fit that is less certain than its evidence says has not
+  /// arrived: it goes on first.
+  bool is_certain(Hypothesis& h, std::size_t effect);
+  /// Forces that look right a sample ahead can simulate badly: then the name is wrong. By how much segments
+  /// are further off, as far as their number can show it: while more is missing, one and the other come out
+  /// better or worse by half.
+  bool simulates_as_well(Hypothesis& h);
+  /// What held-out runs spoke against while more was missing must have them on its side in the end, or all
+  /// that was added since goes.
+  void end_doubt();
+  /// Gives the simpler hypothesis the richer one's noise to start from, so that a better estimate of the
+  /// noise is not taken for an effect. What `current_` becomes is at least as good as before.
+  void level_noise(const Hypothesis& richer);
+  /// Where a hypothesis and the data disagree most: in which equation, with what it goes, and when.
+  std::string locate(const Hypothesis& h) const;
+  void record_trial(int round, std::size_t effect, const Hypothesis& h, const Improvement& improvement);
+  void record_step();
+
+  /// Adds effects one at a time, the best first, for as long as the data ask for one. `calmly`: as they show
+  /// with little noise, for much noise can account for the whole of an effect.
+  void grow(int first_round, int last_round, bool calmly);
+  /// One round: whether an effect was added.
+  bool add_best(int round, bool calmly);
+  /// All promising candidates. `done`: how far the work is.
+  std::vector<Screened> screen(int round, bool calmly, double done);
+  /// The best of them fitted in full: those that the data believe, or, where there are none, those that only
+  /// held-out runs speak against.
+  std::vector<Believed> believe(int round, const std::vector<Screened>& screened, bool calmly, double done);
+  /// The one with the largest score. Close ones are fitted to the end first, for a fit that stopped a little
+  /// early is no reason. Scores that are equal then leave it to the held-out runs, and where those say the
+  /// same, to the plainer effect.
+  std::size_t choose(std::vector<Believed>& believed);
+  void take(int round, Believed& best, const std::vector<Screened>& screened);
+  /// What was the best name while another effect was still missing need not be the best beside it: each but
+  /// the last is exchanged for what had resembled it, where that does better now, or as well and is plainer.
+  /// Whether one was.
+  bool exchange();
+  /// Dry friction in one direction only is Coulomb friction with a constant force as large.
+  static bool is_half_of(std::size_t half, std::size_t effect);
+  /// What an effect that the plant file lacks may be in plain words, with the values at which it is nearly
+  /// the same force.
+  struct Simpler {
+    std::size_t effect = 0;
+    std::vector<PlantEffect> others;
+  };
+  /// That dry friction acts in one direction only, exactly, would be chance: it is Coulomb friction and a
+  /// constant force. A spring whose middle the cart is nowhere near is a constant force.
+  std::vector<Simpler> simpler_forms() const;
+  /// Puts one of these in the place of what was found, where the data bear the change of parameters out.
+  /// Whether it did.
+  bool simplify();
+  /// Two effects can hide each other, so that a third, which resembles both, is found instead. Every pair of
+  /// these is tried in the place of what was found of them, once. Whether one is better.
+  bool try_pairs(const std::vector<std::pair<std::size_t, Hypothesis>>& contenders);
+  /// Backward deletion: what is no longer needed once others are there goes.
+  void prune();
+  /// What the search says of one effect of a hypothesis.
+  using Holds = bool (Search::*)(const Hypothesis&, std::size_t) const;
+  /// Whether it holds of another effect that was found now, and no longer with `h`.
+  bool bends_another(const Hypothesis& h, std::size_t effect, Holds holds) const;
+  bool is_found(std::size_t effect) const;
+
+  Search& search_;
+  const DiagnosisOptions& options_;
+  Diagnosis& record_;
+  Hypothesis given_, current_;
+  std::vector<std::size_t> found_;
+  std::optional<Standing> standing_;
+  bool contradicted_ = false;
+  std::set<std::pair<std::size_t, std::size_t>> exchanged_;   ///< tried already
+  std::set<std::pair<std::size_t, std::size_t>> simplified_;  ///< tried already, beside so many
+  std::map<std::size_t, std::vector<std::size_t>> near_;
+  std::map<std::size_t, std::string> where_;
+  std::vector<std::pair<std::size_t, Hypothesis>> finalists_;
+  std::vector<std::pair<std::size_t, Hypothesis>> resembling_;  ///< screened, of the first round
+  std::set<std::pair<std::size_t, std::size_t>> paired_;        ///< tried already
+};
+
+}  // namespace upright

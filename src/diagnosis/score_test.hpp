@@ -1,0 +1,24 @@
+// Whether an effect that a fitted model lacks would make it better, told by the derivatives at the fit.
+#pragma once
+
+#include <string_view>
+#include <vector>
+
+#include "candidates.hpp"
+
+namespace upright {
+
+/// The effect of the registry that promises most, and by how much minus twice the log likelihood would fall
+/// with it.
+struct PromisedEffect {
+  std::size_t effect = 0;
+  double fall = 0.0;
+};
+
+/// `fitted` is the fit of `data` in which `free` moved. Effects in its plant are not tried, nor those
+/// `tried_already`. Where a step must be cut short, what it promises is what the shorter step promises.
+PromisedEffect most_promising_effect(const FitData& data, const FitResult& fitted,
+                                     const std::vector<FreeParameter>& free, const DataRange& range,
+                                     const std::vector<std::string_view>& tried_already);
+
+}  // namespace upright

@@ -1,0 +1,559 @@
+#include "search.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <numeric>
+
+#include "effect_starts.hpp"
+#include "residual.hpp"
+
+namespace upright {
+
+namespace {
+
+constexpr double infinity = std::numeric_limits<double>::infinity();
+
+/// The same motion with another plant, whose sensors may show it otherwise.
+FitPoint moved_to(FitPoint point, const Plant& plant) {
+  follow_sensors(point.starts, point.plant, plant);
+  point.plant = plant;
+  return point;
+}
+
+std::set<std::size_t> effects_of_both(const Hypothesis& first, const Hypothesis& second) {
+  std::set<std::size_t> effects = first.added;
+  effects.insert(second.added.begin(), second.added.end());
+  return effects;
+}
+
+/// A few steps with the noise as it is.
+FitOptions screening() {
+  FitOptions options;
+  options.noise_rounds = 0;
+  options.noise_last = true;
+  options.most_iterations = 4;
+  return options;
+}
+
+/// What a fit says of its parameters, as a belief. What it says nothing of is believed to be where it is.
+Belief belief_of(const Hypothesis& h) {
+  const auto n = static_cast<Eigen::Index>(h.free.size());
+  Belief belief{Eigen::VectorXd(n), Eigen::MatrixXd::Zero(n, n)};
+  if (n == 0) return belief;
+  Eigen::VectorXd scale(n);
+  for (Eigen::Index j = 0; j < n; ++j) {
+    const FreeParameter& p = h.free[static_cast<std::size_t>(j)];
+    belief.mean[j] = h.train.point.plant.find(p.effect)->values[p.index];
+    scale[j] = std::sqrt(h.train.covariance(j, j));
+    if (!(scale[j] > 0.0)) scale[j] = 1e-6 * p.scale;
+  }
+  const Eigen::MatrixXd unscale = scale.cwiseInverse().asDiagonal();
+  const Eigen::MatrixXd correlation = unscale * h.train.covariance * unscale;
+  // Nearly the same force twice makes this singular; rounding must not make it a belief in the impossible.
+  constexpr double least = 1e-9;
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(0.5 * (correlation + correlation.transpose()));
+  const Eigen::VectorXd inverse = solver.eigenvalues().cwiseMax(least).cwiseInverse();
+  belief.information =
+      unscale * solver.eigenvectors() * inverse.asDiagonal() * solver.eigenvectors().transpose() * unscale;
+  return belief;
+}
+
+double log_determinant(const Eigen::MatrixXd& information) {
+  if (information.size() == 0) return 0.0;
+  return information.ldlt().vectorD().array().abs().max(1e-300).log().sum();
+}
+
+/// Mean over its standard error.
+double t_of(const std::vector<double>& values) {
+  if (values.size() < 2) return 0.0;
+  const auto n = static_cast<double>(values.size());
+  double mean = 0.0, spread = 0.0;
+  for (const double v : values) mean += v / n;
+  for (const double v : values) spread += (v - mean) * (v - mean) / (n - 1.0);
+  return mean / std::sqrt(std::max(spread / n, 1e-12));
+}
+
+}  // namespace
+
+Improvement compare(const Hypothesis& simpler, const Hypothesis& richer) {
+  Improvement result;
+  if (!std::isfinite(richer.train.objective)) return {-infinity, -infinity, -infinity, -infinity};
+  std::vector<double> falls;
+  const std::size_t blocks =
+      std::min(simpler.train.block_objective.size(), richer.train.block_objective.size());
+  for (std::size_t b = 0; b < blocks; ++b)
+    falls.push_back(simpler.train.block_objective[b] - richer.train.block_objective[b]);
+  result.train = simpler.train.objective - richer.train.objective;
+  result.belief = std::accumulate(falls.begin(), falls.end(), result.train, std::minus<>());
+  result.held = simpler.surprise - richer.surprise;
+  result.t_value = t_of(falls);
+  return result;
+}
+
+std::vector<ParameterEstimate> estimates_of(std::size_t effect, const Hypothesis& h) {
+  std::vector<ParameterEstimate> result;
+  const EffectInfo& info = effect_registry()[effect];
+  for (std::size_t i = 0; i < info.parameters.size(); ++i) {
+    ParameterEstimate e;
+    e.name = info.parameters[i].name;
+    e.unit = info.parameters[i].unit;
+    e.value = h.train.point.plant.find(effect)->values[i];
+    e.low = e.high = e.value;
+    for (std::size_t j = 0; j < h.free.size(); ++j) {
+      if (h.free[j].effect != effect || h.free[j].index != i) continue;
+      const auto at = static_cast<Eigen::Index>(j);
+      const double sigma = std::sqrt(std::max(h.train.covariance(at, at), 0.0));
+      e.low = e.value - 1.96 * sigma;
+      e.high = e.value + 1.96 * sigma;
+    }
+    result.push_back(e);
+  }
+  return result;
+}
+
+Search::Search(const Plant& plant, const std::vector<Measurement>& runs, const FitData& train,
+               const FitData& held)
+    : given_(plant), plant_(plant), train_(train), held_(held), range_(range_of(runs, plant)) {
+  for (const PlantEffect& effect : plant.effects) nuisances_.push_back(effect.number);
+  for (const std::size_t effect : base_corrections(plant, range_)) {
+    nuisances_.push_back(effect);
+    plant_.set(effect, std::vector<double>{effect_registry()[effect].parameters[0].neutral});
+  }
+  // Runs differ, segments of a run are alike: take them in turn.
+  constexpr std::size_t least_segments = 6, most_stride = 3;
+  const std::size_t stride = std::clamp<std::size_t>(train_.segments.size() / least_segments, 1, most_stride);
+  sieve_every(stride);
+  train_starts_ = guess_starts(runs, train.segments, plant_);
+  held_starts_ = guess_starts(runs, held.segments, plant_);
+}
+
+bool Search::is_nuisance(std::size_t effect) const {
+  return std::find(nuisances_.begin(), nuisances_.end(), effect) != nuisances_.end();
+}
+
+void Search::sieve_every(std::size_t stride) {
+  sieve_ = {train_.runs, {}, train_.bound};
+  sieve_places_.clear();
+  for (std::size_t s = 0; s < train_.segments.size(); s += stride) {
+    sieve_.segments.push_back(train_.segments[s]);
+    sieve_places_.push_back(s);
+  }
+}
+
+void Search::sieve_all() {
+  sieve_every(1);
+}
+
+std::vector<FreeParameter> Search::free_of(const std::set<std::size_t>& added) const {
+  std::vector<FreeParameter> free;
+  for (const std::size_t effect : nuisances_) {
+    const auto parameters = added.contains(effect) ? free_parameters(effect, range_)
+                                                   : believed_parameters(given_, effect, range_);
+    free.insert(free.end(), parameters.begin(), parameters.end());
+  }
+  for (const std::size_t effect : added) {
+    if (std::find(nuisances_.begin(), nuisances_.end(), effect) != nuisances_.end()) continue;
+    const auto parameters = free_parameters(effect, range_);
+    free.insert(free.end(), parameters.begin(), parameters.end());
+  }
+  return free;
+}
+
+Hypothesis Search::fitted(const std::set<std::size_t>& added, const FitPoint& start,
+                          const FitOptions& options, const std::vector<FreeParameter>& free) {
+  Hypothesis h;
+  h.added = added;
+  h.free = free;
+  h.train = fit(train_, start, free, options);
+  h.valid = std::isfinite(h.train.objective);
+  return h;
+}
+
+void Search::calm(Hypothesis& h, const FitOptions& options) {
+  if (!h.valid) return;
+  FitPoint point = h.train.point;
+  point.noise = calmed(point.noise);
+  Hypothesis again = fitted(h.added, point, options, h.free);
+  if (again.train.objective < h.train.objective) h = std::move(again);
+}
+
+bool Search::may_calm(const Hypothesis& base, const Hypothesis& h) const {
+  // Where every bit of evidence counts, the whole data are asked.
+  constexpr double clear_evidence = 1000.0;
+  if (sieve_.segments.size() == train_.segments.size()) return true;
+  if (!(base.train.objective - h.train.objective > clear_evidence)) return true;
+  FitPoint point = sieve_point(h);
+  const double as_it_is = fit(sieve_, point, h.free, screening()).objective;
+  point.noise = calmed(point.noise);
+  // What another way to the same place makes of an objective.
+  constexpr double of_the_way = 10.0;
+  return fit(sieve_, point, h.free, {}).objective < as_it_is - of_the_way;
+}
+
+void Search::judge(Hypothesis& h, const Noise& noise) const {
+  if (!std::isfinite(h.train.objective)) return;
+  const FitPoint plain{plant_, held_starts_, noise};
+  const FitPoint point = moved_to(plain, h.train.point.plant);
+  h.held = follow(held_, point, 6);
+}
+
+const PlainSimulation& Search::simulate(Hypothesis& h) const {
+  if (h.simulation) return *h.simulation;
+  Hypothesis plain = h;
+  judge(plain, sensors_only(h.train.point.noise));
+  const FitResult& simulated = held_.segments.empty() ? plain.train : plain.held;
+  h.simulation.emplace(PlainSimulation{gap_of(plain), {}});
+  for (std::size_t s = 0; s < simulated.segment_chi_square.size(); ++s)
+    h.simulation->segment_gap.push_back(
+        std::sqrt(simulated.segment_chi_square[s] / std::max(simulated.segment_samples[s], 1e-9)));
+  return *h.simulation;
+}
+
+double Search::gap_of(const Hypothesis& h) const {
+  return held_.segments.empty() ? whitened_rms(h.train) : whitened_rms(h.held);
+}
+
+bool Search::is_plausible(const Hypothesis& h, std::size_t effect) const {
+  for (const FreeParameter& p : h.free) {
+    if (p.effect != effect) continue;
+    const double value = h.train.point.plant.find(effect)->values[p.index];
+    if (p.index == 0 && value == effect_registry()[effect].parameters[0].neutral) return false;
+    if (kind_of(effect).starts_with("angle_offset") && std::abs(value) < 1.5 * range_.theta_resolution_rad)
+      return false;
+  }
+  return can_be(h, effect);
+}
+
+bool Search::can_be(const Hypothesis& h, std::size_t effect) const {
+  for (const FreeParameter& p : h.free)
+    if (p.effect == effect && p.index == 0 && !(h.train.point.plant.find(effect)->values[0] < p.high))
+      return false;
+  return kind_of(effect) != "bristle_friction" || bristles_are_short(h);
+}
+
+bool Search::bristles_are_short(const Hypothesis& h) const {
+  const Plant& plant = h.train.point.plant;
+  const Dynamics<double> dynamics(make_model<double>(plant));
+  const double breakaway_n = dynamics.cart_dry_level(range_.cart_mean_m, 0.0, 1.0);
+  const double stiffness_n_per_m = plant.find(effect_number("bristle_friction"))->values[0];
+  constexpr double share_of_travel = 0.1;
+  return breakaway_n < stiffness_n_per_m * share_of_travel * (range_.cart_high_m - range_.cart_low_m);
+}
+
+double Search::certainty(const Hypothesis& h, std::size_t effect) const {
+  std::vector<Eigen::Index> own;
+  for (std::size_t j = 0; j < h.free.size(); ++j)
+    if (h.free[j].effect == effect) own.push_back(static_cast<Eigen::Index>(j));
+  if (own.empty() || h.free[static_cast<std::size_t>(own.front())].index != 0) return 0.0;
+  const PlantEffect* given = given_.find(effect);
+  const double nothing =
+      given != nullptr ? given->values[0] : effect_registry()[effect].parameters[0].neutral;
+  if (!std::isfinite(nothing)) return infinity;
+  const Eigen::MatrixXd covariance = h.train.covariance(own, own);
+  if (!(covariance(0, 0) > 0.0)) return infinity;  // not estimated: held at the end of its range
+  const Eigen::VectorXd scale = covariance.diagonal().cwiseMax(1e-300).cwiseSqrt();
+  const Eigen::MatrixXd correlation =
+      scale.cwiseInverse().asDiagonal() * covariance * scale.cwiseInverse().asDiagonal();
+  const double held = correlation.completeOrthogonalDecomposition().pseudoInverse()(0, 0);
+  return std::abs(h.train.point.plant.find(effect)->values[0] - nothing) / scale[0] *
+         std::sqrt(std::max(held, 1.0));
+}
+
+void Search::weigh(Hypothesis& h) const {
+  judge(h, h.train.point.noise);
+  if (std::isfinite(h.train.objective)) h.surprise = surprise_of(h);
+}
+
+std::vector<PlantState<double>> Search::sieve_starts(const std::vector<PlantState<double>>& starts) const {
+  std::vector<PlantState<double>> some;
+  some.reserve(sieve_places_.size());
+  for (const std::size_t place : sieve_places_) some.push_back(starts[place]);
+  return some;
+}
+
+FitPoint Search::sieve_point(const Hypothesis& base) const {
+  return {base.train.point.plant, sieve_starts(base.train.point.starts), base.train.point.noise};
+}
+
+double Search::surprise_of(const Hypothesis& h) const {
+  if (!std::isfinite(h.held.objective) || held_.segments.empty()) return h.held.objective;
+  FitOptions options;
+  options.noise_rounds = 1;
+  options.most_iterations = 4;
+  options.belief = belief_of(h);
+  const FitResult told = fit(held_, h.held.point, h.free, options);
+  // Laplace's approximation of the likelihood, averaged over what the training runs left open.
+  return told.objective + log_determinant(told.information) - log_determinant(options.belief->information);
+}
+
+Hypothesis Search::told(const Hypothesis& h) const {
+  FitOptions options;
+  options.noise_rounds = 0;
+  options.belief = belief_of(h);
+  FitPoint point = h.held.point;
+  point.noise = h.train.point.noise;
+  const FitResult held = fit(held_, point, h.free, options);
+  if (!std::isfinite(held.objective)) return h;
+  Hypothesis result = h;
+  result.train.point.plant = held.point.plant;
+  result.held = held;
+  result.simulation.reset();
+  return result;
+}
+
+Hypothesis Search::baseline() {
+  const FitPoint start =
+      with_starts_followed(train_, {plant_, train_starts_, {.force = 0.1, .torque = 0.01}});
+  FitOptions options;
+  Hypothesis h = fitted({}, start, options, free_of({}));
+  options.most_iterations = 24;
+  calm(h, options);
+  weigh(h);
+  return h;
+}
+
+std::vector<FitPoint> Search::points_with(const FitPoint& from, std::size_t effect,
+                                          const Hypothesis& base) const {
+  if (from.plant.find(effect) != nullptr) return {from};
+  std::vector<FitPoint> points;
+  for (const std::vector<double>& values : starts_of(effect, base)) {
+    Plant plant = from.plant;
+    plant.set(effect, values);
+    points.push_back(moved_to(from, plant));
+  }
+  return points;
+}
+
+std::vector<double> Search::promised_gains(const Hypothesis& base,
+                                           const std::vector<std::size_t>& effects) const {
+  FitOptions only_look;
+  only_look.most_iterations = 0;
+  only_look.noise_rounds = 0;
+  const auto promise = [&](const FitPoint& point, const std::vector<FreeParameter>& free) {
+    const FitResult seen = fit(sieve_, point, free, only_look);
+    return seen.promised_fall ? seen.objective - *seen.promised_fall : -infinity;
+  };
+  const FitPoint from = sieve_point(base);
+  const double without = promise(from, base.free);
+  std::vector<double> gains;
+  for (const std::size_t effect : effects) {
+    std::set<std::size_t> added = base.added;
+    added.insert(effect);
+    const std::vector<FreeParameter> free = free_of(added);
+    double least = infinity;
+    for (const FitPoint& point : points_with(from, effect, base))
+      least = std::min(least, promise(point, free));
+    gains.push_back(std::isfinite(without) ? without - least : infinity);
+  }
+  return gains;
+}
+
+Hypothesis Search::screened(const Hypothesis& base, std::size_t effect) const {
+  std::set<std::size_t> added = base.added;
+  added.insert(effect);
+  const std::vector<FreeParameter> free = free_of(added);
+  Hypothesis best;
+  best.train.objective = infinity;
+  for (const FitPoint& point : points_with(sieve_point(base), effect, base)) {
+    Hypothesis h;
+    h.added = added;
+    h.free = free;
+    h.train = fit(sieve_, point, free, screening());
+    if (h.train.objective < best.train.objective) best = std::move(h);
+  }
+  return best;
+}
+
+Hypothesis Search::screened_pair(const Hypothesis& base, const Hypothesis& first,
+                                 const Hypothesis& second) const {
+  FitPoint point = pair_point(base, first, second);
+  point.starts = sieve_starts(point.starts);
+  Hypothesis h;
+  h.added = effects_of_both(first, second);
+  h.free = free_of(h.added);
+  // Each was fitted as if it were alone: the way from there is longer than a few steps.
+  h.train = fit(sieve_, point, h.free, FitOptions{});
+  return h;
+}
+
+void Search::settle_on_sieve(Hypothesis& h) const {
+  if (std::isfinite(h.train.objective)) h.train = fit(sieve_, h.train.point, h.free, {});
+}
+
+Hypothesis Search::sieved(const Hypothesis& base) const {
+  FitOptions options = screening();
+  options.most_iterations = 2;
+  Hypothesis h;
+  h.added = base.added;
+  h.free = base.free;
+  h.train = fit(sieve_, sieve_point(base), base.free, options);
+  return h;
+}
+
+void Search::refit(const Hypothesis& base, Hypothesis& h) {
+  if (!std::isfinite(h.train.objective)) return;
+  FitOptions options;
+  options.or_noise = base.train.point.noise;
+  FitPoint point = moved_to(base.train.point, h.train.point.plant);
+  point.noise = h.train.point.noise;
+  h = fitted(h.added, point, options, h.free);
+}
+
+void Search::refine(const Hypothesis& base, Hypothesis& h) {
+  if (!std::isfinite(h.train.objective)) return;
+  refit(base, h);
+  if (may_calm(base, h)) calm(h, {});
+  weigh(h);
+}
+
+Hypothesis Search::begun_anew(const Hypothesis& base) {
+  FitPoint point = base.train.point;
+  point.starts = guess_starts(*train_.runs, train_.segments, point.plant);
+  Hypothesis h = fitted(base.added, point, FitOptions{}, base.free);
+  const Hypothesis followed =
+      fitted(base.added, with_starts_followed(train_, h.train.point), FitOptions{}, base.free);
+  if (followed.train.objective < h.train.objective) h = followed;
+  calm(h, {});
+  weigh(h);
+  return h;
+}
+
+Hypothesis Search::exchanged(const Hypothesis& base, std::size_t effect,
+                             const std::vector<PlantEffect>& others) {
+  std::set<std::size_t> added = base.added;
+  Plant plant = base.train.point.plant;
+  added.erase(effect);
+  plant.remove(effect);
+  for (const PlantEffect& other : others) {
+    added.insert(other.number);
+    plant.set(other.number, other.values);
+  }
+  Hypothesis h = fitted(added, moved_to(base.train.point, plant), FitOptions{}, free_of(added));
+  weigh(h);
+  return h;
+}
+
+Hypothesis Search::without(const Hypothesis& base, std::size_t effect) {
+  std::set<std::size_t> added = base.added;
+  added.erase(effect);
+  Plant plant = base.train.point.plant;
+  if (const PlantEffect* given = plant_.find(effect)) {
+    plant.set(effect, given->values);
+  } else {
+    plant.remove(effect);
+  }
+  Hypothesis h;
+  h.train.objective = infinity;
+  if (!fault_of(plant).empty()) return h;
+  const FitPoint point = moved_to(base.train.point, plant);
+  FitOptions options;
+  h = fitted(added, point, options, free_of(added));
+  weigh(h);
+  return h;
+}
+
+Hypothesis Search::only(const std::vector<std::size_t>& effects, const Hypothesis& from,
+                        const Noise* fixed_noise, bool settled) {
+  Plant plant = plant_;
+  std::vector<FreeParameter> free;
+  const auto include = [&](std::size_t effect, const std::vector<FreeParameter>& parameters) {
+    if (const PlantEffect* reached = from.train.point.plant.find(effect)) plant.set(effect, reached->values);
+    free.insert(free.end(), parameters.begin(), parameters.end());
+  };
+  for (const std::size_t effect : effects) {
+    // What stands in the plant file is believed, if less firmly, even where the data correct it.
+    const bool correction = is_nuisance(effect);
+    constexpr double less_firmly = 4.0;
+    std::vector<FreeParameter> parameters =
+        correction ? believed_parameters(given_, effect, range_) : free_parameters(effect, range_);
+    for (FreeParameter& p : parameters) p.prior_sigma *= correction ? less_firmly : 1.0;
+    include(effect, parameters);
+  }
+  for (const std::size_t effect : nuisances_) {
+    if (std::find(effects.begin(), effects.end(), effect) != effects.end()) continue;
+    // The zero of the angle is known to a count only, whatever else is.
+    const bool zero = effect == effect_number("angle_offset") && given_.find(effect) == nullptr;
+    if (settled || zero) include(effect, believed_parameters(given_, effect, range_));
+  }
+  FitPoint point = moved_to(from.train.point, plant);
+  FitOptions options;
+  if (fixed_noise != nullptr) options.noise_rounds = 0;
+  if (fixed_noise != nullptr) point.noise = *fixed_noise;
+  return fitted({effects.begin(), effects.end()}, point, options, free);
+}
+
+Hypothesis Search::on_all(const Hypothesis& h) const {
+  FitData all = train_;
+  all.segments.insert(all.segments.end(), held_.segments.begin(), held_.segments.end());
+  FitPoint point = h.train.point;
+  point.starts.insert(point.starts.end(), h.held.point.starts.begin(), h.held.point.starts.end());
+  Hypothesis result = h;
+  result.simulation.reset();
+  result.train = fit(all, point, h.free, FitOptions{});
+  result.valid = std::isfinite(result.train.objective);
+  return result.valid ? result : h;
+}
+
+Hypothesis Search::opened(const Hypothesis& h, std::size_t effect) const {
+  Hypothesis result;
+  result.added = h.added;
+  result.free = h.free;
+  FitPoint point = h.train.point;
+  const EffectInfo& info = effect_registry()[effect];
+  bool there = false;
+  for (FreeParameter& p : result.free) {
+    if (p.effect != effect) continue;
+    p.prior_sigma = 0.0;
+    there = true;
+  }
+  if (!there) {
+    if (point.plant.find(effect) == nullptr) {
+      std::vector<double> values = search_starts(effect, range_, {}).front();
+      for (std::size_t i = 0; i < values.size(); ++i)
+        if (!std::isnan(info.parameters[i].neutral)) values[i] = info.parameters[i].neutral;
+      Plant plant = point.plant;
+      plant.set(effect, values);
+      point = moved_to(point, plant);
+    }
+    for (FreeParameter p : free_parameters(effect, range_)) {
+      // Where it does nothing may be the end of its range.
+      p.low = -infinity;
+      p.high = infinity;
+      result.free.push_back(p);
+    }
+  }
+  FitOptions only_look;
+  only_look.most_iterations = 0;
+  only_look.noise_rounds = 0;
+  result.train = fit(train_, point, result.free, only_look);
+  result.valid = std::isfinite(result.train.objective);
+  return result;
+}
+
+FitPoint Search::pair_point(const Hypothesis& base, const Hypothesis& first, const Hypothesis& second) const {
+  Plant plant = base.train.point.plant;
+  Noise noise = base.train.point.noise;
+  for (const Hypothesis* h : {&first, &second}) {
+    noise.force = std::min(noise.force, h->train.point.noise.force);
+    noise.torque = std::min(noise.torque, h->train.point.noise.torque);
+    for (const std::size_t effect : h->added) plant.set(effect, h->train.point.plant.find(effect)->values);
+  }
+  FitPoint point = moved_to(base.train.point, plant);
+  point.noise = noise;
+  return point;
+}
+
+Hypothesis Search::with_pair(const Hypothesis& base, const Hypothesis& first, const Hypothesis& second) {
+  const std::set<std::size_t> added = effects_of_both(first, second);
+  Hypothesis h = fitted(added, pair_point(base, first, second), FitOptions{}, free_of(added));
+  weigh(h);
+  return h;
+}
+
+std::vector<std::vector<double>> Search::starts_of(std::size_t effect, const Hypothesis& base) const {
+  return effect_starts(effect, range_, train_, base.train.point);
+}
+
+}  // namespace upright

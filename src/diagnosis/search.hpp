@@ -1,0 +1,162 @@
+// The search for missing effects: nested fits, forward by evidence, then backward deletion.
+#pragma once
+
+#include <map>
+#include <optional>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "candidates.hpp"
+#include "upright/diagnosis/diagnosis.hpp"
+#include "upright/estimation/fit.hpp"
+
+namespace upright {
+
+/// A plain simulation of held-out data, in units of the sensors' noise.
+struct PlainSimulation {
+  double gap = 0.0;                 ///< root mean square of all that is off
+  std::vector<double> segment_gap;  ///< the same, by segment
+};
+
+/// A set of effects fitted to the training data and judged on held-out data.
+struct Hypothesis {
+  std::set<std::size_t> added;  ///< effects freed beyond what the plant file says
+  FitResult train;
+  FitResult held;         ///< initial states only, plant and noise from `train`
+  double surprise = 0.0;  ///< of the held-out data: minus twice the log of their likelihood, with noise of
+                          ///< their own, averaged over what the training data leave open of the parameters;
+                          ///< not of what `only` and `on_all` made
+  std::vector<FreeParameter> free;  ///< the parameters that moved, in the order of train.covariance
+  bool valid = false;               ///< fitted, and no parameter at a bound that makes it another effect
+  std::optional<PlainSimulation> simulation;  ///< once measured
+};
+
+/// How much better one hypothesis is than another, robust to residuals that are not white: sums over blocks
+/// of a quarter of a second.
+struct Improvement {
+  double train = 0.0;    ///< fall of the objective on training data
+  double belief = 0.0;   ///< of that, what is believed of the parameters: they need not go so far from it
+  double held = 0.0;     ///< of the surprise of held-out data
+  double t_value = 0.0;  ///< of the mean fall per quarter of a second of training data
+};
+
+Improvement compare(const Hypothesis& simpler, const Hypothesis& richer);
+
+/// Two explanations whose evidence differs by less than this, or by less than its own scatter, are not told
+/// apart.
+inline constexpr double confusable_evidence = 16.0;
+
+/// What a hypothesis says about one effect, as numbers with intervals.
+std::vector<ParameterEstimate> estimates_of(std::size_t effect, const Hypothesis& h);
+
+class Search {
+ public:
+  Search(const Plant& plant, const std::vector<Measurement>& runs, const FitData& train, const FitData& held);
+
+  const DataRange& range() const { return range_; }
+  /// The plant file's own effects and the corrections of its numbers: in every hypothesis, within what is
+  /// believed of them.
+  const std::vector<std::size_t>& nuisances() const { return nuisances_; }
+  bool is_nuisance(std::size_t effect) const;
+  const FitData& train_data() const { return train_; }
+  const FitData& held_data() const { return held_; }
+
+  /// All of the training data are looked at from now on, not a part of them first.
+  void sieve_all();
+  /// How much of the training data is looked at first.
+  double sieve_share() const {
+    return static_cast<double>(sieve_.segments.size()) / static_cast<double>(train_.segments.size());
+  }
+
+  /// Base corrections and the plant's own effects within what is believed of them.
+  Hypothesis baseline();
+  /// How far the objective falls on a part of the training data when each of these is added, as its
+  /// derivatives promise it from the best of its starts: quick, and only a promise. Infinite where they do
+  /// not reach so far.
+  std::vector<double> promised_gains(const Hypothesis& base, const std::vector<std::size_t>& effects) const;
+  /// Adds an effect to a hypothesis: a few steps from every start with the noise as it is, on a part of the
+  /// training data.
+  Hypothesis screened(const Hypothesis& base, std::size_t effect) const;
+  /// Brings a screened hypothesis to convergence on that part, noise included.
+  void settle_on_sieve(Hypothesis& screened) const;
+  /// Two effects at once on that part, from where each alone was fitted, to convergence.
+  Hypothesis screened_pair(const Hypothesis& base, const Hypothesis& first, const Hypothesis& second) const;
+  /// A hypothesis on that part alone, with which to compare.
+  Hypothesis sieved(const Hypothesis& base) const;
+  /// Brings a screened hypothesis to convergence on the whole training data, noise included, and judges it.
+  void refine(const Hypothesis& base, Hypothesis& hypothesis);
+  /// The same without judging it, from the noise that it has.
+  void refit(const Hypothesis& base, Hypothesis& hypothesis);
+  /// The same hypothesis without one effect.
+  Hypothesis without(const Hypothesis& base, std::size_t effect);
+  /// The same hypothesis from initial states that are guessed from the data once more: those that suited a
+  /// poor model keep a good one from its place.
+  Hypothesis begun_anew(const Hypothesis& base);
+  /// The same hypothesis with others, at these values to begin with, in the place of one effect.
+  Hypothesis exchanged(const Hypothesis& base, std::size_t effect, const std::vector<PlantEffect>& others);
+  /// These effects free with nothing believed of them beforehand. Everything else as in the plant file, or
+  /// `settled`: within what is believed of it. Not judged.
+  Hypothesis only(const std::vector<std::size_t>& effects, const Hypothesis& from, const Noise* fixed_noise,
+                  bool settled = false);
+  /// The same point with one effect more left open, with nothing believed of it and where it does nothing:
+  /// what the data then still say of the others.
+  Hypothesis opened(const Hypothesis& h, std::size_t effect) const;
+  /// The same effects fitted to all runs, held-out ones too: what is known once the choice is made.
+  Hypothesis on_all(const Hypothesis& h) const;
+  /// Adds two effects at once to a hypothesis and fits to convergence.
+  Hypothesis with_pair(const Hypothesis& base, const Hypothesis& first, const Hypothesis& second);
+  /// A hypothesis with its parameters moved to what the held-out data say too, as far as the training runs
+  /// leave them open; the noise stays.
+  Hypothesis told(const Hypothesis& h) const;
+  /// Follows held-out data with this noise.
+  void judge(Hypothesis& hypothesis, const Noise& noise) const;
+  /// A plain simulation of held-out data, at its first call (of training data where none is held out).
+  const PlainSimulation& simulate(Hypothesis& h) const;
+  /// How far off what was judged is, in units of its noise.
+  double gap_of(const Hypothesis& h) const;
+  /// A hypothesis in which the new effect does nothing, or is of a size that makes it another effect, has
+  /// lost.
+  bool is_plausible(const Hypothesis& h, std::size_t effect) const;
+  /// The second half of that: no size at the end of its range, no bristles that are a spring.
+  bool can_be(const Hypothesis& h, std::size_t effect) const;
+  /// How many standard errors the size of an effect is from nothing: from what the plant file says, of a
+  /// correction. Its other parameters (a shape, a place) are held: without a size they mean nothing.
+  double certainty(const Hypothesis& h, std::size_t effect) const;
+
+ private:
+  void sieve_every(std::size_t stride);
+  /// Follows held-out data with the fitted noise, for their surprise.
+  void weigh(Hypothesis& h) const;
+  double surprise_of(const Hypothesis& h) const;
+  /// Bristles that bend over a good part of the track before they slide are a spring by another name.
+  bool bristles_are_short(const Hypothesis& h) const;
+  /// A hypothesis's point on the sieve alone.
+  FitPoint sieve_point(const Hypothesis& base) const;
+  std::vector<FreeParameter> free_of(const std::set<std::size_t>& added) const;
+  std::vector<std::vector<double>> starts_of(std::size_t effect, const Hypothesis& base) const;
+  /// A point with an effect added, at each of its starts; a correction that is there already starts where it
+  /// is.
+  std::vector<FitPoint> points_with(const FitPoint& from, std::size_t effect, const Hypothesis& base) const;
+  /// Where a pair starts, on all of the training data.
+  FitPoint pair_point(const Hypothesis& base, const Hypothesis& first, const Hypothesis& second) const;
+  std::vector<PlantState<double>> sieve_starts(const std::vector<PlantState<double>>& starts) const;
+  /// Fits once more from less noise, and keeps what is better: much noise and a poor fit hold each other up.
+  void calm(Hypothesis& h, const FitOptions& options);
+  /// Whether a fit from less noise may find better: of what is far better than `base`, as a part of the
+  /// training data says.
+  bool may_calm(const Hypothesis& base, const Hypothesis& h) const;
+  Hypothesis fitted(const std::set<std::size_t>& added, const FitPoint& start, const FitOptions& options,
+                    const std::vector<FreeParameter>& free);
+
+  Plant given_;  ///< the plant file
+  Plant plant_;  ///< the same with every correction at its neutral value
+  FitData train_, held_;
+  FitData sieve_;  ///< every few training segments: enough to see which candidates are worth a whole fit
+  std::vector<std::size_t> sieve_places_;
+  DataRange range_;
+  std::vector<std::size_t> nuisances_;
+  std::vector<PlantState<double>> train_starts_, held_starts_;
+};
+
+}  // namespace upright

@@ -1,0 +1,24 @@
+// Which of the data are held out: whole runs, or segments of a single one.
+#pragma once
+
+#include <vector>
+
+#include "upright/estimation/fit.hpp"
+
+namespace upright {
+
+/// The data in two parts, by run and never by sample.
+struct DataSplit {
+  FitData train, held;
+  std::vector<std::size_t> held_out_runs;  ///< none of a single run, a third of whose segments is held out
+};
+
+/// Which of each three in the order of how lively they are is held out: the middle one, alike to the rest, or
+/// another, where the fit needs what only that middle one shows. (Of two the calmer one, or the other.) `end`
+/// is `middle` of several runs, and the last third of a single one.
+enum class HeldOut { middle, other, end };
+
+/// Holds out a third.
+DataSplit split(const std::vector<Measurement>& runs, HeldOut which);
+
+}  // namespace upright

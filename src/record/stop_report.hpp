@@ -1,0 +1,19 @@
+// The words for whether the motor is known to be at zero volts.
+#pragma once
+
+#include <string>
+
+#include "upright/hal/rig.hpp"
+
+namespace upright {
+
+/// "confirmed" or "not_confirmed".
+const char* name_of_zero(const StopReport& report) noexcept;
+
+/// What is known, in one sentence; in capitals, and with what to do, where somebody has to act.
+std::string sentence_of(const StopReport& report);
+
+/// Why zero volts is not confirmed yet: "no reply in time", "exception 06 (device busy)", ...
+std::string reason_of(const StopReport& report);
+
+}  // namespace upright

@@ -1,0 +1,39 @@
+// What an unfinished sweep has done, on disk: one line per group of runs, each readable once it is whole.
+#pragma once
+
+#include <cstdio>
+#include <filesystem>
+#include <map>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "sweep.hpp"
+
+namespace upright {
+
+class SweepJournal {
+ public:
+  /// Opens the journal of a sweep with this text, with whatever an earlier call left in it. Throws
+  /// ConfigError when it belongs to another sweep, Error when it cannot be written.
+  SweepJournal(const std::filesystem::path& file, const std::string& sweep_text);
+  ~SweepJournal();
+  SweepJournal(const SweepJournal&) = delete;
+  SweepJournal& operator=(const SweepJournal&) = delete;
+
+  /// The runs of a group when they are there already.
+  const std::vector<SweepRun>* find(std::size_t stage, std::size_t group) const;
+  /// Throws Error when the runs could not be kept.
+  void keep(std::size_t stage, std::size_t group, const std::vector<SweepRun>& runs);
+  /// Throws Error when another program has removed or moved the journal, with its folder or alone.
+  void check() const;
+  /// Once the results are written.
+  void remove();
+
+ private:
+  std::filesystem::path file_;
+  std::FILE* out_ = nullptr;
+  std::map<std::pair<std::size_t, std::size_t>, std::vector<SweepRun>> done_;
+};
+
+}  // namespace upright

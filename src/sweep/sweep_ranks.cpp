@@ -1,0 +1,235 @@
+#include "sweep_ranks.hpp"
+
+#include <cstdlib>
+
+#include "upright/base/error.hpp"
+
+#ifdef UPRIGHT_WITH_MPI
+#include <mpi.h>
+
+#include <algorithm>
+#include <chrono>
+#include <exception>
+#include <mutex>
+#include <thread>
+#endif
+
+namespace upright {
+
+namespace {
+
+bool started_by_mpirun() {
+  for (const char* name : {"OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "PMIX_RANK"})
+    if (std::getenv(name) != nullptr) return true;  // NOLINT(concurrency-mt-unsafe): before any thread
+  return false;
+}
+
+}  // namespace
+
+#ifdef UPRIGHT_WITH_MPI
+
+namespace {
+
+enum Tag : int { work_tag = 1, result_tag = 2, end_tag = 3 };
+constexpr auto patience = std::chrono::microseconds(200);  // between looks for a message; a wait would spin
+
+void send(int rank, Tag tag, const std::vector<double>& numbers) {
+  MPI_Send(numbers.data(), static_cast<int>(numbers.size()), MPI_DOUBLE, rank, tag, MPI_COMM_WORLD);
+}
+
+/// A message from a rank (or any), when there is one.
+bool receive(int from, std::vector<double>& numbers, MPI_Status& status) {
+  int there = 0;
+  MPI_Iprobe(from, MPI_ANY_TAG, MPI_COMM_WORLD, &there, &status);
+  if (there == 0) return false;
+  int count = 0;
+  MPI_Get_count(&status, MPI_DOUBLE, &count);
+  numbers.resize(static_cast<std::size_t>(count));
+  MPI_Recv(numbers.data(), count, MPI_DOUBLE, status.MPI_SOURCE, status.MPI_TAG, MPI_COMM_WORLD, &status);
+  return true;
+}
+
+/// Groups as numbers: for each its number, its size, and its cases.
+void append(std::vector<double>& message, std::size_t number, const SweepTeam::Group& group) {
+  message.push_back(static_cast<double>(number));
+  message.push_back(static_cast<double>(group.size()));
+  for (const LoopCase& start : group) message.insert(message.end(), {start.theta0_rad, start.delay_s});
+}
+
+void append(std::vector<double>& message, std::size_t number, const std::vector<SweepRun>& runs) {
+  message.push_back(static_cast<double>(number));
+  message.push_back(static_cast<double>(runs.size()));
+  for (const SweepRun& run : runs)
+    message.insert(message.end(), {run.start.theta0_rad, run.start.delay_s, run.fall_time_s,
+                                   run.theta_amplitude_rad, run.cart_amplitude_m});
+}
+
+class RankTeam final : public SweepTeam {
+ public:
+  RankTeam(const SweepConfig& config, int ranks, unsigned threads)
+      : config_(config), threads_(threads), idle_(static_cast<std::size_t>(ranks), true) {
+    idle_[0] = false;
+  }
+
+  ~RankTeam() override {
+    std::vector<double> message;
+    MPI_Status status;
+    while (std::count(idle_.begin(), idle_.end(), true) + 1 < static_cast<std::ptrdiff_t>(idle_.size())) {
+      if (receive(MPI_ANY_SOURCE, message, status))
+        idle_[static_cast<std::size_t>(status.MPI_SOURCE)] = true;
+      else
+        std::this_thread::sleep_for(patience);
+    }
+    for (std::size_t rank = 1; rank < idle_.size(); ++rank) send(static_cast<int>(rank), end_tag, {});
+  }
+
+  void run(const std::vector<Group>& groups, const Done& done, const std::atomic<bool>* stop) override {
+    std::atomic<std::size_t> next{0};
+    std::mutex one_at_a_time;
+    std::exception_ptr failure;
+    std::atomic<bool> failed{false};
+    std::size_t away = 0;
+    const auto stopping = [&] { return failed || (stop != nullptr && *stop); };
+    const auto guarded = [&](auto&& work) {
+      try {
+        work();
+      } catch (...) {
+        const std::lock_guard lock(one_at_a_time);
+        if (!failed.exchange(true)) failure = std::current_exception();
+      }
+    };
+    const auto compute_here = [&] {
+      guarded([&] {
+        while (!stopping()) {
+          const std::size_t mine = next++;
+          if (mine >= groups.size()) return;
+          const std::vector<SweepRun> runs = run_sweep_group(config_, groups[mine]);
+          const std::lock_guard lock(one_at_a_time);
+          done(mine, runs);
+        }
+      });
+    };
+    {
+      std::vector<std::jthread> here;
+      for (unsigned i = 0; i < threads_; ++i) here.emplace_back(compute_here);
+      // MPI is called from this thread only.
+      while (away > 0 || (!stopping() && next < groups.size())) {
+        for (std::size_t rank = 1; rank < idle_.size() && !stopping(); ++rank)
+          if (idle_[rank] && hand_out(rank, groups, next)) ++away;
+        std::vector<double> message;
+        MPI_Status status;
+        if (!receive(MPI_ANY_SOURCE, message, status)) {
+          std::this_thread::sleep_for(patience);
+          continue;
+        }
+        idle_[static_cast<std::size_t>(status.MPI_SOURCE)] = true;
+        --away;
+        guarded([&] { take(message, one_at_a_time, done); });
+      }
+    }
+    if (failure) std::rethrow_exception(failure);
+  }
+
+ private:
+  /// Gives a rank as many groups as it has threads. False: none are left.
+  bool hand_out(std::size_t rank, const std::vector<Group>& groups, std::atomic<std::size_t>& next) {
+    std::vector<double> message;
+    for (unsigned i = 0; i < threads_; ++i) {
+      const std::size_t number = next++;
+      if (number >= groups.size()) break;
+      append(message, number, groups[number]);
+    }
+    if (message.empty()) return false;
+    send(static_cast<int>(rank), work_tag, message);
+    idle_[rank] = false;
+    return true;
+  }
+
+  static void take(const std::vector<double>& message, std::mutex& one_at_a_time, const Done& done) {
+    for (std::size_t at = 0; at < message.size();) {
+      const auto number = static_cast<std::size_t>(message[at]);
+      std::vector<SweepRun> runs(static_cast<std::size_t>(message[at + 1]));
+      at += 2;
+      for (SweepRun& run : runs) {
+        run = {{message[at], message[at + 1]}, message[at + 2], message[at + 3], message[at + 4]};
+        at += 5;
+      }
+      const std::lock_guard lock(one_at_a_time);
+      done(number, runs);
+    }
+  }
+
+  const SweepConfig& config_;
+  unsigned threads_;
+  std::vector<bool> idle_;
+};
+
+}  // namespace
+
+SweepRanks::SweepRanks() {
+  if (!started_by_mpirun()) return;
+  int provided = 0;
+  MPI_Init_thread(nullptr, nullptr, MPI_THREAD_FUNNELED, &provided);
+  MPI_Comm_rank(MPI_COMM_WORLD, &rank_);
+  MPI_Comm_size(MPI_COMM_WORLD, &count_);
+}
+
+SweepRanks::~SweepRanks() {
+  int initialized = 0;
+  MPI_Initialized(&initialized);
+  if (initialized != 0) MPI_Finalize();
+}
+
+std::unique_ptr<SweepTeam> SweepRanks::make_team(const SweepConfig& config, unsigned threads) const {
+  if (count_ == 1) return make_thread_team(config, threads);
+  return std::make_unique<RankTeam>(config, count_, std::max(1u, threads));
+}
+
+void SweepRanks::serve(const SweepConfig& config, unsigned threads) const {
+  const std::unique_ptr<SweepTeam> team = make_thread_team(config, std::max(1u, threads));
+  std::vector<double> message;
+  MPI_Status status;
+  while (true) {
+    if (!receive(0, message, status)) {
+      std::this_thread::sleep_for(patience);
+      continue;
+    }
+    if (status.MPI_TAG == end_tag) return;
+    std::vector<std::size_t> numbers;
+    std::vector<SweepTeam::Group> groups;
+    for (std::size_t at = 0; at < message.size();) {
+      numbers.push_back(static_cast<std::size_t>(message[at]));
+      SweepTeam::Group& group = groups.emplace_back(static_cast<std::size_t>(message[at + 1]));
+      at += 2;
+      for (LoopCase& start : group) {
+        start = {message[at], message[at + 1]};
+        at += 2;
+      }
+    }
+    std::vector<double> reply;
+    team->run(
+        groups,
+        [&](std::size_t group, const std::vector<SweepRun>& runs) { append(reply, numbers[group], runs); },
+        nullptr);
+    send(0, result_tag, reply);
+  }
+}
+
+#else
+
+SweepRanks::SweepRanks() {
+  if (started_by_mpirun())
+    throw ConfigError(
+        "this program was built without MPI: install libopenmpi-dev and build again, or go without mpirun");
+}
+SweepRanks::~SweepRanks() = default;
+
+std::unique_ptr<SweepTeam> SweepRanks::make_team(const SweepConfig& config, unsigned threads) const {
+  return make_thread_team(config, threads);
+}
+
+void SweepRanks::serve(const SweepConfig&, unsigned) const {}
+
+#endif
+
+}  // namespace upright

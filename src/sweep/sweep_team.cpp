@@ -1,0 +1,78 @@
+#include <exception>
+#include <mutex>
+#include <thread>
+
+#include "sim/loop/fast_loop.hpp"
+#include "sweep.hpp"
+
+namespace upright {
+
+std::size_t sweep_group_size(const SweepConfig& config) {
+  if (config.engine != SweepEngine::fast || !lanes_can_run(config.setup)) return 1;
+  // Lanes of continuous loops go on with the next run when they end, so that more of them waste less.
+  return config.setup.sampled ? lane_count : 4 * lane_count;
+}
+
+std::vector<SweepRun> run_sweep_group(const SweepConfig& config, const SweepTeam::Group& group) {
+  std::vector<LoopResult> results(group.size());
+  if (config.engine == SweepEngine::fast && lanes_can_run(config.setup)) {
+    run_on_lanes(config.setup, group, results);
+  } else {
+    for (std::size_t i = 0; i < group.size(); ++i)
+      results[i] = config.engine == SweepEngine::fast ? run_with_events(config.setup, group[i])
+                                                      : run_with_reference(config.setup, group[i]);
+  }
+  std::vector<SweepRun> runs;
+  for (std::size_t i = 0; i < group.size(); ++i)
+    runs.push_back(
+        {group[i], results[i].fall_time_s, results[i].theta_amplitude_rad, results[i].cart_amplitude_m});
+  return runs;
+}
+
+namespace {
+
+class ThreadTeam final : public SweepTeam {
+ public:
+  ThreadTeam(const SweepConfig& config, unsigned threads)
+      : config_(config),
+        threads_(threads != 0 ? threads : std::max(1u, std::thread::hardware_concurrency())) {}
+
+  void run(const std::vector<Group>& groups, const Done& done, const std::atomic<bool>* stop) override {
+    std::atomic<std::size_t> next{0};
+    std::atomic<bool> failed{false};
+    std::exception_ptr failure;
+    std::mutex one_at_a_time;
+    const auto work = [&] {
+      try {
+        while (!failed && !(stop && *stop)) {
+          const std::size_t mine = next++;
+          if (mine >= groups.size()) return;
+          const std::vector<SweepRun> runs = run_sweep_group(config_, groups[mine]);
+          const std::lock_guard lock(one_at_a_time);
+          done(mine, runs);
+        }
+      } catch (...) {
+        const std::lock_guard lock(one_at_a_time);
+        if (!failed.exchange(true)) failure = std::current_exception();
+      }
+    };
+    {
+      std::vector<std::jthread> others;
+      for (unsigned i = 1; i < threads_ && i < groups.size(); ++i) others.emplace_back(work);
+      work();
+    }
+    if (failure) std::rethrow_exception(failure);
+  }
+
+ private:
+  const SweepConfig& config_;
+  unsigned threads_;
+};
+
+}  // namespace
+
+std::unique_ptr<SweepTeam> make_thread_team(const SweepConfig& config, unsigned threads) {
+  return std::make_unique<ThreadTeam>(config, threads);
+}
+
+}  // namespace upright
