@@ -1,0 +1,46 @@
+// A board that is the Modbus RTU device of config/rigs/board.yaml: two encoders, a motor bridge, stop inputs, and a watchdog
+// that takes the voltage away. docs/diy-rig.md says how to build one.
+#include <avr/eeprom.h>
+#include <avr/interrupt.h>
+#include <avr/wdt.h>
+
+#include "clock.h"
+#include "encoders.h"
+#include "modbus.h"
+#include "motor.h"
+#include "registers.h"
+
+static uint16_t EEMEM boots_kept;
+
+/// After a reset by the processor's watchdog it still runs, at its shortest time.
+void stop_watchdog(void) __attribute__((naked, used, section(".init3")));
+void stop_watchdog(void) {
+  MCUSR = 0;
+  wdt_disable();
+}
+
+static uint16_t count_boot(void) {
+  const uint16_t boots = eeprom_read_word(&boots_kept) + 1;
+  eeprom_update_word(&boots_kept, boots);
+  return boots;
+}
+
+int main(void) {
+  motor_begin();
+  registers_begin(count_boot());
+  clock_begin();
+  modbus_begin();
+  encoders_begin();
+  sei();
+  // Nothing below takes a millisecond: a program that does not come round has gone astray, and is reset.
+  wdt_enable(WDTO_15MS);
+  uint8_t before = clock_now();
+  for (;;) {
+    wdt_reset();
+    const uint8_t now = clock_now();
+    const uint8_t elapsed_ticks = (uint8_t)(now - before);
+    before = now;
+    registers_watch(elapsed_ticks);
+    modbus_serve(elapsed_ticks);
+  }
+}

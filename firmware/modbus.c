@@ -1,0 +1,215 @@
+#include "modbus.h"
+
+#include <stdbool.h>
+#include <util/crc16.h>
+
+#include "board.h"
+#include "clock.h"
+#include "registers.h"
+
+// Where a request ends follows from its function and its length, so that it is answered at once. After a byte that belongs to
+// no request for us the line has to be silent before the next one counts, and a request that stops in the middle is given up
+// after the same silence. It is what the standard allows between two bytes of a frame above 19200 baud.
+#define SILENCE_US 750UL
+#define LONGEST_FRAME 256
+#define ADDRESS_SIZE 1
+#define CHECK_SIZE 2
+#define EXCEPTION_BIT 0x80
+
+enum { READ_HOLDING = 0x03, READ_INPUT = 0x04, WRITE_SINGLE = 0x06, WRITE_MULTIPLE = 0x10, READ_WRITE = 0x17 };
+
+extern volatile uint8_t received[], received_head, line_errors;  // the sampler's
+
+static uint8_t frame[LONGEST_FRAME];
+static uint16_t frame_size;
+static uint16_t check;  // over what is in the frame
+static bool deaf;       // until the line is silent
+static uint8_t taken;   // how far the ring has been read
+static uint16_t quiet_ticks;
+
+static uint8_t reply[ADDRESS_SIZE + 2 + 2 * READABLE_END + CHECK_SIZE];
+static uint8_t reply_size, reply_sent;
+
+static void begin_frame(void) {
+  frame_size = 0;
+  check = 0xffff;
+}
+
+void modbus_begin(void) {
+  begin_frame();
+  UCSR0A = 1 << U2X0;
+  UBRR0 = F_CPU / (8L * BAUD) - 1;
+  UCSR0C = 1 << UCSZ01 | 1 << UCSZ00;
+  UCSR0B = 1 << RXEN0 | 1 << TXEN0;
+}
+
+static uint16_t word_at(uint16_t place) {
+  return (uint16_t)(frame[place] << 8 | frame[place + 1]);
+}
+
+static void begin_reply(uint8_t function) {
+  reply[0] = UNIT;
+  reply[1] = function;
+  reply_size = 2;
+}
+
+static void add(uint8_t byte) {
+  reply[reply_size++] = byte;
+}
+
+static void send_reply(void) {
+  uint16_t sum = 0xffff;
+  for (uint8_t i = 0; i < reply_size; ++i) sum = _crc16_update(sum, reply[i]);
+  add((uint8_t)sum);
+  add((uint8_t)(sum >> 8));
+  reply_sent = 0;
+}
+
+static void add_registers(uint16_t first, uint16_t count) {
+  registers_latch();
+  add((uint8_t)(2 * count));
+  for (uint16_t i = 0; i < count; ++i) {
+    const uint16_t word = registers_read(first + i);
+    add((uint8_t)(word >> 8));
+    add((uint8_t)word);
+  }
+}
+
+static exception_t read(uint8_t function) {
+  const uint16_t first = word_at(2), count = word_at(4);
+  if (count == 0) return ILLEGAL_VALUE;
+  const exception_t problem = registers_readable(first, count);
+  if (problem != NO_EXCEPTION) return problem;
+  begin_reply(function);
+  add_registers(first, count);
+  return NO_EXCEPTION;
+}
+
+/// Address and quantity, or the value, as they came.
+static void repeat_request(void) {
+  begin_reply(frame[1]);
+  for (uint8_t i = 2; i < 6; ++i) add(frame[i]);
+}
+
+static exception_t write_single(void) {
+  const exception_t problem = registers_writable(word_at(2), 1, frame + 4);
+  if (problem != NO_EXCEPTION) return problem;
+  registers_write(word_at(2), 1, frame + 4);
+  repeat_request();
+  return NO_EXCEPTION;
+}
+
+static exception_t write_multiple(void) {
+  const uint16_t first = word_at(2), count = word_at(4);
+  if (count == 0 || count > LONGEST_FRAME / 2 || frame[6] != 2 * count) return ILLEGAL_VALUE;
+  const exception_t problem = registers_writable(first, count, frame + 7);
+  if (problem != NO_EXCEPTION) return problem;
+  registers_write(first, count, frame + 7);
+  repeat_request();
+  return NO_EXCEPTION;
+}
+
+/// Writes first, as the standard says, but nothing unless all of it can be done.
+static exception_t read_write(void) {
+  const uint16_t first = word_at(6), count = word_at(8);
+  if (word_at(4) == 0 || count == 0 || count > LONGEST_FRAME / 2 || frame[10] != 2 * count) return ILLEGAL_VALUE;
+  exception_t problem = registers_readable(word_at(2), word_at(4));
+  if (problem == NO_EXCEPTION) problem = registers_writable(first, count, frame + 11);
+  if (problem != NO_EXCEPTION) return problem;
+  registers_write(first, count, frame + 11);
+  return read(READ_WRITE);
+}
+
+static exception_t obey(void) {
+  switch (frame[1]) {
+    case READ_HOLDING:
+    case READ_INPUT:
+      return read(frame[1]);
+    case WRITE_SINGLE:
+      return write_single();
+    case WRITE_MULTIPLE:
+      return write_multiple();
+    case READ_WRITE:
+      return read_write();
+  }
+  return ILLEGAL_FUNCTION;
+}
+
+static void answer(void) {
+  const exception_t problem = obey();
+  if (problem == NO_EXCEPTION) {
+    registers_feed();
+  } else {
+    begin_reply(frame[1] | EXCEPTION_BIT);
+    add(problem);
+  }
+  send_reply();
+}
+
+/// The size of the frame as its beginning tells it; 0: that is not known yet, or only silence will tell.
+static uint16_t whole_size(void) {
+  if (frame_size < 2) return 0;
+  switch (frame[1]) {
+    case READ_HOLDING:
+    case READ_INPUT:
+    case WRITE_SINGLE:
+      return 8;
+    case WRITE_MULTIPLE:
+      return frame_size < 7 ? 0 : (uint16_t)(7 + frame[6] + CHECK_SIZE);
+    case READ_WRITE:
+      return frame_size < 11 ? 0 : (uint16_t)(11 + frame[10] + CHECK_SIZE);
+  }
+  return 0;
+}
+
+/// What has come is a request or nothing. The check over a frame with its own check sum is zero.
+static void end_frame(void) {
+  if (check == 0 && frame_size >= ADDRESS_SIZE + 1 + CHECK_SIZE)
+    answer();
+  else
+    deaf = true;
+  begin_frame();
+}
+
+static void take(uint8_t byte) {
+  quiet_ticks = 0;
+  if (line_errors) {
+    line_errors = 0;
+    deaf = true;
+  }
+  if (deaf) return;
+  if (frame_size == LONGEST_FRAME || (frame_size == 0 && byte != UNIT)) {
+    deaf = true;
+    return;
+  }
+  frame[frame_size++] = byte;
+  check = _crc16_update(check, byte);
+  if (frame_size == whole_size()) end_frame();
+}
+
+/// A frame of a function that we do not know ends here, too.
+static void note_silence(void) {
+  if (!deaf && frame_size > 0 && whole_size() == 0) end_frame();
+  begin_frame();
+  deaf = false;
+}
+
+static void send(void) {
+  if (!(UCSR0A & 1 << UDRE0)) return;
+  UDR0 = reply[reply_sent++];
+  if (reply_sent == reply_size) reply_size = 0;
+}
+
+void modbus_serve(uint8_t elapsed_ticks) {
+  if (reply_size != 0) {
+    send();
+    return;
+  }
+  if (taken != received_head) {
+    take(received[taken++]);
+    return;
+  }
+  if (frame_size == 0 && !deaf) return;
+  quiet_ticks += elapsed_ticks;
+  if (quiet_ticks > TICKS(SILENCE_US)) note_silence();
+}
