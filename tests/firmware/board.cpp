@@ -121,13 +121,10 @@ std::uint64_t Board::step(avr_t*, std::uint64_t when, void* parameter) {
 
 void Board::turn_to(Encoder encoder, std::int64_t counts, Cycles spacing) {
   Shaft& moved = shaft(encoder);
-  if (moved.counts != moved.target) {
-    avr_cycle_timer_cancel(avr_, step, &moved);
-    while (moved.counts != moved.target) step(avr_, now(), &moved);
-  }
+  const bool was_moving = moved.counts != moved.target;
   moved.target = counts;
   moved.spacing = spacing;
-  if (moved.counts != counts) avr_cycle_timer_register(avr_, spacing, step, &moved);
+  if (moved.counts != counts && !was_moving) avr_cycle_timer_register(avr_, spacing, step, &moved);
 }
 
 void Board::put_lines(Encoder encoder, int quarter) {

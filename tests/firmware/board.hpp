@@ -58,7 +58,7 @@ class Board {
   void run_until(Cycles time);
   void run_for(double seconds) { run_until(now() + cycles(seconds)); }
 
-  /// Steps of the encoder one after the other, `spacing` apart; those still under way are done at once.
+  /// Steps of the encoder one after the other, `spacing` apart, from the next one on.
   void turn_to(Encoder encoder, std::int64_t counts, Cycles spacing);
   std::int64_t counts(Encoder encoder) const { return shaft(encoder).counts; }
   /// Lines of one encoder as noise puts them: not where the shaft is.

@@ -1,4 +1,4 @@
-// What joins a plant to the kernel's simulated devices, and what can happen to it.
+// What joins a plant to simulated devices, the kernel's or a board's, and what can happen to it.
 #pragma once
 
 #include <cstdint>
@@ -17,6 +17,9 @@ enum class Mishap : std::uint8_t {
   encoders_go,      ///< the device that has them
   encoder_rattles,  ///< faster than edges may come
   edges_burst,      ///< more edges at once than the kernel's queue holds
+  edges_too_fast,   ///< the device that counts them cannot
+  device_restarts,
+  program_hangs,  ///< the device's
   emergency_stop,
   plus_switch,
   minus_switch,

@@ -1,0 +1,51 @@
+// A board, a plant behind it, and the files of an `upright run` that drives it.
+#pragma once
+
+#include <fstream>
+#include <string>
+#include <vector>
+
+#include "../fault/process_case.hpp"
+#include "../integration/virtual_rig_process.hpp"
+#include "board_rig.hpp"
+
+namespace upright::test {
+
+class BoardSetting {
+ public:
+  explicit BoardSetting(const ProcessCase& c = {}, const LineFaults& faults = {})
+      : board_(rig_text(), Pose{0.0, theta0_rad}, folder_ / "trace.csv", faults) {
+    std::ofstream(rig_file()) << as_read(c, replaced(rig_text(), "/dev/ttyACM0", board_.line()));
+    std::ofstream(gain_file()) << text_of(UPRIGHT_SOURCE_DIR "/config/gains/exponential-200hz.yaml");
+  }
+
+  std::filesystem::path rig_file() const { return folder_ / "rig.yaml"; }
+  std::filesystem::path gain_file() const { return folder_ / "gains.yaml"; }
+  std::filesystem::path runs() const { return folder_ / "runs"; }
+  std::vector<std::string> command(double duration_s) const {
+    return {UPRIGHT_BINARY, "run",       "--rig",      rig_file(),
+            "--gains",      gain_file(), "--duration", std::to_string(duration_s),
+            "--out",        runs(),      "--json",     "--unchecked"};
+  }
+  ProcessFiles files(double duration_s) const {
+    return {command(duration_s), rig_file(), runs(), folder_ / "struck"};
+  }
+  BoardRig& board() { return board_; }
+
+ private:
+  static constexpr double theta0_rad = 0.03;
+
+  /// The shipped file, except that the board was switched on in the middle of the track with its pendulum
+  /// upright, and that the machine may be busy: what is tested here is what is done, not how fast.
+  static std::string rig_text() {
+    return replaced(
+        replaced(text_of(UPRIGHT_SOURCE_DIR "/config/rigs/board.yaml"), "{at: start, pose: hanging}",
+                 "{at: counts, cart_counts: 0, pendulum_counts: 0, pose: upright}"),
+        "response_timeout_s: 0.002", "response_timeout_s: 0.003");
+  }
+
+  Folder folder_;
+  BoardRig board_;
+};
+
+}  // namespace upright::test
