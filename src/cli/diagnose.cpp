@@ -11,7 +11,7 @@
 
 #include "commands.hpp"
 #include "diagnosis/diagnosis_json.hpp"
-#include "diagnosis/trace.hpp"
+#include "diagnosis/simulated_segments.hpp"
 #include "experiment_data.hpp"
 #include "measurement/data_check.hpp"
 #include "measurement/long_records.hpp"
@@ -126,9 +126,9 @@ void print(const Diagnosis& d, const std::string& out) {
     std::printf("\n");
     for (const ParameterEstimate& p : effect.parameters) std::printf("      %s\n", in_words(p).c_str());
     if (!effect.where.empty()) std::printf("      %s\n", effect.where.c_str());
-    if (!effect.confusable_with.empty()) {
+    if (!effect.indistinguishable_from.empty()) {
       std::string names;
-      for (const std::size_t other : effect.confusable_with)
+      for (const std::size_t other : effect.indistinguishable_from)
         names += (names.empty() ? "" : ", ") + kind_of(other);
       std::printf("      these data cannot tell it from: %s\n", names.c_str());
     }
@@ -202,10 +202,10 @@ void write_traces(const Diagnosis& d, const Plant& given, const std::vector<Meas
                   const fs::path& file) {
   constexpr std::size_t most_rows = 20000;
   const std::vector<Segment> segments = held_out_segments(d, runs);
-  const std::vector<SimulatedTrace> before = simulate_segments(given, runs, segments);
-  const std::vector<SimulatedTrace> after = simulate_segments(d.model, runs, segments);
+  const std::vector<SimulatedSegment> before = simulate_segments(given, runs, segments);
+  const std::vector<SimulatedSegment> after = simulate_segments(d.model, runs, segments);
   std::size_t count = 0;
-  for (const SimulatedTrace& trace : before) count += trace.time_s.size();
+  for (const SimulatedSegment& trace : before) count += trace.time_s.size();
   const std::size_t stride = 1 + count / most_rows;
   std::ofstream out(file);
   out << "segment,run,time_s,voltage_v,cart_m,cart_before_m,cart_after_m,theta_rad,theta_before_rad,theta_"

@@ -10,7 +10,7 @@
 
 #include "commands.hpp"
 #include "progress.hpp"
-#include "sweep/sweep_ranks.hpp"
+#include "sweep/mpi_executor.hpp"
 #include "upright/base/error.hpp"
 
 namespace upright::cli {
@@ -84,7 +84,7 @@ void print(const SweepResult& result, const std::string& folder) {
   std::fflush(stdout);
 }
 
-ExitCode run_here(const SweepArguments& arguments, const SweepRanks& ranks) {
+ExitCode run_here(const SweepArguments& arguments, const MpiExecutor& ranks) {
   const SweepConfig config = read_sweep_file(arguments.file);
   const std::string folder = !arguments.out.empty()
                                  ? arguments.out
@@ -94,7 +94,7 @@ ExitCode run_here(const SweepArguments& arguments, const SweepRanks& ranks) {
   options.overwrite = arguments.overwrite;
   options.transitions_only = arguments.transitions_only;
   options.stop = &stop_asked;
-  const std::unique_ptr<SweepTeam> team = ranks.make_team(config, arguments.threads);
+  const std::unique_ptr<SweepExecutor> executor = ranks.make_executor(config, arguments.threads);
   SweepResult result;
   {
     const StopOnSignal on_signal;
@@ -102,7 +102,7 @@ ExitCode run_here(const SweepArguments& arguments, const SweepRanks& ranks) {
     options.progress = [&progress](std::size_t done, std::size_t known) {
       progress.report(done, known, "runs");
     };
-    result = run_sweep(config, folder, options, *team);
+    result = run_sweep(config, folder, options, *executor);
   }
   if (arguments.as_json)
     std::cout << json_of(config, result, folder).dump(2) << "\n";
@@ -115,7 +115,7 @@ ExitCode run_here(const SweepArguments& arguments, const SweepRanks& ranks) {
 }
 
 /// On the ranks other than the first: it is the first that speaks, of errors too.
-ExitCode run_elsewhere(const SweepArguments& arguments, const SweepRanks& ranks) {
+ExitCode run_elsewhere(const SweepArguments& arguments, const MpiExecutor& ranks) {
   const StopOnSignal until_the_first_lets_go;
   try {
     ranks.serve(read_sweep_file(arguments.file), arguments.threads);
@@ -126,7 +126,7 @@ ExitCode run_elsewhere(const SweepArguments& arguments, const SweepRanks& ranks)
 }
 
 ExitCode run(const SweepArguments& arguments) {
-  const SweepRanks ranks;
+  const MpiExecutor ranks;
   return ranks.first() ? run_here(arguments, ranks) : run_elsewhere(arguments, ranks);
 }
 

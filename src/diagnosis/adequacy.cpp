@@ -5,28 +5,28 @@
 
 namespace upright {
 
-ResidualStructure examine_fit(const FitData& data, const FitPoint& fitted) {
-  ResidualStructure structure = examine_residuals(data, fitted);
+ResidualTests examine_fit(const FitData& data, const FitPoint& fitted) {
+  ResidualTests structure = examine_residuals(data, fitted);
   FitPoint point = fitted;
   point.noise = sensors_only(fitted.noise);
-  const FitResult plain = follow(data, point);
+  const FitResult plain = fit_initial_states(data, point);
   structure.noise_ratio = whitened_rms(plain);
   point = plain.point;
   point.noise = as_slow_as_left(fitted.noise, structure);
   structure.excess = structure.noise_ratio / simulation_floor(data, point).highest;
-  judge_structure(structure);
+  conclude_tests(structure);
   return structure;
 }
 
 SimulationFloor held_out_floor(const Search& search, const Hypothesis& judged,
-                               const ResidualStructure& structure) {
+                               const ResidualTests& structure) {
   if (search.held_data().segments.empty()) return {};
   FitPoint point = judged.held.point;
   point.noise = as_slow_as_left(judged.train.point.noise, structure);
   return simulation_floor(search.held_data(), point);
 }
 
-void compare_held_out(const Search& search, const Hypothesis& judged, ResidualStructure& structure) {
+void compare_held_out(const Search& search, const Hypothesis& judged, ResidualTests& structure) {
   if (search.held_data().segments.empty()) return;
   Hypothesis told = search.told(judged);
   // What is left need not be such noise: all runs together may be further off than such noise makes them, and

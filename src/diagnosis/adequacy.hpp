@@ -3,21 +3,21 @@
 #pragma once
 
 #include "estimation/noise_floor.hpp"
+#include "residual_tests.hpp"
 #include "search.hpp"
-#include "structure.hpp"
 
 namespace upright {
 
 /// What a fit leaves at `fitted`, judged: its structure, and how far off a plain simulation is.
-ResidualStructure examine_fit(const FitData& data, const FitPoint& fitted);
+ResidualTests examine_fit(const FitData& data, const FitPoint& fitted);
 
 /// What noise as slow as what is left makes of a plain simulation of the held-out data. 1 where none is held
 /// out.
 SimulationFloor held_out_floor(const Search& search, const Hypothesis& judged,
-                               const ResidualStructure& structure);
+                               const ResidualTests& structure);
 
 /// What is left of the training runs must account for the held-out runs too, with the parameters anywhere
 /// that the training runs leave open. Where it does not, `structure` becomes structured and says so.
-void compare_held_out(const Search& search, const Hypothesis& judged, ResidualStructure& structure);
+void compare_held_out(const Search& search, const Hypothesis& judged, ResidualTests& structure);
 
 }  // namespace upright

@@ -8,12 +8,12 @@
 
 #include "adequacy.hpp"
 #include "base/parallel.hpp"
-#include "confusable.hpp"
 #include "estimation/held_out.hpp"
-#include "growth.hpp"
+#include "indistinguishable.hpp"
 #include "next_experiment.hpp"
 #include "residual.hpp"
 #include "search.hpp"
+#include "stepwise_selection.hpp"
 #include "upright/base/error.hpp"
 
 namespace upright {
@@ -23,7 +23,7 @@ namespace {
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
 /// However much it scatters, by this at most.
-constexpr double most_scattered = 10.0 * confusable_evidence;
+constexpr double most_scattered = 10.0 * indistinguishable_evidence;
 /// A correction of the plant file is there when it is this many standard errors from nothing.
 constexpr double least_correction_z = 4.0;
 
@@ -38,16 +38,16 @@ class Diagnostician {
         work_samples_(options.search_bound * samples_of(data_)),
         bound_(work_samples_),
         search_(plant_, runs_, bounded(data_.train), bounded(data_.held)),
-        growth_(search_, options, result_) {}
+        selection_(search_, options, result_) {}
 
   Diagnosis run() {
     try {
-      growth_.begin();
-      growth_.find();
-      ResidualStructure left = settle();
-      if (left.structured && growth_.begin_anew()) left = settle();
-      if (left.structured && growth_.find_pairs_of_all()) left = settle();
-      if (left.beyond_sensors && growth_.find_thoroughly(left.structured)) left = settle();
+      selection_.begin();
+      selection_.find();
+      ResidualTests left = settle();
+      if (left.structured && selection_.begin_anew()) left = settle();
+      if (left.structured && selection_.find_pairs_of_all()) left = settle();
+      if (left.beyond_sensors && selection_.find_thoroughly(left.structured)) left = settle();
       conclude(left);
     } catch (const Interrupted&) {
       result_.interrupted = true;
@@ -59,13 +59,13 @@ class Diagnostician {
   }
   /// Whether an effect was found that the plant file lacks, not only numbers of it that are off.
   bool found_what_was_lacking() const {
-    return std::any_of(growth_.found().begin(), growth_.found().end(),
+    return std::any_of(selection_.found().begin(), selection_.found().end(),
                        [&](std::size_t effect) { return !search_.is_nuisance(effect); });
   }
   /// Of what is unexplained: whether held-out runs excite what is missing still, and the others do not. They
   /// alone show it, or spoke to the end against what the others show beyond doubt.
   bool lacks_what_was_held_out() const {
-    return growth_.contradicted() || !examine_fit(data_.train, final_.train.point).structured;
+    return selection_.contradicted() || !examine_fit(data_.train, final_.train.point).structured;
   }
 
  private:
@@ -106,23 +106,23 @@ class Diagnostician {
   /// What a search that was given up has found, unexamined: nothing is claimed of it.
   void report_so_far() {
     constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
-    const Hypothesis& h = growth_.current();
+    const Hypothesis& h = selection_.current();
     const auto known_gap = [&](const Hypothesis& of) { return of.simulation ? of.simulation->gap : unknown; };
     note_runs();
     result_.examined = false;
-    for (const std::size_t effect : growth_.found()) {
+    for (const std::size_t effect : selection_.found()) {
       FoundEffect found;
       found.effect = effect;
       found.gap_before = found.gap_after = unknown;
       found.parameters = estimates_of(effect, h);
-      found.where = growth_.where(effect);
+      found.where = selection_.where(effect);
       result_.effects.push_back(found);
     }
     for (CandidateScore& candidate : result_.candidates) candidate.gap_after = unknown;
-    result_.gap_before = known_gap(growth_.given());
+    result_.gap_before = known_gap(selection_.given());
     result_.gap_after = known_gap(h);
     result_.noise = h.train.point.noise;
-    result_.model = growth_.found().empty() ? plant_ : model_with(growth_.found(), h.train.point.plant);
+    result_.model = selection_.found().empty() ? plant_ : model_with(selection_.found(), h.train.point.plant);
     result_.residual = "not examined: the search was not finished";
     result_.verdict = moves_enough(runs_) ? Verdict::unexplained : Verdict::not_excited;
   }
@@ -138,13 +138,13 @@ class Diagnostician {
   }
 
   /// Settles the corrections, and looks at what is left.
-  ResidualStructure settle() {
+  ResidualTests settle() {
     settle_corrections();
     options_.tell(0.92, "measuring the gap");
     FitData all = data_.train;
     all.segments.insert(all.segments.end(), data_.held.segments.begin(), data_.held.segments.end());
     // At what all runs say, so that what few training runs left uncertain is not taken for something missing.
-    ResidualStructure left = examine_fit(all, known_.train.point);
+    ResidualTests left = examine_fit(all, known_.train.point);
     if (!left.structured) compare_held_out(search_, final_, left);
     if (!left.structured) doubt_what_cannot_be(left);
     return left;
@@ -154,7 +154,7 @@ class Diagnostician {
   /// back to what the plant file says, the others follow (a Gaussian approximation of the likelihood), until
   /// all that are left are certain.
   void settle_corrections() {
-    const Hypothesis& h = growth_.current();
+    const Hypothesis& h = selection_.current();
     std::vector<std::size_t> open;
     for (std::size_t j = 0; j < h.free.size(); ++j) open.push_back(j);
     Eigen::VectorXd value(static_cast<Eigen::Index>(h.free.size()));
@@ -163,8 +163,8 @@ class Diagnostician {
           h.train.point.plant.find(h.free[j].effect)->values[h.free[j].index];
     Eigen::MatrixXd covariance = h.train.covariance;
     const auto is_correction = [&](std::size_t j) {
-      return std::find(growth_.found().begin(), growth_.found().end(), h.free[j].effect) ==
-             growth_.found().end();
+      return std::find(selection_.found().begin(), selection_.found().end(), h.free[j].effect) ==
+             selection_.found().end();
     };
     for (;;) {
       double least = infinity;
@@ -210,10 +210,10 @@ class Diagnostician {
 
   /// The last fits, of training runs and of all. A correction that these leave uncertain is none: it goes.
   void fit_last(std::vector<std::size_t>& corrections) {
-    const Hypothesis* from = &growth_.current();
+    const Hypothesis* from = &selection_.current();
     for (;;) {
       options_.tell(0.88, "fitting what is left");
-      std::vector<std::size_t> all = growth_.found();
+      std::vector<std::size_t> all = selection_.found();
       all.insert(all.end(), corrections.begin(), corrections.end());
       final_ = search_.only(all, *from, nullptr, true);
       search_.judge(final_, final_.train.point.noise);
@@ -245,7 +245,7 @@ class Diagnostician {
     const Noise noise = final_.train.point.noise;
     std::vector<std::tuple<bool, double, std::size_t>> opened;
     for (const std::size_t effect : corrections) {
-      std::vector<std::size_t> others = growth_.found();
+      std::vector<std::size_t> others = selection_.found();
       for (const std::size_t other : corrections)
         if (other != effect) others.push_back(other);
       Hypothesis h = search_.only(others, final_, &noise);
@@ -257,7 +257,7 @@ class Diagnostician {
     for (const auto& [number, gap, effect] : opened) corrections_.push_back(effect);
   }
 
-  void conclude(const ResidualStructure& structure) {
+  void conclude(const ResidualTests& structure) {
     options_.tell(0.93, "measuring the gap");
     note_runs();
     result_.noise = known_.train.point.noise;
@@ -281,7 +281,7 @@ class Diagnostician {
       gap = gap_with(first, final_, i + 1 == all.size());
       found.gap_after = gap;
       found.parameters = estimates_of(all[i], known_);
-      found.where = growth_.where(all[i]);
+      found.where = selection_.where(all[i]);
       result_.effects.push_back(found);
     }
     result_.gap_after = gap;
@@ -289,9 +289,9 @@ class Diagnostician {
     result_.model = all.empty() ? plant_ : model_with(all, known_.train.point.plant);
     for (auto& candidate : result_.candidates) {
       candidate.gap_after = result_.gap_before;
-      for (auto& [effect, h] : growth_.finalists()) {
+      for (auto& [effect, h] : selection_.finalists()) {
         if (effect != candidate.effect) continue;
-        candidate.evidence = compare(growth_.given(), h).train;
+        candidate.evidence = compare(selection_.given(), h).train;
         candidate.gap_after = search_.simulate(h).gap / floor;
       }
     }
@@ -300,7 +300,7 @@ class Diagnostician {
     note_doubtful_numbers();
     decide(structure);
     trace_residuals();
-    find_confusable();
+    find_indistinguishable();
   }
 
   void trace_residuals() {
@@ -313,7 +313,7 @@ class Diagnostician {
   }
 
   /// A scale at the end of what it may be stands for something else.
-  void doubt_what_cannot_be(ResidualStructure& structure) const {
+  void doubt_what_cannot_be(ResidualTests& structure) const {
     constexpr double nearly = 1e-3;
     for (const std::size_t effect : all_found()) {
       const auto [scale, parameter] = scale_of(effect);
@@ -352,7 +352,7 @@ class Diagnostician {
   }
 
   std::vector<std::size_t> all_found() const {
-    std::vector<std::size_t> all = growth_.found();
+    std::vector<std::size_t> all = selection_.found();
     all.insert(all.end(), corrections_.begin(), corrections_.end());
     return all;
   }
@@ -387,7 +387,7 @@ class Diagnostician {
     if (!rod) plant.pendulum->given_inertia_kgm2 = base.inertia_about_pivot_kgm2;
   }
 
-  void decide(const ResidualStructure& structure) {
+  void decide(const ResidualTests& structure) {
     // What held-out data show of an effect that they hardly excite may be so much chance.
     constexpr double chance = 0.01;
     const bool worse = result_.gap_after > (1.0 + chance) * result_.gap_before;
@@ -407,38 +407,40 @@ class Diagnostician {
 
   /// Other effects that do as well in the place of one that was found: from sensitivities, or fitted where an
   /// effect does not act in proportion to its size.
-  void find_confusable() {
+  void find_indistinguishable() {
     options_.tell(0.94, "what else could it be");
-    std::vector<std::pair<std::size_t, Plant>> rivals;
-    for (const Rival& rival : linear_rivals(search_, final_, all_found())) {
-      declare(rival.instead_of, rival.effect);
-      rivals.emplace_back(rival.effect, rival.plant);
+    std::vector<std::pair<std::size_t, Plant>> alternatives;
+    for (const Alternative& alternative : linear_alternatives(search_, final_, all_found())) {
+      declare(alternative.instead_of, alternative.effect);
+      alternatives.emplace_back(alternative.effect, alternative.plant);
     }
-    std::optional<double> sieved;
-    for (const std::size_t effect : growth_.found()) {
+    std::optional<double> on_screening_subset;
+    for (const std::size_t effect : selection_.found()) {
       std::optional<Hypothesis> without;
-      for (const std::size_t other : growth_.near(effect)) {
+      for (const std::size_t other : selection_.near(effect)) {
         if (is_listed(other) || is_declared(effect, other)) continue;
         options_.tell(0.95, "is it " + kind_of(other) + " instead of " + kind_of(effect));
-        if (!without) without = search_.without(growth_.current(), effect);
+        if (!without) without = search_.without(selection_.current(), effect);
         if (!std::isfinite(without->train.objective)) break;
-        Hypothesis rival = search_.screened(*without, other);
-        search_.settle_on_sieve(rival);
-        if (!sieved) sieved = search_.sieved(growth_.current()).train.objective;
+        Hypothesis alternative = search_.screened(*without, other);
+        search_.settle_on_subset(alternative);
+        if (!on_screening_subset)
+          on_screening_subset = search_.on_screening_subset(selection_.current()).train.objective;
         // So much worse on a part, it is no better on the whole.
-        if (!(rival.train.objective - *sieved < most_scattered)) continue;
-        rival.train.point.noise = growth_.current().train.point.noise;
-        search_.refit(*without, rival);
-        const Improvement worse = compare(rival, growth_.current());
-        if (!search_.is_plausible(rival, other)) continue;
+        if (!(alternative.train.objective - *on_screening_subset < most_scattered)) continue;
+        alternative.train.point.noise = selection_.current().train.point.noise;
+        search_.refit(*without, alternative);
+        const Improvement worse = compare(alternative, selection_.current());
+        if (!search_.is_plausible(alternative, other)) continue;
         const bool same =
-            worse.train < confusable_evidence || (worse.train < most_scattered && worse.t_value < 2.0);
+            worse.train < indistinguishable_evidence || (worse.train < most_scattered && worse.t_value < 2.0);
         if (!same) continue;
         declare(effect, other);
-        rivals.emplace_back(other, rival.train.point.plant);
+        alternatives.emplace_back(other, alternative.train.point.plant);
       }
     }
-    if (!rivals.empty()) result_.next_experiment = choose_experiment(final_.train.point.plant, rivals, runs_);
+    if (!alternatives.empty())
+      result_.next_experiment = choose_experiment(final_.train.point.plant, alternatives, runs_);
   }
 
   FoundEffect& listed(std::size_t effect) {
@@ -450,10 +452,12 @@ class Diagnostician {
     return std::find(all.begin(), all.end(), effect) != all.end();
   }
   bool is_declared(std::size_t effect, std::size_t other) {
-    const std::vector<std::size_t>& others = listed(effect).confusable_with;
+    const std::vector<std::size_t>& others = listed(effect).indistinguishable_from;
     return std::find(others.begin(), others.end(), other) != others.end();
   }
-  void declare(std::size_t effect, std::size_t other) { listed(effect).confusable_with.push_back(other); }
+  void declare(std::size_t effect, std::size_t other) {
+    listed(effect).indistinguishable_from.push_back(other);
+  }
 
   const Plant plant_;
   const std::vector<Measurement>& runs_;
@@ -464,7 +468,7 @@ class Diagnostician {
   WorkBound bound_;
   bool decided_ = false;  ///< the verdict stands
   Search search_;
-  Growth growth_;
+  StepwiseSelection selection_;
   Hypothesis final_;  ///< fitted to the training runs, judged on the others
   Hypothesis known_;  ///< the same effects fitted to all runs: what the model says in the end
   std::vector<std::size_t> corrections_;
@@ -498,7 +502,7 @@ NextBest next_best(const Diagnosis& diagnosis, const FoundEffect& effect) {
     if (trial.taken && trial.effect == effect.effect) best.taken = &trial;
   if (best.taken == nullptr) return best;
   for (const Trial& trial : diagnosis.trials) {
-    const std::vector<std::size_t>& same = effect.confusable_with;
+    const std::vector<std::size_t>& same = effect.indistinguishable_from;
     const double share = trial.evidence / best.taken->evidence;
     if (trial.round == best.taken->round && share > near && share < 1.0 &&
         std::find(same.begin(), same.end(), trial.effect) == same.end())

@@ -58,7 +58,7 @@ json next_best_json(const NextBest& best) {
 
 json effect_json(const Diagnosis& diagnosis, const FoundEffect& effect) {
   json confusable = json::array();
-  for (const std::size_t other : effect.confusable_with) confusable.push_back(kind_of(other));
+  for (const std::size_t other : effect.indistinguishable_from) confusable.push_back(kind_of(other));
   return {{"kind", kind_of(effect.effect)},
           {"enters", std::string(name_of(effect_registry()[effect.effect].enters))},
           {"gap_before", number(effect.gap_before)},

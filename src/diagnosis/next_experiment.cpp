@@ -74,9 +74,9 @@ std::vector<LibraryExperiment> experiment_library() {
   return library;
 }
 
-std::optional<NextExperiment> choose_experiment(const Plant& chosen,
-                                                const std::vector<std::pair<std::size_t, Plant>>& rivals,
-                                                const std::vector<Measurement>& runs) {
+std::optional<NextExperiment> choose_experiment(
+    const Plant& chosen, const std::vector<std::pair<std::size_t, Plant>>& alternatives,
+    const std::vector<Measurement>& runs) {
   double cart_noise = 1e-5, theta_noise = 5e-4;
   for (const Measurement& run : runs) {
     if (run.has_cart()) cart_noise = run.cart_noise_m();
@@ -93,14 +93,14 @@ std::optional<NextExperiment> choose_experiment(const Plant& chosen,
       continue;  // this plant cannot do it within the travel
     }
     double least = std::numeric_limits<double>::infinity();
-    std::vector<double> sums(rivals.size(), 0.0);
+    std::vector<double> sums(alternatives.size(), 0.0);
     std::size_t samples = 0;
     for (const Piece& piece : pieces) {
       const std::vector<LogRecord> rows = rehearse(piece, setup).rows;
       const Trace base = follow(chosen, piece, rows);
       samples += rows.size();
-      for (std::size_t i = 0; i < rivals.size(); ++i) {
-        const Trace other = follow(rivals[i].second, piece, rows);
+      for (std::size_t i = 0; i < alternatives.size(); ++i) {
+        const Trace other = follow(alternatives[i].second, piece, rows);
         for (std::size_t k = 0; k < rows.size(); ++k)
           sums[i] += std::pow((base.cart_m[k] - other.cart_m[k]) / cart_noise, 2) +
                      std::pow((base.theta_rad[k] - other.theta_rad[k]) / theta_noise, 2);

@@ -19,10 +19,10 @@ struct LibraryExperiment {
 };
 std::vector<LibraryExperiment> experiment_library();
 
-/// `chosen` is the plant that was found, `rivals` those that explain the data as well, each with the effect
-/// it has instead.
-std::optional<NextExperiment> choose_experiment(const Plant& chosen,
-                                                const std::vector<std::pair<std::size_t, Plant>>& rivals,
-                                                const std::vector<Measurement>& runs);
+/// `chosen` is the plant that was found, `alternatives` those that explain the data as well, each with the
+/// effect it has instead.
+std::optional<NextExperiment> choose_experiment(
+    const Plant& chosen, const std::vector<std::pair<std::size_t, Plant>>& alternatives,
+    const std::vector<Measurement>& runs);
 
 }  // namespace upright

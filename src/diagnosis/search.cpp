@@ -87,7 +87,7 @@ Improvement compare(const Hypothesis& simpler, const Hypothesis& richer) {
     falls.push_back(simpler.train.block_objective[b] - richer.train.block_objective[b]);
   result.train = simpler.train.objective - richer.train.objective;
   result.belief = std::accumulate(falls.begin(), falls.end(), result.train, std::minus<>());
-  result.held = simpler.surprise - richer.surprise;
+  result.held = simpler.negative_log_predictive_density - richer.negative_log_predictive_density;
   result.t_value = t_of(falls);
   return result;
 }
@@ -124,7 +124,7 @@ Search::Search(const Plant& plant, const std::vector<Measurement>& runs, const F
   // Runs differ, segments of a run are alike: take them in turn.
   constexpr std::size_t least_segments = 6, most_stride = 3;
   const std::size_t stride = std::clamp<std::size_t>(train_.segments.size() / least_segments, 1, most_stride);
-  sieve_every(stride);
+  choose_screening_subset(stride);
   train_starts_ = guess_starts(runs, train.segments, plant_);
   held_starts_ = guess_starts(runs, held.segments, plant_);
 }
@@ -133,17 +133,17 @@ bool Search::is_nuisance(std::size_t effect) const {
   return std::find(nuisances_.begin(), nuisances_.end(), effect) != nuisances_.end();
 }
 
-void Search::sieve_every(std::size_t stride) {
-  sieve_ = {train_.runs, {}, train_.bound};
-  sieve_places_.clear();
+void Search::choose_screening_subset(std::size_t stride) {
+  screening_subset_ = {train_.runs, {}, train_.bound};
+  screening_places_.clear();
   for (std::size_t s = 0; s < train_.segments.size(); s += stride) {
-    sieve_.segments.push_back(train_.segments[s]);
-    sieve_places_.push_back(s);
+    screening_subset_.segments.push_back(train_.segments[s]);
+    screening_places_.push_back(s);
   }
 }
 
-void Search::sieve_all() {
-  sieve_every(1);
+void Search::screen_on_all() {
+  choose_screening_subset(1);
 }
 
 std::vector<FreeParameter> Search::free_of(const std::set<std::size_t>& added) const {
@@ -174,7 +174,7 @@ Hypothesis Search::fitted(const std::set<std::size_t>& added, const FitPoint& st
 void Search::calm(Hypothesis& h, const FitOptions& options) {
   if (!h.valid) return;
   FitPoint point = h.train.point;
-  point.noise = calmed(point.noise);
+  point.noise = reduced_process_noise(point.noise);
   Hypothesis again = fitted(h.added, point, options, h.free);
   if (again.train.objective < h.train.objective) h = std::move(again);
 }
@@ -182,21 +182,21 @@ void Search::calm(Hypothesis& h, const FitOptions& options) {
 bool Search::may_calm(const Hypothesis& base, const Hypothesis& h) const {
   // Where every bit of evidence counts, the whole data are asked.
   constexpr double clear_evidence = 1000.0;
-  if (sieve_.segments.size() == train_.segments.size()) return true;
+  if (screening_subset_.segments.size() == train_.segments.size()) return true;
   if (!(base.train.objective - h.train.objective > clear_evidence)) return true;
-  FitPoint point = sieve_point(h);
-  const double as_it_is = fit(sieve_, point, h.free, screening()).objective;
-  point.noise = calmed(point.noise);
+  FitPoint point = screening_point(h);
+  const double as_it_is = fit(screening_subset_, point, h.free, screening()).objective;
+  point.noise = reduced_process_noise(point.noise);
   // What another way to the same place makes of an objective.
   constexpr double of_the_way = 10.0;
-  return fit(sieve_, point, h.free, {}).objective < as_it_is - of_the_way;
+  return fit(screening_subset_, point, h.free, {}).objective < as_it_is - of_the_way;
 }
 
 void Search::judge(Hypothesis& h, const Noise& noise) const {
   if (!std::isfinite(h.train.objective)) return;
   const FitPoint plain{plant_, held_starts_, noise};
   const FitPoint point = moved_to(plain, h.train.point.plant);
-  h.held = follow(held_, point, 6);
+  h.held = fit_initial_states(held_, point, 6);
 }
 
 const PlainSimulation& Search::simulate(Hypothesis& h) const {
@@ -263,21 +263,23 @@ double Search::certainty(const Hypothesis& h, std::size_t effect) const {
 
 void Search::weigh(Hypothesis& h) const {
   judge(h, h.train.point.noise);
-  if (std::isfinite(h.train.objective)) h.surprise = surprise_of(h);
+  if (std::isfinite(h.train.objective))
+    h.negative_log_predictive_density = negative_log_predictive_density_of(h);
 }
 
-std::vector<PlantState<double>> Search::sieve_starts(const std::vector<PlantState<double>>& starts) const {
+std::vector<PlantState<double>> Search::screening_starts(
+    const std::vector<PlantState<double>>& starts) const {
   std::vector<PlantState<double>> some;
-  some.reserve(sieve_places_.size());
-  for (const std::size_t place : sieve_places_) some.push_back(starts[place]);
+  some.reserve(screening_places_.size());
+  for (const std::size_t place : screening_places_) some.push_back(starts[place]);
   return some;
 }
 
-FitPoint Search::sieve_point(const Hypothesis& base) const {
-  return {base.train.point.plant, sieve_starts(base.train.point.starts), base.train.point.noise};
+FitPoint Search::screening_point(const Hypothesis& base) const {
+  return {base.train.point.plant, screening_starts(base.train.point.starts), base.train.point.noise};
 }
 
-double Search::surprise_of(const Hypothesis& h) const {
+double Search::negative_log_predictive_density_of(const Hypothesis& h) const {
   if (!std::isfinite(h.held.objective) || held_.segments.empty()) return h.held.objective;
   FitOptions options;
   options.noise_rounds = 1;
@@ -305,7 +307,7 @@ Hypothesis Search::told(const Hypothesis& h) const {
 
 Hypothesis Search::baseline() {
   const FitPoint start =
-      with_starts_followed(train_, {plant_, train_starts_, {.force = 0.1, .torque = 0.01}});
+      with_fitted_initial_states(train_, {plant_, train_starts_, {.force = 0.1, .torque = 0.01}});
   FitOptions options;
   Hypothesis h = fitted({}, start, options, free_of({}));
   options.most_iterations = 24;
@@ -332,10 +334,10 @@ std::vector<double> Search::promised_gains(const Hypothesis& base,
   only_look.most_iterations = 0;
   only_look.noise_rounds = 0;
   const auto promise = [&](const FitPoint& point, const std::vector<FreeParameter>& free) {
-    const FitResult seen = fit(sieve_, point, free, only_look);
+    const FitResult seen = fit(screening_subset_, point, free, only_look);
     return seen.promised_fall ? seen.objective - *seen.promised_fall : -infinity;
   };
-  const FitPoint from = sieve_point(base);
+  const FitPoint from = screening_point(base);
   const double without = promise(from, base.free);
   std::vector<double> gains;
   for (const std::size_t effect : effects) {
@@ -356,11 +358,11 @@ Hypothesis Search::screened(const Hypothesis& base, std::size_t effect) const {
   const std::vector<FreeParameter> free = free_of(added);
   Hypothesis best;
   best.train.objective = infinity;
-  for (const FitPoint& point : points_with(sieve_point(base), effect, base)) {
+  for (const FitPoint& point : points_with(screening_point(base), effect, base)) {
     Hypothesis h;
     h.added = added;
     h.free = free;
-    h.train = fit(sieve_, point, free, screening());
+    h.train = fit(screening_subset_, point, free, screening());
     if (h.train.objective < best.train.objective) best = std::move(h);
   }
   return best;
@@ -369,26 +371,26 @@ Hypothesis Search::screened(const Hypothesis& base, std::size_t effect) const {
 Hypothesis Search::screened_pair(const Hypothesis& base, const Hypothesis& first,
                                  const Hypothesis& second) const {
   FitPoint point = pair_point(base, first, second);
-  point.starts = sieve_starts(point.starts);
+  point.starts = screening_starts(point.starts);
   Hypothesis h;
   h.added = effects_of_both(first, second);
   h.free = free_of(h.added);
   // Each was fitted as if it were alone: the way from there is longer than a few steps.
-  h.train = fit(sieve_, point, h.free, FitOptions{});
+  h.train = fit(screening_subset_, point, h.free, FitOptions{});
   return h;
 }
 
-void Search::settle_on_sieve(Hypothesis& h) const {
-  if (std::isfinite(h.train.objective)) h.train = fit(sieve_, h.train.point, h.free, {});
+void Search::settle_on_subset(Hypothesis& h) const {
+  if (std::isfinite(h.train.objective)) h.train = fit(screening_subset_, h.train.point, h.free, {});
 }
 
-Hypothesis Search::sieved(const Hypothesis& base) const {
+Hypothesis Search::on_screening_subset(const Hypothesis& base) const {
   FitOptions options = screening();
   options.most_iterations = 2;
   Hypothesis h;
   h.added = base.added;
   h.free = base.free;
-  h.train = fit(sieve_, sieve_point(base), base.free, options);
+  h.train = fit(screening_subset_, screening_point(base), base.free, options);
   return h;
 }
 
@@ -413,7 +415,7 @@ Hypothesis Search::begun_anew(const Hypothesis& base) {
   point.starts = guess_starts(*train_.runs, train_.segments, point.plant);
   Hypothesis h = fitted(base.added, point, FitOptions{}, base.free);
   const Hypothesis followed =
-      fitted(base.added, with_starts_followed(train_, h.train.point), FitOptions{}, base.free);
+      fitted(base.added, with_fitted_initial_states(train_, h.train.point), FitOptions{}, base.free);
   if (followed.train.objective < h.train.objective) h = followed;
   calm(h, {});
   weigh(h);

@@ -23,10 +23,11 @@ struct PlainSimulation {
 struct Hypothesis {
   std::set<std::size_t> added;  ///< effects freed beyond what the plant file says
   FitResult train;
-  FitResult held;         ///< initial states only, plant and noise from `train`
-  double surprise = 0.0;  ///< of the held-out data: minus twice the log of their likelihood, with noise of
-                          ///< their own, averaged over what the training data leave open of the parameters;
-                          ///< not of what `only` and `on_all` made
+  FitResult held;  ///< initial states only, plant and noise from `train`
+  double negative_log_predictive_density =
+      0.0;  ///< of the held-out data: minus twice the log of their likelihood, with noise of
+            ///< their own, averaged over what the training data leave open of the parameters;
+            ///< not of what `only` and `on_all` made
   std::vector<FreeParameter> free;  ///< the parameters that moved, in the order of train.covariance
   bool valid = false;               ///< fitted, and no parameter at a bound that makes it another effect
   std::optional<PlainSimulation> simulation;  ///< once measured
@@ -37,7 +38,7 @@ struct Hypothesis {
 struct Improvement {
   double train = 0.0;    ///< fall of the objective on training data
   double belief = 0.0;   ///< of that, what is believed of the parameters: they need not go so far from it
-  double held = 0.0;     ///< of the surprise of held-out data
+  double held = 0.0;     ///< of the negative log predictive density of held-out data
   double t_value = 0.0;  ///< of the mean fall per quarter of a second of training data
 };
 
@@ -45,7 +46,7 @@ Improvement compare(const Hypothesis& simpler, const Hypothesis& richer);
 
 /// Two explanations whose evidence differs by less than this, or by less than its own scatter, are not told
 /// apart.
-inline constexpr double confusable_evidence = 16.0;
+inline constexpr double indistinguishable_evidence = 16.0;
 
 /// What a hypothesis says about one effect, as numbers with intervals.
 std::vector<ParameterEstimate> estimates_of(std::size_t effect, const Hypothesis& h);
@@ -63,10 +64,11 @@ class Search {
   const FitData& held_data() const { return held_; }
 
   /// All of the training data are looked at from now on, not a part of them first.
-  void sieve_all();
+  void screen_on_all();
   /// How much of the training data is looked at first.
-  double sieve_share() const {
-    return static_cast<double>(sieve_.segments.size()) / static_cast<double>(train_.segments.size());
+  double screening_share() const {
+    return static_cast<double>(screening_subset_.segments.size()) /
+           static_cast<double>(train_.segments.size());
   }
 
   /// Base corrections and the plant's own effects within what is believed of them.
@@ -79,11 +81,11 @@ class Search {
   /// training data.
   Hypothesis screened(const Hypothesis& base, std::size_t effect) const;
   /// Brings a screened hypothesis to convergence on that part, noise included.
-  void settle_on_sieve(Hypothesis& screened) const;
+  void settle_on_subset(Hypothesis& screened) const;
   /// Two effects at once on that part, from where each alone was fitted, to convergence.
   Hypothesis screened_pair(const Hypothesis& base, const Hypothesis& first, const Hypothesis& second) const;
   /// A hypothesis on that part alone, with which to compare.
-  Hypothesis sieved(const Hypothesis& base) const;
+  Hypothesis on_screening_subset(const Hypothesis& base) const;
   /// Brings a screened hypothesis to convergence on the whole training data, noise included, and judges it.
   void refine(const Hypothesis& base, Hypothesis& hypothesis);
   /// The same without judging it, from the noise that it has.
@@ -125,14 +127,14 @@ class Search {
   double certainty(const Hypothesis& h, std::size_t effect) const;
 
  private:
-  void sieve_every(std::size_t stride);
-  /// Follows held-out data with the fitted noise, for their surprise.
+  void choose_screening_subset(std::size_t stride);
+  /// Filters held-out data with the fitted noise, for their negative log predictive density.
   void weigh(Hypothesis& h) const;
-  double surprise_of(const Hypothesis& h) const;
+  double negative_log_predictive_density_of(const Hypothesis& h) const;
   /// Bristles that bend over a good part of the track before they slide are a spring by another name.
   bool bristles_are_short(const Hypothesis& h) const;
-  /// A hypothesis's point on the sieve alone.
-  FitPoint sieve_point(const Hypothesis& base) const;
+  /// A hypothesis's point on the screening subset alone.
+  FitPoint screening_point(const Hypothesis& base) const;
   std::vector<FreeParameter> free_of(const std::set<std::size_t>& added) const;
   std::vector<std::vector<double>> starts_of(std::size_t effect, const Hypothesis& base) const;
   /// A point with an effect added, at each of its starts; a correction that is there already starts where it
@@ -140,7 +142,7 @@ class Search {
   std::vector<FitPoint> points_with(const FitPoint& from, std::size_t effect, const Hypothesis& base) const;
   /// Where a pair starts, on all of the training data.
   FitPoint pair_point(const Hypothesis& base, const Hypothesis& first, const Hypothesis& second) const;
-  std::vector<PlantState<double>> sieve_starts(const std::vector<PlantState<double>>& starts) const;
+  std::vector<PlantState<double>> screening_starts(const std::vector<PlantState<double>>& starts) const;
   /// Fits once more from less noise, and keeps what is better: much noise and a poor fit hold each other up.
   void calm(Hypothesis& h, const FitOptions& options);
   /// Whether a fit from less noise may find better: of what is far better than `base`, as a part of the
@@ -152,8 +154,9 @@ class Search {
   Plant given_;  ///< the plant file
   Plant plant_;  ///< the same with every correction at its neutral value
   FitData train_, held_;
-  FitData sieve_;  ///< every few training segments: enough to see which candidates are worth a whole fit
-  std::vector<std::size_t> sieve_places_;
+  FitData screening_subset_;  ///< every few training segments: enough to see which candidates are worth a
+                              ///< whole fit
+  std::vector<std::size_t> screening_places_;
   DataRange range_;
   std::vector<std::size_t> nuisances_;
   std::vector<PlantState<double>> train_starts_, held_starts_;

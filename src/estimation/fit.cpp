@@ -93,10 +93,11 @@ bool has_channel(const Measurement& run, const Plant& plant, int channel) {
   return channel == 0 ? run.has_cart() : run.has_theta() && plant.pendulum.has_value();
 }
 
-/// The Kalman filter that whitens residuals, and any columns that pass through it alike.
-class Whitener {
+/// Covariance, gains and innovation variances of the extended Kalman filter, whose innovations are white
+/// under the right model.
+class EkfCovariance {
  public:
-  Whitener(const Measurement& run, const Plant& plant, const Noise& noise)
+  EkfCovariance(const Measurement& run, const Plant& plant, const Noise& noise)
       : noise_(noise),
         present_{has_channel(run, plant, 0), has_channel(run, plant, 1)},
         sensor_variance_{square(run.has_cart() ? run.cart_noise_m() : 1.0),
@@ -116,9 +117,9 @@ class Whitener {
 
   bool present(int channel) const { return present_[channel]; }
 
-  /// Prepares the update with one channel: gain and innovation variance. What is only a part of a measurement
+  /// Updates with one channel: its gain and innovation variance. What is only a part of a measurement
   /// corrects by as much less.
-  void prepare(const LinearStep& step, int channel) {
+  void update(const LinearStep& step, int channel) {
     const double c = step.gain[channel];
     const double sensor =
         square(noise_.sensors) * sensor_variance_[channel] + square(noise_.jitter_s * step.rate[channel]);
@@ -247,15 +248,15 @@ void count(Likelihood& sum, double e, double variance, double weight) {
 
 /// Likelihood of a segment that is linearised, had the noise been another: to first order the filtered
 /// trajectory moves by what the other gains would have corrected.
-Likelihood whiten(const std::vector<LinearStep>& steps, const Measurement& run, const Plant& plant,
-                  const Noise& noise) {
-  Whitener whitener(run, plant, noise);
+Likelihood likelihood_with_noise(const std::vector<LinearStep>& steps, const Measurement& run,
+                                 const Plant& plant, const Noise& noise) {
+  EkfCovariance covariance(run, plant, noise);
   Likelihood sum;
   double shift[states] = {}, moved[states];
   for (std::size_t k = 0; k < steps.size(); ++k) {
     const LinearStep& step = steps[k];
     if (k > 0) {
-      whitener.predict(step);
+      covariance.predict(step);
       for (int i = 0; i < states; ++i) {
         moved[i] = 0.0;
         for (int j = 0; j < states; ++j) moved[i] += step.transition[i][j] * shift[j];
@@ -264,14 +265,14 @@ Likelihood whiten(const std::vector<LinearStep>& steps, const Measurement& run, 
     }
     double update[states] = {}, former[states] = {};
     for (int channel = 0; channel < 2; ++channel) {
-      if (!whitener.present(channel)) continue;
-      whitener.prepare(step, channel);
+      if (!covariance.present(channel)) continue;
+      covariance.update(step, channel);
       const double c = step.gain[channel];
       const double e = step.residual[channel] - c * (shift[channel] + update[channel]);
       const double e_former = step.residual[channel] - c * former[channel];
-      count(sum, e, whitener.variance(), step.weight[channel]);
+      count(sum, e, covariance.variance(), step.weight[channel]);
       for (int i = 0; i < states; ++i) {
-        update[i] += whitener.gain()[i] * e;
+        update[i] += covariance.gain()[i] * e;
         former[i] += step.update[channel][i] * e_former;
       }
     }
@@ -397,7 +398,7 @@ void linearise_segment(const Measurement& run, const Segment& segment, const Eng
   }
   Eigen::Matrix<double, N, N> information = Eigen::Matrix<double, N, N>::Zero();
   Row score = Row::Zero();
-  Whitener whitener(run, point.plant, point.noise);
+  EkfCovariance covariance(run, point.plant, point.noise);
   steps.resize(segment.last - segment.first + 1);
   if (with_normal) {
     normal.h.setZero(columns, columns);
@@ -435,7 +436,7 @@ void linearise_segment(const Measurement& run, const Segment& segment, const Eng
       step.gain[channel] = value_of(sensors[static_cast<std::size_t>(channel)]);
       step.weight[channel] = weight_of(run, channel, k);
       step.residual[channel] =
-          whitener.present(channel) ? measured(run, channel, k) - simulated[channel] : 0.0;
+          covariance.present(channel) ? measured(run, channel, k) - simulated[channel] : 0.0;
     }
     step.rate[0] = value_of(reached.cart_mps);
     step.rate[1] = value_of(reached.theta_radps);
@@ -453,7 +454,7 @@ void linearise_segment(const Measurement& run, const Segment& segment, const Eng
       step.by_torque[1] = total_mass / determinant;
     }
     if (!first) {
-      whitener.predict(step);
+      covariance.predict(step);
       if (with_normal) {
         former = sensitivity;
         for (std::size_t i = 0; i < states; ++i) {
@@ -467,14 +468,14 @@ void linearise_segment(const Measurement& run, const Segment& segment, const Eng
     }
     double update[states] = {};
     for (int channel = 0; channel < 2; ++channel) {
-      if (!whitener.present(channel)) continue;
-      whitener.prepare(step, channel);
-      step.variance[channel] = whitener.variance();
-      std::copy(whitener.gain(), whitener.gain() + states, step.update[channel]);
+      if (!covariance.present(channel)) continue;
+      covariance.update(step, channel);
+      step.variance[channel] = covariance.variance();
+      std::copy(covariance.gain(), covariance.gain() + states, step.update[channel]);
       const double e = step.residual[channel] - step.gain[channel] * update[channel];
-      for (int i = 0; i < states; ++i) update[i] += whitener.gain()[i] * e;
+      for (int i = 0; i < states; ++i) update[i] += covariance.gain()[i] * e;
       if (!with_normal) continue;
-      count(normal.likelihood, e, whitener.variance(), step.weight[channel]);
+      count(normal.likelihood, e, covariance.variance(), step.weight[channel]);
       if (!std::isfinite(e)) return;
       // Of what the sensor shows, what is its own, and what comes with the state.
       Row row = channel == 0 ? outputs.cart_m.v : outputs.theta_rad.v;
@@ -483,14 +484,14 @@ void linearise_segment(const Measurement& run, const Segment& segment, const Eng
       row.template head<states>().setZero();
       row += step.gain[channel] * sensitivity[static_cast<std::size_t>(channel)];
       if (channel == 0) row += shown_of_speed_s * sensitivity[2];
-      const double weight = step.weight[channel] / whitener.variance();
+      const double weight = step.weight[channel] / covariance.variance();
       add_square(row, weight, columns, information);
       score += (weight * e) * row;
       for (std::size_t i = 0; i < states; ++i) {
-        if (whitener.gain()[i] == 0.0) continue;
-        sensitivity[i] -= whitener.gain()[i] * row;
+        if (covariance.gain()[i] == 0.0) continue;
+        sensitivity[i] -= covariance.gain()[i] * row;
         const std::size_t sensor = i % 2 == 0 ? 0 : 1;  // x, v and the bristles; theta and omega
-        sensitivity[i] -= whitener.gain()[i] * e * worth_less[sensor];
+        sensitivity[i] -= covariance.gain()[i] * e * worth_less[sensor];
       }
     }
     correct_state(simulator.engine(), update);
@@ -622,16 +623,16 @@ class Fitter {
     constexpr double out_of_reach = 3.0;
     count_work();
     const std::size_t none = order_.size();
-    std::atomic<std::size_t> spoiler = none;
+    std::atomic<std::size_t> rejecting_segment = none;
     parallel_for(order_.size(), [&](std::size_t i) {
-      if (spoiler != none) return;
+      if (rejecting_segment != none) return;
       const std::size_t s = order_[i];
       linearise(s);
       const double rise = normals_[s].likelihood.objective() - former_normals_[s].likelihood.objective();
-      if (!(rise < out_of_reach * promised_fall)) spoiler = i;
+      if (!(rise < out_of_reach * promised_fall)) rejecting_segment = i;
     });
-    if (spoiler == none) return likelihood_of_normals() + prior_objective();
-    const auto place = order_.begin() + static_cast<std::ptrdiff_t>(spoiler.load());
+    if (rejecting_segment == none) return likelihood_of_normals() + prior_objective();
+    const auto place = order_.begin() + static_cast<std::ptrdiff_t>(rejecting_segment.load());
     std::rotate(order_.begin(), place, std::next(place));
     return infinity;
   }
@@ -848,7 +849,7 @@ class Fitter {
   double noise_objective(const Noise& noise) const {
     std::vector<double> parts(data_.segments.size());
     parallel_for(data_.segments.size(), [&](std::size_t s) {
-      parts[s] = whiten(steps_[s], run_of(s), point_.plant, noise).objective();
+      parts[s] = likelihood_with_noise(steps_[s], run_of(s), point_.plant, noise).objective();
     });
     double sum = 0.0;
     for (const double part : parts) sum += part;
@@ -856,7 +857,7 @@ class Fitter {
   }
 
   /// One number of the noise, of which the likelihood's maximum is sought.
-  struct Knob {
+  struct NoiseParameter {
     double Noise::*value;
     double smallest, largest;  ///< below the smallest it is `least`
     double least;
@@ -870,18 +871,18 @@ class Fitter {
     }
   };
 
-  /// Turns a knob one way for as long as the objective falls. How often it did.
-  int turn(Knob& knob, double move, double& objective) {
+  /// Moves a parameter of the noise one way for as long as the objective falls; returns how often it did.
+  int line_search(NoiseParameter& parameter, double move, double& objective) {
     constexpr double falls = 1e-3;
-    for (int turns = 0;; ++turns) {
+    for (int moves = 0;; ++moves) {
       Noise next = point_.noise;
-      const double now = next.*knob.value;
-      next.*knob.value = knob.moved(now, move);
-      if (next.*knob.value == now) return turns;
+      const double now = next.*parameter.value;
+      next.*parameter.value = parameter.moved(now, move);
+      if (next.*parameter.value == now) return moves;
       const double reached = noise_objective(next);
       if (!(reached < objective - falls)) {
-        knob.off = now == 0.0;
-        return turns;
+        parameter.off = now == 0.0;
+        return moves;
       }
       objective = reached;
       point_.noise = next;
@@ -896,23 +897,24 @@ class Fitter {
       cart = cart || run.has_cart();
       pendulum = pendulum || (run.has_theta() && point_.plant.pendulum);
     }
-    std::array<Knob, 4> knobs = {
-        Knob{&Noise::force, 1e-5, 10.0, 0.0, cart}, Knob{&Noise::torque, 1e-7, 1.0, 0.0, pendulum},
-        Knob{&Noise::jitter_s, 1e-6, 1e-2, 0.0, true}, Knob{&Noise::sensors, 1.0, 1e3, 1.0, true}};
+    std::array<NoiseParameter, 4> parameters = {NoiseParameter{&Noise::force, 1e-5, 10.0, 0.0, cart},
+                                                NoiseParameter{&Noise::torque, 1e-7, 1.0, 0.0, pendulum},
+                                                NoiseParameter{&Noise::jitter_s, 1e-6, 1e-2, 0.0, true},
+                                                NoiseParameter{&Noise::sensors, 1.0, 1e3, 1.0, true}};
     const double before = noise_objective(point_.noise);
     double objective = before;
     int changes = 0;
     for (const double factor : factors) {
-      for (Knob& knob : knobs)
-        if (!knob.off) knob.tried_at = -1;
+      for (NoiseParameter& parameter : parameters)
+        if (!parameter.off) parameter.tried_at = -1;
       int so_far = -1;
       for (int sweep = 0; sweep < 3 && changes != so_far; ++sweep) {
         so_far = changes;
-        for (Knob& knob : knobs) {
-          if (!knob.used || knob.tried_at == changes) continue;
-          int turns = turn(knob, factor, objective);
-          if (turns == 0) turns = turn(knob, 1.0 / factor, objective);
-          knob.tried_at = changes += turns;
+        for (NoiseParameter& parameter : parameters) {
+          if (!parameter.used || parameter.tried_at == changes) continue;
+          int moves = line_search(parameter, factor, objective);
+          if (moves == 0) moves = line_search(parameter, 1.0 / factor, objective);
+          parameter.tried_at = changes += moves;
         }
       }
     }
@@ -1116,7 +1118,7 @@ namespace {
 
 /// Where the initial state of one segment goes from several of the same, with noise that carries it over from
 /// one basin to the next: a plain simulation past friction or a cogged track has many.
-FitResult follow_through_noise(const FitData& segment, FitPoint point, const FitOptions& options) {
+FitResult fit_initial_state_through_noise(const FitData& segment, FitPoint point, const FitOptions& options) {
   const Noise wanted = point.noise;
   double work_samples = 0.0;
   for (const double share : {1.0, 0.1, 0.01, 1e-3}) {
@@ -1132,11 +1134,11 @@ FitResult follow_through_noise(const FitData& segment, FitPoint point, const Fit
   return found;
 }
 
-FitResult follow_segment(const FitData& segment, const FitPoint& point, const FitOptions& options) {
+FitResult fit_initial_state(const FitData& segment, const FitPoint& point, const FitOptions& options) {
   FitResult found = fit(segment, point, {}, options);
   constexpr double suspicious = 1.3;  // so far off, in noise standard deviations, that it may be elsewhere
   if (whitened_rms(found) < suspicious) return found;
-  FitResult other = follow_through_noise(segment, point, options);
+  FitResult other = fit_initial_state_through_noise(segment, point, options);
   const double work_samples = found.work_samples + other.work_samples;
   FitResult& better = other.objective < found.objective ? other : found;
   better.work_samples = work_samples;
@@ -1145,15 +1147,15 @@ FitResult follow_segment(const FitData& segment, const FitPoint& point, const Fi
 
 }  // namespace
 
-FitResult follow(const FitData& data, const FitPoint& start, int most_iterations) {
+FitResult fit_initial_states(const FitData& data, const FitPoint& start, int most_iterations) {
   FitOptions options;
   options.noise_rounds = 0;
   options.most_iterations = most_iterations;
   if (data.bound != nullptr) data.bound->check();
   std::vector<FitResult> found(data.segments.size());
   parallel_for(found.size(), [&](std::size_t s) {
-    found[s] = follow_segment({data.runs, {data.segments[s]}}, {start.plant, {start.starts[s]}, start.noise},
-                              options);
+    found[s] = fit_initial_state({data.runs, {data.segments[s]}},
+                                 {start.plant, {start.starts[s]}, start.noise}, options);
   });
   FitResult result;
   result.point = start;
@@ -1174,8 +1176,8 @@ FitResult follow(const FitData& data, const FitPoint& start, int most_iterations
   return result;
 }
 
-FitPoint with_starts_followed(const FitData& data, FitPoint point) {
-  const FitResult followed = follow(data, point, 6);
+FitPoint with_fitted_initial_states(const FitData& data, FitPoint point) {
+  const FitResult followed = fit_initial_states(data, point, 6);
   if (std::isfinite(followed.objective)) point.starts = followed.point.starts;
   return point;
 }

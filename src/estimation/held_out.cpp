@@ -8,8 +8,9 @@ namespace upright {
 
 namespace {
 
-/// How lively a stretch is: root mean square speed of the cart and of a pendulum of arm's length beside it.
-double liveliness(const Measurement& run, const Segment& stretch) {
+/// The excitation of a stretch: root mean square speed of the cart and of a pendulum of arm's length beside
+/// it.
+double excitation_of(const Measurement& run, const Segment& stretch) {
   constexpr double arm_m = 0.3;
   const auto stride = std::max<std::size_t>(1, static_cast<std::size_t>(0.02 / run.median_period_s()));
   double sum = 0.0, count = 0.0;
@@ -23,18 +24,18 @@ double liveliness(const Measurement& run, const Segment& stretch) {
   return std::sqrt(sum / std::max(count, 1.0));
 }
 
-/// Which stretches to hold out, a third of them: by default the middle one of each three in the order of how
-/// lively they are, so that the fit need not answer for motions beyond those it saw, in whatever order they
+/// Which stretches to hold out, a third of them: by default the middle one of each three in the order of
+/// their excitation, so that the fit need not answer for motions beyond those it saw, in whatever order they
 /// come.
 std::vector<std::size_t> choose_held_out(const std::vector<Measurement>& runs,
                                          const std::vector<Segment>& stretches, HeldOut which) {
-  std::vector<double> lively;
-  lively.reserve(stretches.size());
-  for (const Segment& stretch : stretches) lively.push_back(liveliness(runs[stretch.run], stretch));
+  std::vector<double> excitation;
+  excitation.reserve(stretches.size());
+  for (const Segment& stretch : stretches) excitation.push_back(excitation_of(runs[stretch.run], stretch));
   std::vector<std::size_t> order(stretches.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
   std::stable_sort(order.begin(), order.end(),
-                   [&](std::size_t a, std::size_t b) { return lively[a] < lively[b]; });
+                   [&](std::size_t a, std::size_t b) { return excitation[a] < excitation[b]; });
   std::vector<std::size_t> held;
   const bool middle = which != HeldOut::other;
   if (order.size() == 2) held = {order[middle ? 0 : 1]};

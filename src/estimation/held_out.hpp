@@ -13,7 +13,7 @@ struct DataSplit {
   std::vector<std::size_t> held_out_runs;  ///< none of a single run, a third of whose segments is held out
 };
 
-/// Which of each three in the order of how lively they are is held out: the middle one, alike to the rest, or
+/// Which of each three in the order of their excitation is held out: the middle one, alike to the rest, or
 /// another, where the fit needs what only that middle one shows. (Of two the calmer one, or the other.) `end`
 /// is `middle` of several runs, and the last third of a single one.
 enum class HeldOut { middle, other, end };

@@ -233,7 +233,7 @@ Demand ExperimentScript::settle(const ControlState& now) noexcept {
   still_s_ = 0.0;
   if (phase_s_ > longest_settling_s) {
     Demand demand = put(0.0);
-    demand.gave_up = true;
+    demand.timed_out = true;
     return demand;
   }
   const ServoModel& m = context_.servo;
@@ -273,7 +273,7 @@ Demand ExperimentScript::wait(const ControlState& now) noexcept {
     enter(ScriptPhase::acting);
     origin_m_ = now.cart_m;
   } else if (phase_s_ > piece_.patience_s) {
-    demand.gave_up = true;
+    demand.timed_out = true;
   }
   return demand;
 }
@@ -312,7 +312,7 @@ Demand ExperimentScript::swing_up(const ControlState& now) noexcept {
   const ServoModel& m = context_.servo;
   if (phase_s_ > piece_.patience_s) {
     Demand demand = put(0.0);
-    demand.gave_up = true;
+    demand.timed_out = true;
     return demand;
   }
   const double lean = wrapped(now.theta_rad);
@@ -446,7 +446,7 @@ Demand ExperimentScript::act(const ControlState& now) noexcept {
       if (done && farthest_m_ > pulse_felt_m) ++pulses_felt_;
       if (moved_m > context_.travel_m) {
         Demand demand = put(0.0);
-        demand.gave_up = true;
+        demand.timed_out = true;
         return demand;
       }
       break;

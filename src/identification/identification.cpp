@@ -143,7 +143,7 @@ class Identifier {
     model = fitted(model, trial_, 8, 1);
     so_far_ = model;
     Model calm = model;
-    calm.fit.point.noise = calmed(calm.fit.point.noise);
+    calm.fit.point.noise = reduced_process_noise(calm.fit.point.noise);
     calm = fitted(calm, trial_, 16, 1);
     if (rank_of(calm) < rank_of(model)) model = std::move(calm);
     so_far_ = model;
@@ -182,7 +182,7 @@ class Identifier {
       result_.residual = "the model cannot be simulated with these runs";
       return;
     }
-    ResidualStructure left = examine_fit(whole_, model.fit.point);
+    ResidualTests left = examine_fit(whole_, model.fit.point);
     search.judge(judged, sensors_only(judged.train.point.noise));
     if (!left.structured) compare_held_out(search, judged, left);
     const SimulationFloor noise = left.structured ? SimulationFloor{} : held_out_floor(search, judged, left);
@@ -286,7 +286,7 @@ class Identifier {
     point.noise = model.fit.covariance.size() > 0 ? model.fit.point.noise : Noise{};
     if (model.fit.covariance.size() == 0) point.noise.force = 0.01 * range_.largest_force_n;
     point.starts = guess_starts(runs_, data.segments, model.plant);
-    point = with_starts_followed(data, std::move(point));
+    point = with_fitted_initial_states(data, std::move(point));
     FitOptions fit_options;
     fit_options.most_iterations = iterations;
     fit_options.noise_rounds = noise_rounds;

@@ -71,13 +71,13 @@ std::vector<SweepRun> simulate(const Plant& plant, const RunRecord& run,
     theta0 += std::abs(r.theta0_rad) / static_cast<double>(trials.size());
     longest = std::max(longest, r.trial.delay_s);
   }
-  SweepTeam::Group cases;
+  SweepExecutor::Group cases;
   constexpr int count = 60;
   for (int i = 0; i <= count; ++i) cases.push_back({theta0, 1.2 * longest * i / count});
   std::vector<SweepRun> runs;
   const std::size_t most = std::max<std::size_t>(1, sweep_group_size(config));
   for (std::size_t begin = 0; begin < cases.size(); begin += most) {
-    const SweepTeam::Group group(
+    const SweepExecutor::Group group(
         cases.begin() + static_cast<std::ptrdiff_t>(begin),
         cases.begin() + static_cast<std::ptrdiff_t>(std::min(begin + most, cases.size())));
     const std::vector<SweepRun> done = run_sweep_group(config, group);

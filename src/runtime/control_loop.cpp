@@ -134,7 +134,7 @@ void ControlLoop::compute(const Wake& wake, LoopOutcome& outcome) noexcept {
     stop(outcome, StopReason::fell, wake.tick);
   else if (beyond_track(output.demand))
     stop(outcome, StopReason::track_limit, wake.tick);
-  else if (output.demand.gave_up)
+  else if (output.demand.timed_out)
     stop(outcome, StopReason::not_ready, wake.tick);
   if (!stopped_) watch_encoders(wake, balancing, outcome);
   over_ = output.demand.over;

@@ -43,15 +43,16 @@ bool earlier(const LoopCase& a, const LoopCase& b) {
 /// the same way every time.
 class Stages {
  public:
-  Stages(const SweepConfig& config, const SweepOptions& options, SweepTeam& team, SweepJournal* journal)
-      : config_(config), options_(options), team_(team), journal_(journal) {}
+  Stages(const SweepConfig& config, const SweepOptions& options, SweepExecutor& executor,
+         SweepJournal* journal)
+      : config_(config), options_(options), executor_(executor), journal_(journal) {}
 
   /// The runs of these cases, in their order; empty when stopped.
   std::vector<SweepRun> run(const std::vector<LoopCase>& cases) {
     const std::size_t size = sweep_group_size(config_);
     const std::size_t groups = (cases.size() + size - 1) / size;
     std::vector<SweepRun> runs(cases.size());
-    std::vector<SweepTeam::Group> open;
+    std::vector<SweepExecutor::Group> open;
     std::vector<std::size_t> open_number;
     known_ += cases.size();
     for (std::size_t g = 0; g < groups; ++g) {
@@ -67,7 +68,7 @@ class Stages {
       }
     }
     std::size_t finished = 0;
-    team_.run(
+    executor_.run(
         open,
         [&](std::size_t group, const std::vector<SweepRun>& made) {
           const std::size_t g = open_number[group];
@@ -99,7 +100,7 @@ class Stages {
 
   const SweepConfig& config_;
   const SweepOptions& options_;
-  SweepTeam& team_;
+  SweepExecutor& executor_;
   SweepJournal* journal_;
   std::size_t stage_ = 0, done_ = 0, known_ = 0, made_ = 0;
   bool interrupted_ = false;
@@ -341,9 +342,9 @@ void refuse_unstable(const SweepConfig& config, const std::vector<LinearMargin>&
                     "for it (upright design PLANT --out GAINS)");
 }
 
-std::vector<Transition> find_transitions(const SweepConfig& config, SweepTeam& team) {
+std::vector<Transition> find_transitions(const SweepConfig& config, SweepExecutor& executor) {
   const SweepOptions options;
-  Stages stages(config, options, team, nullptr);
+  Stages stages(config, options, executor, nullptr);
   TransitionSearch search(config, stages);
   std::vector<SweepRun> runs;
   search.bracket_by_halving(runs);
@@ -352,13 +353,13 @@ std::vector<Transition> find_transitions(const SweepConfig& config, SweepTeam& t
 }
 
 SweepResult run_sweep(const SweepConfig& config, const std::filesystem::path& folder,
-                      const SweepOptions& options, SweepTeam& team) {
+                      const SweepOptions& options, SweepExecutor& executor) {
   const std::vector<LinearMargin> margins = linear_margins(config);
   refuse_unstable(config, margins);
   prepare_folder(folder, options.overwrite);
   const std::string mode = options.transitions_only ? "# transitions only\n" : "";
   SweepJournal journal(folder / journal_name, mode + config.resolved_text);
-  Stages stages(config, options, team, &journal);
+  Stages stages(config, options, executor, &journal);
   TransitionSearch search(config, stages);
   SweepResult result;
   std::vector<SweepRun> refining;

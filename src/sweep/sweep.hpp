@@ -81,31 +81,31 @@ struct SweepResult {
 };
 
 /// Runs groups of cases, here or elsewhere.
-class SweepTeam {
+class SweepExecutor {
  public:
   using Group = std::vector<LoopCase>;
   using Done = std::function<void(std::size_t group, const std::vector<SweepRun>& runs)>;
-  virtual ~SweepTeam() = default;
+  virtual ~SweepExecutor() = default;
   /// Calls `done` once for each group, in any order but one call at a time, until all are done or `stop` is
   /// set.
   virtual void run(const std::vector<Group>& groups, const Done& done, const std::atomic<bool>* stop) = 0;
 };
 
 /// The processors of this machine. `threads` 0: all of them.
-std::unique_ptr<SweepTeam> make_thread_team(const SweepConfig& config, unsigned threads);
+std::unique_ptr<SweepExecutor> make_thread_executor(const SweepConfig& config, unsigned threads);
 
 /// One group of at most `sweep_group_size(config)` runs by the sweep's engine.
-std::vector<SweepRun> run_sweep_group(const SweepConfig& config, const SweepTeam::Group& group);
+std::vector<SweepRun> run_sweep_group(const SweepConfig& config, const SweepExecutor::Group& group);
 std::size_t sweep_group_size(const SweepConfig& config);
 
 /// The transitions alone, by bisection over the list of delays, nothing written.
-std::vector<Transition> find_transitions(const SweepConfig& config, SweepTeam& team);
+std::vector<Transition> find_transitions(const SweepConfig& config, SweepExecutor& executor);
 
 /// Runs the sweep and writes `sweep.csv`, `transitions.csv`, `margins.csv` and `sweep.yaml` into `folder`.
 /// While it goes on, `sweep.partial` there keeps what is done; a later call with the same sweep goes on from
 /// it. Throws ConfigError where the gains hold the plant neither near rest nor sliding even without delay,
 /// where the folder holds results already (unless `overwrite`) or those of another sweep.
 SweepResult run_sweep(const SweepConfig& config, const std::filesystem::path& folder,
-                      const SweepOptions& options, SweepTeam& team);
+                      const SweepOptions& options, SweepExecutor& executor);
 
 }  // namespace upright

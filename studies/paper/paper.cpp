@@ -498,7 +498,8 @@ class Paper {
         Series line;
         line.name = std::string(predicts ? "predictor, " : "gain (7), ") + model + " plant";
         line.color = color::curve(color++);
-        for (const Transition& t : find_transitions(config, *make_thread_team(config, options_.threads))) {
+        for (const Transition& t :
+             find_transitions(config, *make_thread_executor(config, options_.threads))) {
           line.x.push_back(t.falls_from_s);
           line.y.push_back(t.theta0_rad / degree);
         }
@@ -572,7 +573,7 @@ class Paper {
 
   std::vector<Transition> transitions(const Case& c, std::vector<double> theta0_rad, double longest_s) const {
     const SweepConfig config = sweep_of(c, std::move(theta0_rad), longest_s);
-    return find_transitions(config, *make_thread_team(config, options_.threads));
+    return find_transitions(config, *make_thread_executor(config, options_.threads));
   }
 
   static std::vector<double> rig_starts() { return {1.0 * degree, 3.0 * degree, 5.0 * degree}; }
@@ -593,7 +594,7 @@ class Paper {
     SweepConfig config = sweep_of(c, std::move(starts), 0.1);
     config.stable_below_rad = stable_rad;
     Changes found;
-    for (const Transition& t : find_transitions(config, *make_thread_team(config, options_.threads))) {
+    for (const Transition& t : find_transitions(config, *make_thread_executor(config, options_.threads))) {
       found.oscillates.include(t.oscillates_from_s);
       found.falls.include(t.falls_from_s);
     }

@@ -131,7 +131,7 @@ Series falls_of(const LoopSetup& setup, unsigned threads) {
     config.theta0_rad.push_back(least_deg * std::pow(most_deg / least_deg, static_cast<double>(i) / starts) *
                                 degree);
   Series line;
-  for (const Transition& t : find_transitions(config, *make_thread_team(config, threads))) {
+  for (const Transition& t : find_transitions(config, *make_thread_executor(config, threads))) {
     line.x.push_back(t.falls_from_s);
     line.y.push_back(t.theta0_rad / degree);
   }

@@ -233,7 +233,7 @@ TEST_F(SweepCommand, KeepsWhatIsDoneOnAnInterruptAndGoesOn) {
 
 #ifdef UPRIGHT_WITH_MPI
 
-class SweepOverRanks : public SweepCommand {
+class SweepOverMpi : public SweepCommand {
  protected:
   CommandResult with_ranks(int ranks, const std::string& arguments) const {
     return run_shell("ASAN_OPTIONS=detect_leaks=0 " + shell_quoted(UPRIGHT_MPIRUN) +
@@ -242,7 +242,7 @@ class SweepOverRanks : public SweepCommand {
   }
 };
 
-TEST_F(SweepOverRanks, GivesTheBytesOfOneProcessOverTwoAndThree) {
+TEST_F(SweepOverMpi, GivesTheBytesOfOneProcessOverTwoAndThree) {
   EXPECT_EQ(run_upright("sweep " + file() + " --out " + out("one")).exit_code, 0);
   for (const int ranks : {1, 2, 3}) {
     const std::string to = std::to_string(ranks) + "-ranks";
@@ -252,7 +252,7 @@ TEST_F(SweepOverRanks, GivesTheBytesOfOneProcessOverTwoAndThree) {
   }
 }
 
-TEST_F(SweepOverRanks, SpeaksOnceAndWithTheSameExitCode) {
+TEST_F(SweepOverMpi, SpeaksOnceAndWithTheSameExitCode) {
   write("4", "quick");
   const CommandResult result = with_ranks(2, file() + " --out " + out("a"));
   EXPECT_EQ(result.exit_code, 2);

@@ -218,7 +218,7 @@ double plain_rms(const std::vector<Measurement>& runs, const Plant& plant,
   for (const Segment& segment : cut_segments(runs))
     if (std::find(which.begin(), which.end(), segment.run) != which.end()) data.segments.push_back(segment);
   if (data.segments.empty()) return 0.0;
-  return whitened_rms(follow(data, {plant, guess_starts(runs, data.segments, plant), {}}));
+  return whitened_rms(fit_initial_states(data, {plant, guess_starts(runs, data.segments, plant), {}}));
 }
 
 std::vector<std::size_t> all_runs(const std::vector<Measurement>& runs) {
@@ -261,7 +261,8 @@ void describe_diagnosis(const Diagnosis& d, json& record) {
                   {"gap_after", effect.gap_after},
                   {"confusable_with", json::array()},
                   {"parameters", json::object()}};
-    for (const std::size_t other : effect.confusable_with) found["confusable_with"].push_back(kind_of(other));
+    for (const std::size_t other : effect.indistinguishable_from)
+      found["confusable_with"].push_back(kind_of(other));
     for (const ParameterEstimate& p : effect.parameters)
       found["parameters"][p.name] = {{"value", p.value}, {"low", p.low}, {"high", p.high}};
     record["found"].push_back(found);

@@ -20,7 +20,7 @@ using nlohmann::json;
 using Records = std::vector<json>;
 
 /// Structures that fit worse than the true one by less than this are not told apart.
-constexpr double told_apart = 16.0;
+constexpr double distinguishable = 16.0;
 
 bool is_failed(const json& r) {
   return r.contains("failed");
@@ -64,10 +64,10 @@ bool is_same_force(const json& r) {
 }
 
 /// By the data: whether the hidden effect differs from the one that was named.
-bool is_told_apart(const json& r) {
+bool is_distinguishable(const json& r) {
   if (is_same_force(r)) return false;
   return !r.contains("worse_if_named") || r.at("worse_if_named").is_null() ||
-         r.at("worse_if_named").get<double>() > told_apart;
+         r.at("worse_if_named").get<double>() > distinguishable;
 }
 
 bool is_right_first(const json& r) {
@@ -193,7 +193,7 @@ Figure coverage_figure(const Share& share, double low, double high) {
 
 std::vector<Figure> figures_of(const Records& records, bool disturbed) {
   const auto single = [](const json& r) { return is_single(r) && is_shown(r); };
-  const auto clear = [&](const json& r) { return single(r) && is_told_apart(r); };
+  const auto clear = [&](const json& r) { return single(r) && is_distinguishable(r); };
   std::vector<double> errors, over_floor;
   Share covered, floor_kept;
   for (const json& r : records) {
@@ -293,7 +293,7 @@ void write_counts(std::ostringstream& out, const Records& records) {
   row("hidden effects that the data show", is_single, is_shown);
   row("of these, exactly the same force as another", shown_single, is_same_force);
   row("of these, not told by the data from what was named", shown_single,
-      [](const json& r) { return !is_same_force(r) && !is_told_apart(r); });
+      [](const json& r) { return !is_same_force(r) && !is_distinguishable(r); });
   row(
       "of those with the same force as another: in the first's declared set",
       [&](const json& r) { return shown_single(r) && is_same_force(r); },
@@ -317,14 +317,14 @@ void write_counts(std::ostringstream& out, const Records& records) {
     row(
         std::string("right name first, ") + size,
         [=](const json& r) {
-          return is_single(r) && is_shown(r) && is_told_apart(r) && r.at("size") == size;
+          return is_single(r) && is_shown(r) && is_distinguishable(r) && r.at("size") == size;
         },
         is_right_first);
   for (const char* campaign : {"mixed", "hanging", "upright", "cart_alone", "locked"})
     row(
         std::string("right name first, ") + campaign,
         [=](const json& r) {
-          return is_single(r) && is_shown(r) && is_told_apart(r) && r.at("campaign") == campaign;
+          return is_single(r) && is_shown(r) && is_distinguishable(r) && r.at("campaign") == campaign;
         },
         is_right_first);
   for (const bool disturbed : {false, true}) {
@@ -396,7 +396,7 @@ void write_misses(std::ostringstream& out, const Records& records) {
     } else if (is_pair(r)) {
       missed = is_shown(r) && !names_both(r);
     } else {
-      missed = is_shown(r) && (!is_right_set(r) || (is_told_apart(r) && !is_right_first(r)));
+      missed = is_shown(r) && (!is_right_set(r) || (is_distinguishable(r) && !is_right_first(r)));
     }
     if (!missed) continue;
     std::string hidden, named;

@@ -218,7 +218,7 @@ void continuous(const char* name, const std::string& plant, double smoothing) {
 void cores() {
   SweepConfig config;
   config.setup = setup_for("exponential", 100.0);
-  std::vector<SweepTeam::Group> groups;
+  std::vector<SweepExecutor::Group> groups;
   const std::vector<LoopCase> cases = cases_240();
   for (std::size_t first = 0; first < cases.size(); first += lane_count)
     for (int repeat = 0; repeat < 12; ++repeat)
@@ -229,7 +229,7 @@ void cores() {
   for (int repeat = 0; repeat < 9; ++repeat) {
     for (const unsigned threads : {1u, 2u}) {
       const auto begin = std::chrono::steady_clock::now();
-      make_thread_team(config, threads)
+      make_thread_executor(config, threads)
           ->run(
               groups, [](std::size_t, const std::vector<SweepRun>&) {}, nullptr);
       const std::chrono::duration<double> wall = std::chrono::steady_clock::now() - begin;

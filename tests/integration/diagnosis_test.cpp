@@ -98,7 +98,8 @@ TEST(Diagnosis, NamesAConstantForceTogetherWithWhatItCannotBeToldFrom) {
   ASSERT_FALSE(d.effects.empty());
   const FoundEffect& first = d.effects.front();
   std::vector<std::string> set = {std::string(effect_registry()[first.effect].kind)};
-  for (const std::size_t other : first.confusable_with) set.emplace_back(effect_registry()[other].kind);
+  for (const std::size_t other : first.indistinguishable_from)
+    set.emplace_back(effect_registry()[other].kind);
   EXPECT_NE(std::find(set.begin(), set.end(), "constant_force"), set.end());
   EXPECT_NE(std::find(set.begin(), set.end(), "voltage_offset"), set.end());
   EXPECT_TRUE(d.next_experiment.has_value());
@@ -207,7 +208,8 @@ class Blind : public testing::TestWithParam<BlindCase> {
     if (diagnosis_.effects.empty()) return {};
     const FoundEffect& first = diagnosis_.effects.front();
     std::vector<std::string> set = {std::string(effect_registry()[first.effect].kind)};
-    for (const std::size_t other : first.confusable_with) set.emplace_back(effect_registry()[other].kind);
+    for (const std::size_t other : first.indistinguishable_from)
+      set.emplace_back(effect_registry()[other].kind);
     return set;
   }
 

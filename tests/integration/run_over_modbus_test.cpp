@@ -132,7 +132,7 @@ double outcome_number(const std::string& yaml, const std::string& key) {
 
 /// Every fresh row against what the plant did while it was read; every other row repeats the last fresh one
 /// and says so.
-void expect_no_old_count(const Outcome& outcome, const std::vector<Row>& rows, bool can_be_told) {
+void expect_no_old_count(const Outcome& outcome, const std::vector<Row>& rows, bool is_certain) {
   const double start_s = outcome_number(outcome.run_yaml, "started_monotonic_s");
   std::uint64_t sequence = 0;
   std::int64_t counts = 0;
@@ -153,7 +153,7 @@ void expect_no_old_count(const Outcome& outcome, const std::vector<Row>& rows, b
     if (!range.holds(row.cart_m)) ++wrong;
   }
   EXPECT_GT(fresh, 0u);
-  EXPECT_EQ(can_be_told ? wrong : 0u, 0u) << "of " << fresh;
+  EXPECT_EQ(is_certain ? wrong : 0u, 0u) << "of " << fresh;
 }
 
 /// The cycle that the outcome names is the first of the trouble and the log's row of it says so; a cycle that

@@ -88,11 +88,11 @@ TEST(MutantFinds, ASweepMakesAnewWhatItsJournalKeepsOfOtherCases) {
       "  theta0_deg: [1.0, 2.0]\n  delay_s: [0.0, 0.01, 0.02, 0.04]\n  duration_s: 0.5\n"
       "  outcome: {stable_below_rad: 0.0016, fell_above_rad: 1.0}\n  engine: fast\n");
   const SweepConfig sweep = read_sweep_file(file);
-  const auto team = make_thread_team(sweep, 1);
+  const auto executor = make_thread_executor(sweep, 1);
   std::string journal;
   SweepOptions options;
   options.progress = [&](std::size_t, std::size_t) { journal = text_of(out / "sweep.partial"); };
-  run_sweep(sweep, out, options, *team);
+  run_sweep(sweep, out, options, *executor);
   const std::string expected = text_of(out / "sweep.csv"), moved = text_of(out / "transitions.csv");
 
   for (std::size_t at = 0; (at = journal.find(" 0.04 ", at)) != std::string::npos;)
@@ -100,7 +100,7 @@ TEST(MutantFinds, ASweepMakesAnewWhatItsJournalKeepsOfOtherCases) {
   fs::remove_all(out);
   fs::create_directory(out);
   write(out / "sweep.partial", journal);
-  run_sweep(sweep, out, {}, *team);
+  run_sweep(sweep, out, {}, *executor);
   EXPECT_EQ(text_of(out / "sweep.csv"), expected);
   EXPECT_EQ(text_of(out / "transitions.csv"), moved);
 }

@@ -179,7 +179,7 @@ void drive_scripts(const ExperimentSetup& setup) {
       if (i % 300 == 200) state = any_state(random);
       if (i % 300 == 0) state = {0.0, std::numbers::pi, 0.0, 0.0};
       const Demand demand = script.next(tick += 1 + random() % 3, state);
-      if (demand.over || demand.gave_up) break;
+      if (demand.over || demand.timed_out) break;
     }
   }
 }

@@ -293,9 +293,9 @@ TEST(RecordedMutants, OfSweepResults) {
   const Folder folder;
   const QuickGnuplot quick(folder.path());
   const SweepConfig sweep = short_sweep(folder.path());
-  const auto team = make_thread_team(sweep, 1);
+  const auto executor = make_thread_executor(sweep, 1);
   const fs::path done = folder.path() / "done";
-  run_sweep(sweep, done, {}, *team);
+  run_sweep(sweep, done, {}, *executor);
   for (const char* name : {"sweep.csv", "transitions.csv", "margins.csv", "sweep.yaml"}) {
     const std::string good = text_of(done / name);
     feed({name, {good}, std::string("done/") + name}, folder, mutants() / 4 + 1,
@@ -305,22 +305,22 @@ TEST(RecordedMutants, OfSweepResults) {
 }
 
 /// The journal of a sweep whose last line was never written.
-std::string journal_of(const SweepConfig& sweep, const fs::path& folder, SweepTeam& team) {
+std::string journal_of(const SweepConfig& sweep, const fs::path& folder, SweepExecutor& executor) {
   SweepOptions options;
   std::string journal;
   options.progress = [&](std::size_t, std::size_t) { journal = text_of(folder / "sweep.partial"); };
-  run_sweep(sweep, folder, options, team);
+  run_sweep(sweep, folder, options, executor);
   return journal;
 }
 
 TEST(RecordedMutants, OfSweepJournals) {
   const Folder folder;
   const SweepConfig sweep = short_sweep(folder.path());
-  const auto team = make_thread_team(sweep, 1);
-  const std::string journal = journal_of(sweep, folder.path() / "whole", *team);
+  const auto executor = make_thread_executor(sweep, 1);
+  const std::string journal = journal_of(sweep, folder.path() / "whole", *executor);
   const fs::path done = folder.path() / "done";
   feed({"journal", {journal}, "done/sweep.partial"}, folder, mutants(), [&](const fs::path&) {
-    run_sweep(sweep, done, {}, *team);
+    run_sweep(sweep, done, {}, *executor);
     fs::remove_all(done);
     fs::create_directory(done);
   });

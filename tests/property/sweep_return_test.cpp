@@ -1,5 +1,5 @@
 // An unattended delay sweep goes on after each fall: the cart comes back from wherever the fall left it, the
-// pendulum is calmed and swung up again, until both transitions are found.
+// pendulum is reduced_process_noise and swung up again, until both transitions are found.
 #include <gtest/gtest.h>
 
 #include <algorithm>

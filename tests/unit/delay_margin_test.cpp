@@ -95,8 +95,8 @@ TEST(CharacteristicRoots, KnownAnswers) {
   EXPECT_NEAR(root.imag(), 0.0, 1e-10);
 }
 
-/// Growth over the second half of a linear loop's motion, from small states, of the simulator against the
-/// prediction.
+/// StepwiseSelection over the second half of a linear loop's motion, from small states, of the simulator
+/// against the prediction.
 double growth(const Plant& plant, const ControlConfig& config, double duration_s) {
   Controller controller(config, 1e6);
   Simulator<double> simulator(make_model<double>(plant));

@@ -52,7 +52,8 @@ TEST(Fit, BeginsAfterAGapWhenTheLagOfTheMotorHasForgottenWhatWasCommandedThere) 
     const std::vector<Measurement> runs = {measure(rig, plan, "run")};
     const FitData data{&runs, cut_segments(runs)};
     ASSERT_EQ(data.segments.size(), 4u);
-    const FitResult followed = follow(data, {plant, guess_starts(runs, data.segments, plant), {}});
+    const FitResult followed =
+        fit_initial_states(data, {plant, guess_starts(runs, data.segments, plant), {}});
     EXPECT_LT(whitened_rms(followed), 1.1) << gap_s;
   }
 }

@@ -25,10 +25,10 @@ class NextBestName : public testing::Test {
                          trial_of(1, "cable_spring", 690.0)};
   }
 
-  NextBest of(const char* kind, const std::vector<std::size_t>& confusable_with = {}) const {
+  NextBest of(const char* kind, const std::vector<std::size_t>& indistinguishable_from = {}) const {
     FoundEffect found;
     found.effect = effect_number(kind);
-    found.confusable_with = confusable_with;
+    found.indistinguishable_from = indistinguishable_from;
     return next_best(diagnosis_, found);
   }
 

@@ -332,8 +332,8 @@ TEST_F(SweepFolder, RefusesWhatCannotBeSwept) {
 TEST_F(SweepFolder, FindsTheCriticalDelayOfALinearPlant) {
   // Gain (7) on viscous friction alone: 0.01536 s (paper-facts). Short runs near it neither decay nor fall.
   const SweepConfig config = read_sweep_file(write(text_with("duration_s", "60")));
-  const auto team = make_thread_team(config, 2);
-  const SweepResult result = run_sweep(config, folder_ / "out", {}, *team);
+  const auto executor = make_thread_executor(config, 2);
+  const SweepResult result = run_sweep(config, folder_ / "out", {}, *executor);
   ASSERT_EQ(result.transitions.size(), 2u);
   for (const Transition& transition : result.transitions) {
     EXPECT_NEAR(transition.oscillates_from_s, 0.01536, 4e-4);
@@ -348,8 +348,8 @@ TEST_F(SweepFolder, TakesAPredictorAlong) {
   text.replace(text.find("continuous"), 10, "sampled\n  rig: " + source + "/config/rigs/simulated.yaml");
   const SweepConfig config = read_sweep_file(write(text));
   ASSERT_TRUE(config.setup.make_parts);
-  const auto team = make_thread_team(config, 1);
-  for (const SweepRun& run : run_sweep(config, folder_ / "out", {}, *team).runs) {
+  const auto executor = make_thread_executor(config, 1);
+  for (const SweepRun& run : run_sweep(config, folder_ / "out", {}, *executor).runs) {
     EXPECT_TRUE(std::isnan(run.fall_time_s)) << run.start.delay_s;
     EXPECT_LT(run.theta_amplitude_rad, 0.02) << run.start.delay_s;
   }
@@ -357,7 +357,7 @@ TEST_F(SweepFolder, TakesAPredictorAlong) {
 
 TEST_F(SweepFolder, GivesTheSameBytesForAnyNumberOfThreadsAndAfterAStop) {
   const SweepConfig config = read_sweep_file(write(text_with("", "")));
-  const auto one = make_thread_team(config, 1), three = make_thread_team(config, 3);
+  const auto one = make_thread_executor(config, 1), three = make_thread_executor(config, 3);
   run_sweep(config, folder_ / "one", {}, *one);
   run_sweep(config, folder_ / "three", {}, *three);
 
@@ -384,33 +384,33 @@ TEST_F(SweepFolder, GivesTheSameBytesForAnyNumberOfThreadsAndAfterAStop) {
 
 TEST_F(SweepFolder, OverwritesNothingUnasked) {
   const SweepConfig config = read_sweep_file(write(text_with("", "")));
-  const auto team = make_thread_team(config, 2);
-  run_sweep(config, folder_ / "out", {}, *team);
-  EXPECT_THROW(run_sweep(config, folder_ / "out", {}, *team), ConfigError);
+  const auto executor = make_thread_executor(config, 2);
+  run_sweep(config, folder_ / "out", {}, *executor);
+  EXPECT_THROW(run_sweep(config, folder_ / "out", {}, *executor), ConfigError);
   SweepOptions options;
   options.overwrite = true;
-  EXPECT_NO_THROW(run_sweep(config, folder_ / "out", options, *team));
+  EXPECT_NO_THROW(run_sweep(config, folder_ / "out", options, *executor));
 }
 
 TEST_F(SweepFolder, DoesNotGoOnFromAnotherSweep) {
   const SweepConfig config = read_sweep_file(write(text_with("", "")));
   const SweepConfig other = read_sweep_file(write(text_with("duration_s", "5")));
-  const auto team = make_thread_team(config, 1);
+  const auto executor = make_thread_executor(config, 1);
   std::atomic<bool> stop{false};
   SweepOptions options;
   options.stop = &stop;
   options.progress = [&stop](std::size_t, std::size_t) { stop = true; };
-  run_sweep(config, folder_ / "out", options, *team);
-  EXPECT_THROW(run_sweep(other, folder_ / "out", {}, *team), ConfigError);
+  run_sweep(config, folder_ / "out", options, *executor);
+  EXPECT_THROW(run_sweep(other, folder_ / "out", {}, *executor), ConfigError);
 }
 
 TEST_F(SweepFolder, BisectionFindsWhatTheGridFindsWithFewerRuns) {
   const SweepConfig config = read_sweep_file(write(text_with("delay_s", "{from: 0.0, to: 0.04, count: 41}")));
-  const auto team = make_thread_team(config, 2);
+  const auto executor = make_thread_executor(config, 2);
   SweepOptions options;
   options.transitions_only = true;
-  const SweepResult grid = run_sweep(config, folder_ / "grid", {}, *team);
-  const SweepResult quick = run_sweep(config, folder_ / "quick", options, *team);
+  const SweepResult grid = run_sweep(config, folder_ / "grid", {}, *executor);
+  const SweepResult quick = run_sweep(config, folder_ / "quick", options, *executor);
   EXPECT_LT(quick.runs_made * 2, grid.runs_made);
   EXPECT_EQ(content(folder_ / "grid" / "transitions.csv"), content(folder_ / "quick" / "transitions.csv"));
 }

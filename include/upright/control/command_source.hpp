@@ -13,9 +13,9 @@ struct Demand {
   double reference_m = 0.0;    ///< set-point of the cart
   double reference_rad = 0.0;  ///< whole turns at which the pendulum is upright
   double voltage_v = 0.0;
-  bool homing = false;   ///< on its way to where it starts: the cart may begin beyond the track limit
-  bool over = false;     ///< there is nothing more to do: the run is complete with this period
-  bool gave_up = false;  ///< what was waited for did not come: the run stops
+  bool homing = false;     ///< on its way to where it starts: the cart may begin beyond the track limit
+  bool over = false;       ///< there is nothing more to do: the run is complete with this period
+  bool timed_out = false;  ///< what was waited for did not come: the run stops
 };
 
 /// Called once per computed period, in the loop: no allocation, no lock, no exception. The same inputs give

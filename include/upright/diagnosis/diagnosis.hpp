@@ -30,7 +30,7 @@ struct FoundEffect {
   std::size_t effect = 0;
   double gap_before = 0.0, gap_after = 0.0;
   std::vector<ParameterEstimate> parameters;
-  std::vector<std::size_t> confusable_with;
+  std::vector<std::size_t> indistinguishable_from;
   std::string where;
 };
 

@@ -77,7 +77,7 @@ struct LinearStep {
 
 /// A tenth of the force and torque noise. Much noise and a poor fit hold each other up: a second descent
 /// begins with little noise.
-inline Noise calmed(Noise noise) {
+inline Noise reduced_process_noise(Noise noise) {
   noise.force *= 0.1;
   noise.torque *= 0.1;
   return noise;
@@ -140,13 +140,13 @@ struct FitOptions {
 FitResult fit(const FitData& data, const FitPoint& start, const std::vector<FreeParameter>& free,
               const FitOptions& options = {});
 
-/// Lets the initial states follow, with plant and noise held. Throws as `fit` does.
-FitResult follow(const FitData& data, const FitPoint& start,
-                 int most_iterations = FitOptions{}.most_iterations);
+/// Fits the initial states alone, with plant and noise held. Throws as `fit` does.
+FitResult fit_initial_states(const FitData& data, const FitPoint& start,
+                             int most_iterations = FitOptions{}.most_iterations);
 
-/// The point with its initial states followed, for a first fit: what guessed ones leave is not noise. As it
+/// The point with its initial states fitted, for a first fit: what guessed ones leave is not noise. As it
 /// was where they cannot be.
-FitPoint with_starts_followed(const FitData& data, FitPoint point);
+FitPoint with_fitted_initial_states(const FitData& data, FitPoint point);
 
 /// Linearised steps of every segment at a point, for residual analysis.
 std::vector<std::vector<LinearStep>> linearise(const FitData& data, const FitPoint& point);

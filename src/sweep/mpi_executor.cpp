@@ -1,4 +1,4 @@
-#include "sweep_ranks.hpp"
+#include "mpi_executor.hpp"
 
 #include <cstdlib>
 
@@ -50,7 +50,7 @@ bool receive(int from, std::vector<double>& numbers, MPI_Status& status) {
 }
 
 /// Groups as numbers: for each its number, its size, and its cases.
-void append(std::vector<double>& message, std::size_t number, const SweepTeam::Group& group) {
+void append(std::vector<double>& message, std::size_t number, const SweepExecutor::Group& group) {
   message.push_back(static_cast<double>(number));
   message.push_back(static_cast<double>(group.size()));
   for (const LoopCase& start : group) message.insert(message.end(), {start.theta0_rad, start.delay_s});
@@ -64,7 +64,7 @@ void append(std::vector<double>& message, std::size_t number, const std::vector<
                                    run.theta_amplitude_rad, run.cart_amplitude_m});
 }
 
-class RankTeam final : public SweepTeam {
+class RankTeam final : public SweepExecutor {
  public:
   RankTeam(const SweepConfig& config, int ranks, unsigned threads)
       : config_(config), threads_(threads), idle_(static_cast<std::size_t>(ranks), true) {
@@ -166,7 +166,7 @@ class RankTeam final : public SweepTeam {
 
 }  // namespace
 
-SweepRanks::SweepRanks() {
+MpiExecutor::MpiExecutor() {
   if (!started_by_mpirun()) return;
   int provided = 0;
   MPI_Init_thread(nullptr, nullptr, MPI_THREAD_FUNNELED, &provided);
@@ -174,19 +174,19 @@ SweepRanks::SweepRanks() {
   MPI_Comm_size(MPI_COMM_WORLD, &count_);
 }
 
-SweepRanks::~SweepRanks() {
+MpiExecutor::~MpiExecutor() {
   int initialized = 0;
   MPI_Initialized(&initialized);
   if (initialized != 0) MPI_Finalize();
 }
 
-std::unique_ptr<SweepTeam> SweepRanks::make_team(const SweepConfig& config, unsigned threads) const {
-  if (count_ == 1) return make_thread_team(config, threads);
+std::unique_ptr<SweepExecutor> MpiExecutor::make_executor(const SweepConfig& config, unsigned threads) const {
+  if (count_ == 1) return make_thread_executor(config, threads);
   return std::make_unique<RankTeam>(config, count_, std::max(1u, threads));
 }
 
-void SweepRanks::serve(const SweepConfig& config, unsigned threads) const {
-  const std::unique_ptr<SweepTeam> team = make_thread_team(config, std::max(1u, threads));
+void MpiExecutor::serve(const SweepConfig& config, unsigned threads) const {
+  const std::unique_ptr<SweepExecutor> executor = make_thread_executor(config, std::max(1u, threads));
   std::vector<double> message;
   MPI_Status status;
   while (true) {
@@ -196,10 +196,10 @@ void SweepRanks::serve(const SweepConfig& config, unsigned threads) const {
     }
     if (status.MPI_TAG == end_tag) return;
     std::vector<std::size_t> numbers;
-    std::vector<SweepTeam::Group> groups;
+    std::vector<SweepExecutor::Group> groups;
     for (std::size_t at = 0; at < message.size();) {
       numbers.push_back(static_cast<std::size_t>(message[at]));
-      SweepTeam::Group& group = groups.emplace_back(static_cast<std::size_t>(message[at + 1]));
+      SweepExecutor::Group& group = groups.emplace_back(static_cast<std::size_t>(message[at + 1]));
       at += 2;
       for (LoopCase& start : group) {
         start = {message[at], message[at + 1]};
@@ -207,7 +207,7 @@ void SweepRanks::serve(const SweepConfig& config, unsigned threads) const {
       }
     }
     std::vector<double> reply;
-    team->run(
+    executor->run(
         groups,
         [&](std::size_t group, const std::vector<SweepRun>& runs) { append(reply, numbers[group], runs); },
         nullptr);
@@ -217,18 +217,18 @@ void SweepRanks::serve(const SweepConfig& config, unsigned threads) const {
 
 #else
 
-SweepRanks::SweepRanks() {
+MpiExecutor::MpiExecutor() {
   if (started_by_mpirun())
     throw ConfigError(
         "this program was built without MPI: install libopenmpi-dev and build again, or go without mpirun");
 }
-SweepRanks::~SweepRanks() = default;
+MpiExecutor::~MpiExecutor() = default;
 
-std::unique_ptr<SweepTeam> SweepRanks::make_team(const SweepConfig& config, unsigned threads) const {
-  return make_thread_team(config, threads);
+std::unique_ptr<SweepExecutor> MpiExecutor::make_executor(const SweepConfig& config, unsigned threads) const {
+  return make_thread_executor(config, threads);
 }
 
-void SweepRanks::serve(const SweepConfig&, unsigned) const {}
+void MpiExecutor::serve(const SweepConfig&, unsigned) const {}
 
 #endif
 

@@ -1,6 +1,6 @@
 // Simulation of measured segments, and the rig that makes blind data: both against each other, since one
 // follows the event engine and the other the CVODE reference.
-#include "diagnosis/trace.hpp"
+#include "diagnosis/simulated_segments.hpp"
 
 #include <gtest/gtest.h>
 
@@ -43,7 +43,7 @@ TEST(SimulateSegments, OfTheTruePlantLeavesTheEncodersSteps) {
     const std::vector<Measurement> runs = {measure(rig, short_plan(experiment), "run")};
     const auto traces = simulate_segments(rig.plant, runs, cut_segments(runs));
     ASSERT_FALSE(traces.empty());
-    for (const SimulatedTrace& trace : traces) {
+    for (const SimulatedSegment& trace : traces) {
       EXPECT_LT(rms_of_difference(trace.cart_m, trace.simulated_cart_m), 0.5 * rig.cart_step_m);
       EXPECT_LT(rms_of_difference(trace.theta_rad, trace.simulated_theta_rad), 0.5 * rig.theta_step_rad);
     }
@@ -62,7 +62,7 @@ TEST(SimulateSegments, FindsTheBasinOfTheInitialStateOnACoggedTrack) {
     plan.seed = seed;
     runs.push_back(measure(rig, plan, "run"));
   }
-  for (const SimulatedTrace& trace : simulate_segments(rig.plant, runs, cut_segments(runs)))
+  for (const SimulatedSegment& trace : simulate_segments(rig.plant, runs, cut_segments(runs)))
     EXPECT_LT(rms_of_difference(trace.cart_m, trace.simulated_cart_m), rig.cart_step_m);
 }
 
@@ -72,7 +72,7 @@ TEST(SimulateSegments, OfAnotherPlantIsOff) {
   Plant other = rig.plant;
   other.remove(effect_number("coulomb_friction"));
   double largest = 0.0;
-  for (const SimulatedTrace& trace : simulate_segments(other, runs, cut_segments(runs)))
+  for (const SimulatedSegment& trace : simulate_segments(other, runs, cut_segments(runs)))
     largest = std::max(largest, rms_of_difference(trace.cart_m, trace.simulated_cart_m));
   EXPECT_GT(largest, 20.0 * rig.cart_step_m);
 }
@@ -80,7 +80,7 @@ TEST(SimulateSegments, OfAnotherPlantIsOff) {
 TEST(SimulateSegments, LeavesEmptyWhatIsNotMeasured) {
   const blind::Rig rig{.plant = rig_plant()};
   const std::vector<Measurement> runs = {measure(rig, short_plan(blind::Experiment::locked_swing), "run")};
-  for (const SimulatedTrace& trace : simulate_segments(rig.plant, runs, cut_segments(runs))) {
+  for (const SimulatedSegment& trace : simulate_segments(rig.plant, runs, cut_segments(runs))) {
     EXPECT_TRUE(trace.cart_m.empty());
     EXPECT_TRUE(trace.simulated_cart_m.empty());
     EXPECT_EQ(trace.theta_rad.size(), trace.time_s.size());

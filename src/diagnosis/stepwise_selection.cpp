@@ -1,4 +1,4 @@
-#include "growth.hpp"
+#include "stepwise_selection.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -6,7 +6,7 @@
 #include <numeric>
 #include <sstream>
 
-#include "structure.hpp"
+#include "residual_tests.hpp"
 #include "upright/base/error.hpp"
 
 namespace upright {
@@ -39,10 +39,10 @@ constexpr std::size_t most_resembling = 8;
 
 }  // namespace
 
-Growth::Growth(Search& search, const DiagnosisOptions& options, Diagnosis& record)
+StepwiseSelection::StepwiseSelection(Search& search, const DiagnosisOptions& options, Diagnosis& record)
     : search_(search), options_(options), record_(record) {}
 
-void Growth::begin() {
+void StepwiseSelection::begin() {
   options_.tell(0.02, "comparing the model as given");
   given_ = search_.baseline();
   if (!std::isfinite(given_.train.objective))
@@ -50,13 +50,13 @@ void Growth::begin() {
   current_ = given_;
 }
 
-void Growth::find() {
+void StepwiseSelection::find() {
   grow(0, most_rounds, false);
   try_pairs(finalists_);
   prune();
 }
 
-bool Growth::begin_anew() {
+bool StepwiseSelection::begin_anew() {
   options_.tell(0.83, "beginning anew");
   Hypothesis h = search_.begun_anew(current_);
   if (!(h.train.objective < current_.train.objective - equally_good)) return false;
@@ -64,21 +64,21 @@ bool Growth::begin_anew() {
   return true;
 }
 
-bool Growth::find_pairs_of_all() {
+bool StepwiseSelection::find_pairs_of_all() {
   if (!try_pairs(resembling_)) return false;
   prune();
   return true;
 }
 
-bool Growth::find_thoroughly(bool certainly_missing) {
+bool StepwiseSelection::find_thoroughly(bool certainly_missing) {
   const std::vector<std::size_t> before = found_;
   const double objective = current_.train.objective;
   grow(most_rounds, 2 * most_rounds, true);
   // What certainly is missing shows on a part of many data too.
   constexpr double few = 0.5;
-  const double share = search_.sieve_share();
+  const double share = search_.screening_share();
   if (share < 1.0 && !(certainly_missing && share < few)) {
-    search_.sieve_all();
+    search_.screen_on_all();
     grow(2 * most_rounds, 3 * most_rounds, false);
   }
   // On the way a better place may have been found for the noise alone.
@@ -87,15 +87,15 @@ bool Growth::find_thoroughly(bool certainly_missing) {
   return true;
 }
 
-std::vector<std::size_t> Growth::open_candidates() const {
+std::vector<std::size_t> StepwiseSelection::open_candidates() const {
   std::vector<std::size_t> candidates = candidate_effects(current_.train.point.plant, search_.range());
   for (const std::size_t effect : search_.nuisances())
     if (!current_.added.contains(effect)) candidates.push_back(effect);
   return candidates;
 }
 
-std::vector<std::size_t> Growth::promising(const Hypothesis& from, const std::vector<std::size_t>& candidates,
-                                           int round) {
+std::vector<std::size_t> StepwiseSelection::promising(const Hypothesis& from,
+                                                      const std::vector<std::size_t>& candidates, int round) {
   constexpr double share = 0.1;
   constexpr std::size_t least_count = 8;
   const std::vector<double> promised = search_.promised_gains(from, candidates);
@@ -120,15 +120,15 @@ std::vector<std::size_t> Growth::promising(const Hypothesis& from, const std::ve
   return chosen;
 }
 
-double Growth::price_of(std::size_t effect) {
+double StepwiseSelection::price_of(std::size_t effect) {
   return parameter_price * static_cast<double>(effect_registry()[effect].parameters.size() - 1);
 }
 
-double Growth::price_of_change(const Hypothesis& from, const Hypothesis& to) {
+double StepwiseSelection::price_of_change(const Hypothesis& from, const Hypothesis& to) {
   return parameter_price * (static_cast<double>(to.free.size()) - static_cast<double>(from.free.size()));
 }
 
-bool Growth::is_believed(Hypothesis& h, const Improvement& improvement, std::size_t effect) {
+bool StepwiseSelection::is_believed(Hypothesis& h, const Improvement& improvement, std::size_t effect) {
   const double evidence = improvement.train - price_of(effect);
   const double t = witnessed_t(improvement);
   if (is_borne_out(improvement, effect) && t > least_t) return true;
@@ -144,23 +144,23 @@ bool Growth::is_believed(Hypothesis& h, const Improvement& improvement, std::siz
          search_.simulate(h).gap < as_sensors;
 }
 
-double Growth::witnessed_t(const Improvement& improvement) {
+double StepwiseSelection::witnessed_t(const Improvement& improvement) {
   constexpr double chance = 1.0;
   if (!(improvement.t_value > chance)) return improvement.t_value;
   return std::sqrt(improvement.t_value * improvement.t_value + std::max(improvement.held, 0.0));
 }
 
-bool Growth::is_borne_out(const Improvement& improvement, std::size_t effect) {
+bool StepwiseSelection::is_borne_out(const Improvement& improvement, std::size_t effect) {
   const double evidence = improvement.train - price_of(effect);
   constexpr double least_share = 8.0, least_together = 40.0;
   return std::min(evidence, improvement.held) > least_share && evidence + improvement.held > least_together;
 }
 
-bool Growth::is_overwhelming(const Improvement& improvement, std::size_t effect) {
+bool StepwiseSelection::is_overwhelming(const Improvement& improvement, std::size_t effect) {
   return improvement.train - price_of(effect) > overwhelming_evidence && improvement.t_value > least_t;
 }
 
-bool Growth::is_certain(Hypothesis& h, std::size_t effect) {
+bool StepwiseSelection::is_certain(Hypothesis& h, std::size_t effect) {
   const double so_far = search_.certainty(h, effect);
   if (so_far >= least_certainty) return true;
   const Improvement improvement = compare(current_, h);
@@ -181,7 +181,7 @@ bool Growth::is_certain(Hypothesis& h, std::size_t effect) {
   return search_.certainty(h, effect) >= least_certainty;
 }
 
-bool Growth::simulates_as_well(Hypothesis& h) {
+bool StepwiseSelection::simulates_as_well(Hypothesis& h) {
   if (search_.held_data().segments.empty()) return true;
   const std::vector<double>& now = search_.simulate(h).segment_gap;
   const std::vector<double>& before = search_.simulate(current_).segment_gap;
@@ -198,7 +198,7 @@ bool Growth::simulates_as_well(Hypothesis& h) {
   return mean < by_chance + scatter / std::sqrt(n);
 }
 
-void Growth::end_doubt() {
+void StepwiseSelection::end_doubt() {
   if (!standing_) return;
   // What stood before is the answer until the held-out runs are on the side of what was added.
   Standing grown = std::move(*standing_);
@@ -214,14 +214,14 @@ void Growth::end_doubt() {
   }
 }
 
-void Growth::level_noise(const Hypothesis& richer) {
+void StepwiseSelection::level_noise(const Hypothesis& richer) {
   Hypothesis again = current_;
   again.train.point.noise = richer.train.point.noise;
   search_.refine(again, again);
   if (again.train.objective < current_.train.objective) current_ = std::move(again);
 }
 
-std::string Growth::locate(const Hypothesis& h) const {
+std::string StepwiseSelection::locate(const Hypothesis& h) const {
   const FitData& train = search_.train_data();
   const ResidualPlace place = locate_residual(train, h.train.point);
   std::size_t worst = 0;
@@ -243,8 +243,8 @@ std::string Growth::locate(const Hypothesis& h) const {
   return text.str();
 }
 
-void Growth::record_trial(int round, std::size_t effect, const Hypothesis& h,
-                          const Improvement& improvement) {
+void StepwiseSelection::record_trial(int round, std::size_t effect, const Hypothesis& h,
+                                     const Improvement& improvement) {
   Trial trial;
   trial.round = static_cast<std::size_t>(round);
   trial.effect = effect;
@@ -257,19 +257,19 @@ void Growth::record_trial(int round, std::size_t effect, const Hypothesis& h,
   record_.trials.push_back(trial);
 }
 
-void Growth::record_step() {
+void StepwiseSelection::record_step() {
   Step step;
   for (const std::size_t effect : found_) step.effects.push_back({effect, estimates_of(effect, current_)});
   record_.steps.push_back(std::move(step));
 }
 
-void Growth::grow(int first_round, int last_round, bool calmly) {
+void StepwiseSelection::grow(int first_round, int last_round, bool calmly) {
   for (int round = first_round; round < last_round && add_best(round, calmly); ++round) {
   }
   end_doubt();
 }
 
-bool Growth::add_best(int round, bool calmly) {
+bool StepwiseSelection::add_best(int round, bool calmly) {
   const double done = std::min(0.05 + 0.2 * round, 0.7);
   const std::vector<Screened> screened = screen(round, calmly, done);
   std::vector<Believed> believed = believe(round, screened, calmly, done);
@@ -280,26 +280,27 @@ bool Growth::add_best(int round, bool calmly) {
   return true;
 }
 
-std::vector<Growth::Screened> Growth::screen(int round, bool calmly, double done) {
+std::vector<StepwiseSelection::Screened> StepwiseSelection::screen(int round, bool calmly, double done) {
   options_.tell(done, "looking for what is missing");
   Hypothesis from = current_;
-  if (calmly) from.train.point.noise = calmed(from.train.point.noise);
+  if (calmly) from.train.point.noise = reduced_process_noise(from.train.point.noise);
   const std::vector<std::size_t> candidates = promising(from, open_candidates(), round);
-  const double sieved = search_.sieved(from).train.objective;
+  const double on_screening_subset = search_.on_screening_subset(from).train.objective;
   std::vector<Screened> screened;
   for (std::size_t c = 0; c < candidates.size(); ++c) {
     options_.tell(done + 0.02 + 0.1 * static_cast<double>(c) / static_cast<double>(candidates.size()),
                   "trying " + kind_of(candidates[c]));
     Hypothesis h = search_.screened(from, candidates[c]);
-    const double gain = sieved - h.train.objective - price_of(candidates[c]);
+    const double gain = on_screening_subset - h.train.objective - price_of(candidates[c]);
     if (round == 0) record_.candidates.push_back({candidates[c], 0.0, std::max(gain, 0.0)});
     screened.push_back({candidates[c], std::move(h), gain});
   }
   return screened;
 }
 
-std::vector<Growth::Believed> Growth::believe(int round, const std::vector<Screened>& screened, bool calmly,
-                                              double done) {
+std::vector<StepwiseSelection::Believed> StepwiseSelection::believe(int round,
+                                                                    const std::vector<Screened>& screened,
+                                                                    bool calmly, double done) {
   std::vector<const Screened*> ranking;
   ranking.reserve(screened.size());
   for (const Screened& s : screened) ranking.push_back(&s);
@@ -311,7 +312,7 @@ std::vector<Growth::Believed> Growth::believe(int round, const std::vector<Scree
         resembling_.emplace_back(s->effect, s->hypothesis);
   std::vector<Believed> believed, doubtful;
   constexpr double of_best = 0.05;  // what a whole fit does not make up for
-  const double least_gain = 0.4 * least_evidence * search_.sieve_share();
+  const double least_gain = 0.4 * least_evidence * search_.screening_share();
   for (std::size_t place = 0; place < std::min(most_finalists, ranking.size()); ++place) {
     const auto& [effect, start, gain] = *ranking[place];
     if (gain < std::max(least_gain, of_best * ranking[0]->gain)) break;
@@ -349,7 +350,7 @@ std::vector<Growth::Believed> Growth::believe(int round, const std::vector<Scree
   return doubtful;
 }
 
-std::size_t Growth::choose(std::vector<Believed>& believed) {
+std::size_t StepwiseSelection::choose(std::vector<Believed>& believed) {
   constexpr double close = 0.05;
   const auto largest = [&] {
     double score = -infinity;
@@ -382,7 +383,7 @@ std::size_t Growth::choose(std::vector<Believed>& believed) {
   return chosen;
 }
 
-void Growth::take(int round, Believed& best, const std::vector<Screened>& screened) {
+void StepwiseSelection::take(int round, Believed& best, const std::vector<Screened>& screened) {
   const std::size_t effect = best.effect;
   where_[effect] = locate(current_);
   for (Trial& trial : record_.trials)
@@ -397,11 +398,11 @@ void Growth::take(int round, Believed& best, const std::vector<Screened>& screen
   record_step();
 }
 
-bool Growth::is_half_of(std::size_t half, std::size_t effect) {
+bool StepwiseSelection::is_half_of(std::size_t half, std::size_t effect) {
   return kind_of(effect) == "friction_asymmetry" && kind_of(half) == "coulomb_friction";
 }
 
-bool Growth::exchange() {
+bool StepwiseSelection::exchange() {
   for (std::size_t i = 0; i + 1 < found_.size(); ++i) {
     const std::size_t effect = found_[i];
     std::vector<std::size_t> others;
@@ -411,22 +412,22 @@ bool Growth::exchange() {
     options_.tell(0.8, "is it still " + kind_of(effect));
     const Hypothesis without = search_.without(current_, effect);
     if (!std::isfinite(without.train.objective)) continue;
-    const double to_beat = search_.sieved(current_).train.objective - price_of(effect);
-    const double worth = search_.sieved(without).train.objective - to_beat;
+    const double to_beat = search_.on_screening_subset(current_).train.objective - price_of(effect);
+    const double worth = search_.on_screening_subset(without).train.objective - to_beat;
     for (const std::size_t other : others) {
       // The other half of the force may be found later.
       if (!is_half_of(other, effect)) exchanged_.insert({effect, other});
       Hypothesis h = search_.screened(without, other);
       // What was found beside the one is of the wrong size for the other: the way is longer than a few steps.
       constexpr double may_do = 0.5;
-      if (h.train.objective + price_of(other) < to_beat + may_do * worth) search_.settle_on_sieve(h);
-      if (!(h.train.objective + price_of(other) < to_beat + confusable_evidence)) continue;
+      if (h.train.objective + price_of(other) < to_beat + may_do * worth) search_.settle_on_subset(h);
+      if (!(h.train.objective + price_of(other) < to_beat + indistinguishable_evidence)) continue;
       search_.refine(without, h);
       const Improvement improvement = compare(current_, h);
       const double evidence = improvement.train + price_of(effect) - price_of(other);
       const bool as_good =
           std::min({evidence, improvement.held, evidence + improvement.held}) > -equally_good;
-      const bool better = evidence > confusable_evidence && improvement.held > 0.0;
+      const bool better = evidence > indistinguishable_evidence && improvement.held > 0.0;
       if (!better && !(as_good && is_plainer(other, effect))) continue;
       if (!search_.is_plausible(h, other) || search_.certainty(h, other) < least_certainty ||
           !simulates_as_well(h))
@@ -443,7 +444,7 @@ bool Growth::exchange() {
   return false;
 }
 
-std::vector<Growth::Simpler> Growth::simpler_forms() const {
+std::vector<StepwiseSelection::Simpler> StepwiseSelection::simpler_forms() const {
   const std::size_t one_way = effect_number("friction_asymmetry"), spring = effect_number("cable_spring");
   const std::size_t level = effect_number("coulomb_friction"), force = effect_number("constant_force");
   const Plant& plant = current_.train.point.plant;
@@ -464,7 +465,7 @@ std::vector<Growth::Simpler> Growth::simpler_forms() const {
   return forms;
 }
 
-bool Growth::simplify() {
+bool StepwiseSelection::simplify() {
   for (const Simpler& form : simpler_forms()) {
     if (!simplified_.insert({form.effect, found_.size()}).second) continue;
     options_.tell(0.8, "is it simpler than " + kind_of(form.effect));
@@ -490,10 +491,10 @@ bool Growth::simplify() {
   return false;
 }
 
-bool Growth::try_pairs(const std::vector<std::pair<std::size_t, Hypothesis>>& contenders) {
+bool StepwiseSelection::try_pairs(const std::vector<std::pair<std::size_t, Hypothesis>>& contenders) {
   std::optional<Hypothesis> best;
   std::vector<std::size_t> best_found;
-  std::optional<double> to_beat;  // on the sieve, by the best so far
+  std::optional<double> to_beat;  // on the screening subset, by the best so far
   for (std::size_t a = 0; a < contenders.size(); ++a)
     for (std::size_t b = a + 1; b < contenders.size(); ++b) {
       const std::size_t first = contenders[a].first, second = contenders[b].first;
@@ -502,7 +503,7 @@ bool Growth::try_pairs(const std::vector<std::pair<std::size_t, Hypothesis>>& co
       options_.tell(0.83, "trying " + kind_of(first) + " with " + kind_of(second));
       const Hypothesis& so_far = best ? *best : current_;
       const Hypothesis quick = search_.screened_pair(given_, contenders[a].second, contenders[b].second);
-      if (!to_beat) to_beat = search_.sieved(so_far).train.objective;
+      if (!to_beat) to_beat = search_.on_screening_subset(so_far).train.objective;
       if (!(quick.train.objective < *to_beat)) continue;
       Hypothesis h = search_.with_pair(given_, contenders[a].second, contenders[b].second);
       const Improvement improvement = compare(so_far, h);
@@ -524,7 +525,7 @@ bool Growth::try_pairs(const std::vector<std::pair<std::size_t, Hypothesis>>& co
   return true;
 }
 
-void Growth::prune() {
+void StepwiseSelection::prune() {
   bool again = found_.size() > 1;
   while (again) {
     again = false;
@@ -547,13 +548,13 @@ void Growth::prune() {
   }
 }
 
-bool Growth::bends_another(const Hypothesis& h, std::size_t effect, Holds holds) const {
+bool StepwiseSelection::bends_another(const Hypothesis& h, std::size_t effect, Holds holds) const {
   return std::any_of(found_.begin(), found_.end(), [&](std::size_t other) {
     return other != effect && (search_.*holds)(current_, other) && !(search_.*holds)(h, other);
   });
 }
 
-bool Growth::is_found(std::size_t effect) const {
+bool StepwiseSelection::is_found(std::size_t effect) const {
   return std::find(found_.begin(), found_.end(), effect) != found_.end();
 }
 

@@ -13,7 +13,7 @@ std::size_t sweep_group_size(const SweepConfig& config) {
   return config.setup.sampled ? lane_count : 4 * lane_count;
 }
 
-std::vector<SweepRun> run_sweep_group(const SweepConfig& config, const SweepTeam::Group& group) {
+std::vector<SweepRun> run_sweep_group(const SweepConfig& config, const SweepExecutor::Group& group) {
   std::vector<LoopResult> results(group.size());
   if (config.engine == SweepEngine::fast && lanes_can_run(config.setup)) {
     run_on_lanes(config.setup, group, results);
@@ -31,7 +31,7 @@ std::vector<SweepRun> run_sweep_group(const SweepConfig& config, const SweepTeam
 
 namespace {
 
-class ThreadTeam final : public SweepTeam {
+class ThreadTeam final : public SweepExecutor {
  public:
   ThreadTeam(const SweepConfig& config, unsigned threads)
       : config_(config),
@@ -71,7 +71,7 @@ class ThreadTeam final : public SweepTeam {
 
 }  // namespace
 
-std::unique_ptr<SweepTeam> make_thread_team(const SweepConfig& config, unsigned threads) {
+std::unique_ptr<SweepExecutor> make_thread_executor(const SweepConfig& config, unsigned threads) {
   return std::make_unique<ThreadTeam>(config, threads);
 }
 

@@ -1,4 +1,4 @@
-#include "confusable.hpp"
+#include "indistinguishable.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -63,9 +63,9 @@ bool is_proportional(std::size_t effect) {
 
 }  // namespace
 
-std::vector<Rival> linear_rivals(const Search& search, const Hypothesis& h,
-                                 const std::vector<std::size_t>& listed) {
-  std::vector<Rival> rivals;
+std::vector<Alternative> linear_alternatives(const Search& search, const Hypothesis& h,
+                                             const std::vector<std::size_t>& listed) {
+  std::vector<Alternative> alternatives;
   std::vector<std::size_t> others = candidate_effects(h.train.point.plant, search.range());
   others.insert(others.end(), search.nuisances().begin(), search.nuisances().end());
   for (const std::size_t other : others) {
@@ -78,10 +78,10 @@ std::vector<Rival> linear_rivals(const Search& search, const Hypothesis& h,
       if (before < 0 || after < 0 || !std::isfinite(nothing_of(h, before))) continue;
       const double doubt = distance(open, after);
       if (doubt < least_distance && doubt < least_loss * distance(h, before))
-        rivals.push_back({effect, other, without(open, after)});
+        alternatives.push_back({effect, other, without(open, after)});
     }
   }
-  return rivals;
+  return alternatives;
 }
 
 }  // namespace upright

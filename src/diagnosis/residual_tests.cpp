@@ -1,4 +1,4 @@
-#include "structure.hpp"
+#include "residual_tests.hpp"
 
 #include <algorithm>
 #include <array>
@@ -417,7 +417,7 @@ double largest_size(const std::vector<double>& pulses) {
   return std::min(std::sqrt(sum / static_cast<double>(pulses.size())), by_chance * robust_deviation(pulses));
 }
 
-std::string slow_push_of(const ResidualStructure& s) {
+std::string slow_push_of(const ResidualTests& s) {
   const bool torque = s.slow_torque > s.slow_force;
   std::ostringstream text;
   text.precision(3);
@@ -437,13 +437,13 @@ ResidualPlace locate_residual(const FitData& data, const FitPoint& point) {
   return {true, std::max(torque_share, 0.0), feature_names[torque_feature]};
 }
 
-ResidualStructure examine_residuals(const FitData& data, const FitPoint& point) {
+ResidualTests examine_residuals(const FitData& data, const FitPoint& point) {
   const std::vector<std::vector<LinearStep>> steps = linearise(data, point);
   Blocks blocks;
   for (std::size_t s = 0; s < steps.size(); ++s)
     examine_segment((*data.runs)[data.segments[s].run], data.segments[s], point.plant, point.noise, steps[s],
                     blocks);
-  ResidualStructure result;
+  ResidualTests result;
   if (blocks.rms.size() >= 20) {
     std::sort(blocks.rms.begin(), blocks.rms.end());
     result.dispersion =
@@ -470,7 +470,7 @@ ResidualStructure examine_residuals(const FitData& data, const FitPoint& point) 
   return result;
 }
 
-void judge_structure(ResidualStructure& s) {
+void conclude_tests(ResidualTests& s) {
   std::ostringstream text;
   text.precision(3);
   const double slow = std::max(s.slow_force, s.slow_torque);
@@ -524,7 +524,7 @@ void judge_structure(ResidualStructure& s) {
   s.sentence = text.str();
 }
 
-Noise as_slow_as_left(Noise noise, const ResidualStructure& structure) {
+Noise as_slow_as_left(Noise noise, const ResidualTests& structure) {
   noise.force *= structure.slow_force;
   noise.torque *= structure.slow_torque;
   return noise;

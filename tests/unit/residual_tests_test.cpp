@@ -1,5 +1,5 @@
 // What is left of runs of a rig that the model is not, in words.
-#include "diagnosis/structure.hpp"
+#include "diagnosis/residual_tests.hpp"
 
 #include <gtest/gtest.h>
 
@@ -44,11 +44,11 @@ TEST(Structure, TellsOnWhichSideOfTheEncoderADriveGivesWay) {
 
 /// Beyond the sensors' noise, by so much that a verdict is due.
 bool is_more_than_noise(double kurtosis, double slow_force) {
-  ResidualStructure left;
+  ResidualTests left;
   left.noise_ratio = 10.0;
   left.tails = {kurtosis, 2.0};
   left.slow_force = slow_force;
-  judge_structure(left);
+  conclude_tests(left);
   return left.structured;
 }
 

@@ -20,7 +20,7 @@
 
 namespace upright {
 
-struct ResidualStructure {
+struct ResidualTests {
   double noise_ratio = 1.0;  ///< rms of a plain simulation's residual over the sensors' noise
   double excess = 1.0;       ///< the same over what noise like what is left makes of it at most
   double dispersion = 1.0;   ///< 95th percentile of block rms over its median
@@ -38,13 +38,13 @@ struct ResidualStructure {
 };
 
 /// White noise that moves a plain simulation as what is left does.
-Noise as_slow_as_left(Noise noise, const ResidualStructure& structure);
+Noise as_slow_as_left(Noise noise, const ResidualTests& structure);
 
 /// Examines what a fit leaves at `point`.
-ResidualStructure examine_residuals(const FitData& data, const FitPoint& point);
+ResidualTests examine_residuals(const FitData& data, const FitPoint& point);
 
 /// Whether what is left is more than noise, in a sentence, once its excess is known too.
-void judge_structure(ResidualStructure& structure);
+void conclude_tests(ResidualTests& structure);
 
 /// A plain simulation may be this many times as far off as noise like what is left makes it at most.
 inline constexpr double most_excess = 2.0;

@@ -1,21 +1,21 @@
-#include "trace.hpp"
+#include "simulated_segments.hpp"
 
 #include <algorithm>
 
 namespace upright {
 
-std::vector<SimulatedTrace> simulate_segments(const Plant& plant, const std::vector<Measurement>& runs,
-                                              const std::vector<Segment>& segments) {
+std::vector<SimulatedSegment> simulate_segments(const Plant& plant, const std::vector<Measurement>& runs,
+                                                const std::vector<Segment>& segments) {
   const FitData data{&runs, segments};
   // Without force and torque noise the filter is a plain simulation.
   const FitPoint guess{plant, guess_starts(runs, segments, plant), {}};
-  const FitPoint point = follow(data, guess).point;
+  const FitPoint point = fit_initial_states(data, guess).point;
   const std::vector<std::vector<LinearStep>> steps = linearise(data, point);
-  std::vector<SimulatedTrace> traces;
+  std::vector<SimulatedSegment> traces;
   for (std::size_t s = 0; s < segments.size(); ++s) {
     const Measurement& run = runs[segments[s].run];
     const bool has_theta = run.has_theta() && plant.pendulum.has_value();
-    SimulatedTrace trace;
+    SimulatedSegment trace;
     trace.run = segments[s].run;
     for (std::size_t i = 0; i < steps[s].size(); ++i) {
       const std::size_t k = segments[s].first + i;

@@ -9,15 +9,15 @@
 namespace upright {
 
 /// An effect that could stand in the place of one that was found, and the plant as it would then be.
-struct Rival {
+struct Alternative {
   std::size_t instead_of = 0;
   std::size_t effect = 0;
   Plant plant;
 };
 
-/// Rivals of `listed` effects of `h` among all that act in proportion to their size where they do nothing.
-/// What acts otherwise (saturation, lag, delay, ...) does not show here and has to be fitted.
-std::vector<Rival> linear_rivals(const Search& search, const Hypothesis& h,
-                                 const std::vector<std::size_t>& listed);
+/// Alternatives of `listed` effects of `h` among all that act in proportion to their size where they do
+/// nothing. What acts otherwise (saturation, lag, delay, ...) does not show here and has to be fitted.
+std::vector<Alternative> linear_alternatives(const Search& search, const Hypothesis& h,
+                                             const std::vector<std::size_t>& listed);
 
 }  // namespace upright

@@ -10,19 +10,19 @@ namespace upright {
 
 /// MPI from construction to destruction, when mpirun started this process; one rank otherwise. One per
 /// process.
-class SweepRanks {
+class MpiExecutor {
  public:
-  SweepRanks();
-  ~SweepRanks();
-  SweepRanks(const SweepRanks&) = delete;
-  SweepRanks& operator=(const SweepRanks&) = delete;
+  MpiExecutor();
+  ~MpiExecutor();
+  MpiExecutor(const MpiExecutor&) = delete;
+  MpiExecutor& operator=(const MpiExecutor&) = delete;
 
   bool first() const { return rank_ == 0; }
   int count() const { return count_; }
 
-  /// For the first rank: a team of all ranks with `threads` threads each (0: one each, or every processor
+  /// For the first rank: a executor of all ranks with `threads` threads each (0: one each, or every processor
   /// where there is one rank). Destroy it before this object: that lets the others go.
-  std::unique_ptr<SweepTeam> make_team(const SweepConfig& config, unsigned threads) const;
+  std::unique_ptr<SweepExecutor> make_executor(const SweepConfig& config, unsigned threads) const;
   /// For the other ranks: computes what the first one hands out until that lets go.
   void serve(const SweepConfig& config, unsigned threads) const;
 

@@ -16,9 +16,9 @@ namespace upright {
 
 /// Works on one Search, which must outlive it. What was tried is written to `record`: candidates, trials,
 /// steps.
-class Growth {
+class StepwiseSelection {
  public:
-  Growth(Search& search, const DiagnosisOptions& options, Diagnosis& record);
+  StepwiseSelection(Search& search, const DiagnosisOptions& options, Diagnosis& record);
 
   /// Fits the plant file as given: before everything else. Throws ConfigError when that cannot be simulated.
   /// This and what follows throw Interrupted and BoundReached; what was found until then stays readable.
