@@ -40,7 +40,7 @@ std::string joined(const json& names) {
   return text;
 }
 
-void add_answer(HtmlPage& page, const json& d) {
+void add_answer(HtmlPage& page, const json& d, const std::filesystem::path& file) {
   const std::string verdict = d.at("verdict");
   const std::map<std::string, std::pair<Tone, std::string>> headlines = {
       {"explained", {Tone::good, "Explained: the model lacked what is listed here"}},
@@ -49,7 +49,7 @@ void add_answer(HtmlPage& page, const json& d) {
       {"not_excited", {Tone::neutral, "Not excited: too little moves in these data to show anything"}}};
   const auto known = headlines.find(verdict);
   if (known == headlines.end())
-    throw ConfigError("diagnosis.json has an unknown verdict: make the diagnosis anew");
+    throw ConfigError(file.string() + " has an unknown verdict: make the diagnosis anew");
   const auto& [tone, headline] = known->second;
   page.answer(
       tone, headline,
@@ -308,9 +308,10 @@ bool is_diagnosis_folder(const std::filesystem::path& folder) {
 std::filesystem::path write_diagnosis_report(const std::filesystem::path& folder) {
   const std::filesystem::path file = folder / "report.html";
   try {
-    const json d = json::parse(file_text(folder / "diagnosis.json"));
+    const std::filesystem::path diagnosis = folder / "diagnosis.json";
+    const json d = json::parse(file_text(diagnosis));
     HtmlPage page("Diagnosis", folder.string());
-    add_answer(page, d);
+    add_answer(page, d, diagnosis);
     add_gap(page, d);
     add_effects(page, d);
     add_traces(page, folder / "traces.csv");

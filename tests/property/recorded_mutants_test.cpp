@@ -184,6 +184,14 @@ TEST(ExperimentFolder, NamesThePlantFileThatCannotBeAnalysed) {
   EXPECT_NE(refusal.find((made / "plan_plant.yaml").string()), std::string::npos) << refusal;
 }
 
+TEST(DiagnosisFolder, NamesTheFileWhoseVerdictIsUnknown) {
+  const Folder folder;
+  write(folder.path() / "diagnosis.json", "{\"verdict\": \"eXplained\"}");
+  const std::string refusal = refusal_of([&] { write_diagnosis_report(folder.path()); });
+  EXPECT_TRUE(refusal.starts_with((folder.path() / "diagnosis.json").string() + " has an unknown verdict"))
+      << refusal;
+}
+
 TEST(RecordedMutants, OfSignRecords) {
   const Folder folder;
   RigFile rig = read_rig_file(config / "rigs" / "modbus-tcp.yaml");
