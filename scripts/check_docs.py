@@ -1,0 +1,72 @@
+#!/usr/bin/env python3
+"""Checks that what README.md and docs/ point at is there: links, anchors, and files of the sources named in code style.
+
+  scripts/check_docs.py [--root FOLDER]
+
+- A link to a file of the repository leads to a file, and its anchor to a heading of that page.
+- `name.cpp` is a source of that name; `src/folder/name.hpp` is a file at that place.
+Ends with 1 and a line for each finding. Links to the web are not followed.
+"""
+import argparse
+import pathlib
+import re
+import subprocess
+import sys
+
+LINK = re.compile(r"!?\[[^\]]*\]\(([^)\s]+)\)")
+SOURCE = re.compile(r"`([\w./-]+\.(?:cpp|hpp|py|sh))`")
+FENCE = re.compile(r"^```.*?^```", re.MULTILINE | re.DOTALL)
+
+
+def anchors_of(text):
+    """The anchors that GitHub makes of the headings of a page."""
+    found = set()
+    for heading in re.findall(r"^#+ +(.*)$", FENCE.sub("", text), re.MULTILINE):
+        words = re.sub(r"[`*]|\[([^\]]*)\]\([^)]*\)", r"\1", heading).strip().lower()
+        found.add(re.sub(r"\s", "-", re.sub(r"[^\w\- ]", "", words)))
+    return found
+
+
+def files_of(root):
+    listed = subprocess.run(["git", "-C", root, "ls-files", "-co", "--exclude-standard"], capture_output=True, text=True)
+    if listed.returncode == 0:
+        return set(listed.stdout.split("\n"))
+    return {file.relative_to(root).as_posix() for file in root.rglob("*") if file.is_file()}
+
+
+def findings_of(page, root, files):
+    text = page.read_text()
+    prose = FENCE.sub(lambda fence: "\n" * fence.group(0).count("\n"), text)
+    where = lambda match: f"{page.relative_to(root)}:{prose[:match.start()].count(chr(10)) + 1}"
+    for match in LINK.finditer(prose):
+        target = match.group(1)
+        if re.match(r"[a-z]+:", target):
+            continue
+        name, _, anchor = target.partition("#")
+        file = (page.parent / name).resolve() if name else page
+        if not file.exists():
+            yield f"{where(match)}: links to {target}, which is not there: correct the link"
+        elif anchor and file.suffix == ".md" and anchor not in anchors_of(file.read_text()):
+            yield f"{where(match)}: links to {target}, but that page has no such heading: correct the anchor"
+    names = {pathlib.PurePosixPath(file).name for file in files}
+    for match in SOURCE.finditer(prose):
+        name = match.group(1)
+        here = (page.parent / name).resolve()
+        if name not in files and not here.exists() and ("/" in name or name not in names):
+            yield f"{where(match)}: names {name}, which is no file of the repository: correct the name"
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--root", type=pathlib.Path, default=pathlib.Path(__file__).resolve().parent.parent)
+    root = parser.parse_args().root.resolve()
+    files = files_of(root)
+    pages = sorted([root / "README.md", *(root / "docs").rglob("*.md")])
+    findings = [finding for page in pages for finding in findings_of(page, root, files)]
+    for finding in findings:
+        print(finding, file=sys.stderr)
+    sys.exit(1 if findings else 0)
+
+
+if __name__ == "__main__":
+    main()
