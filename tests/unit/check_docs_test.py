@@ -34,7 +34,7 @@ class CheckDocs(unittest.TestCase):
                              ("`src/other/loop.cpp`", "names src/other/loop.cpp")):
             code, said = check("# Title\n\n" + wrong + "\n")
             self.assertEqual(code, 1, wrong)
-            self.assertIn(f"README.md:3: ", said)
+            self.assertIn("README.md:3: ", said)
             self.assertIn(words, said)
 
 
