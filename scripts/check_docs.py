@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Checks that what README.md and docs/ point at is there: links, anchors, and files of the sources named in code style.
+"""Checks that what README.md, the other pages beside it and docs/ point at is there: links, anchors, and files of the sources named in code style.
 
   scripts/check_docs.py [--root FOLDER]
 
@@ -61,7 +61,7 @@ def main():
     parser.add_argument("--root", type=pathlib.Path, default=pathlib.Path(__file__).resolve().parent.parent)
     root = parser.parse_args().root.resolve()
     files = files_of(root)
-    pages = sorted([root / "README.md", *(root / "docs").rglob("*.md")])
+    pages = sorted([*root.glob("*.md"), *(root / "docs").rglob("*.md")])
     findings = [finding for page in pages for finding in findings_of(page, root, files)]
     for finding in findings:
         print(finding, file=sys.stderr)
