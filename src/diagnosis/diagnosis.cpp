@@ -388,9 +388,7 @@ class Diagnostician {
   }
 
   void decide(const ResidualTests& structure) {
-    // What held-out data show of an effect that they hardly excite may be so much chance.
-    constexpr double chance = 0.01;
-    const bool worse = result_.gap_after > (1.0 + chance) * result_.gap_before;
+    const bool worse = result_.gap_after > result_.gap_before;
     if (worse)
       result_.notes.emplace_back(
           "what was found takes held-out data further from the model, so it explains nothing: check the "
