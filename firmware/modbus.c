@@ -15,6 +15,8 @@
 #define ADDRESS_SIZE 1
 #define CHECK_SIZE 2
 #define EXCEPTION_BIT 0x80
+#define NOT_KNOWN_YET 0
+#define UNTIL_SILENCE 0xffff
 
 enum { READ_HOLDING = 0x03, READ_INPUT = 0x04, WRITE_SINGLE = 0x06, WRITE_MULTIPLE = 0x10, READ_WRITE = 0x17 };
 
@@ -66,7 +68,6 @@ static void send_reply(void) {
 }
 
 static void add_registers(uint16_t first, uint16_t count) {
-  registers_latch();
   add((uint8_t)(2 * count));
   for (uint16_t i = 0; i < count; ++i) {
     const uint16_t word = registers_read(first + i);
@@ -78,6 +79,7 @@ static void add_registers(uint16_t first, uint16_t count) {
 static exception_t read(uint8_t function) {
   const uint16_t first = word_at(2), count = word_at(4);
   if (count == 0) return ILLEGAL_VALUE;
+  registers_latch();  // first: what was lost before has shown itself by the time it is asked for
   const exception_t problem = registers_readable(first, count);
   if (problem != NO_EXCEPTION) return problem;
   begin_reply(function);
@@ -146,20 +148,21 @@ static void answer(void) {
   send_reply();
 }
 
-/// The size of the frame as its beginning tells it; 0: that is not known yet, or only silence will tell.
+/// The size of the frame as its beginning tells it; NOT_KNOWN_YET: it is too short to tell; UNTIL_SILENCE: of a function that
+/// we do not know.
 static uint16_t whole_size(void) {
-  if (frame_size < 2) return 0;
+  if (frame_size < 2) return NOT_KNOWN_YET;
   switch (frame[1]) {
     case READ_HOLDING:
     case READ_INPUT:
     case WRITE_SINGLE:
       return 8;
     case WRITE_MULTIPLE:
-      return frame_size < 7 ? 0 : (uint16_t)(7 + frame[6] + CHECK_SIZE);
+      return frame_size < 7 ? NOT_KNOWN_YET : (uint16_t)(7 + frame[6] + CHECK_SIZE);
     case READ_WRITE:
-      return frame_size < 11 ? 0 : (uint16_t)(11 + frame[10] + CHECK_SIZE);
+      return frame_size < 11 ? NOT_KNOWN_YET : (uint16_t)(11 + frame[10] + CHECK_SIZE);
   }
-  return 0;
+  return UNTIL_SILENCE;
 }
 
 /// What has come is a request or nothing. The check over a frame with its own check sum is zero.
@@ -189,7 +192,7 @@ static void take(uint8_t byte) {
 
 /// A frame of a function that we do not know ends here, too.
 static void note_silence(void) {
-  if (!deaf && frame_size > 0 && whole_size() == 0) end_frame();
+  if (!deaf && frame_size > 0 && whole_size() == UNTIL_SILENCE) end_frame();
   begin_frame();
   deaf = false;
 }

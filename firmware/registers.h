@@ -37,8 +37,8 @@ typedef enum {
   DEVICE_FAILURE = 4
 } exception_t;
 
-/// Takes the counts, at one moment, for the reads that follow.
 void registers_begin(uint16_t boot_count);
+/// Takes the counts, at one moment, for the reads that follow.
 void registers_latch(void);
 /// Whether all of them can be read now, or written. Nothing has happened yet.
 exception_t registers_readable(uint16_t first, uint16_t count);

@@ -51,8 +51,9 @@ Board::Board(const BoardPins& pins) : pins_(pins), avr_(avr_make_mcu_by_name(pin
   avr_ioctl(avr_, AVR_IOCTL_UART_SET_FLAGS(serial_port), &flags);
   avr_irq_register_notify(avr_io_getirq(avr_, AVR_IOCTL_UART_GETIRQ(serial_port), UART_IRQ_OUTPUT), byte_sent,
                           this);
-  avr_irq_register_notify(avr_io_getirq(avr_, AVR_IOCTL_TIMER_GETIRQ(pwm_timer), TIMER_IRQ_OUT_PWM0),
-                          width_changed, this);
+  avr_irq_t* const width = avr_io_getirq(avr_, AVR_IOCTL_TIMER_GETIRQ(pwm_timer), TIMER_IRQ_OUT_PWM0);
+  width->flags &= static_cast<std::uint8_t>(~IRQ_FLAG_FILTERED);  // what it compares with may be of long ago
+  avr_irq_register_notify(width, width_changed, this);
   avr_->custom.data = this;
   core_reset_ = avr_->reset;
   avr_->reset = note_reset;
