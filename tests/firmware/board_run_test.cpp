@@ -5,7 +5,7 @@
 
 #include "../fault/evidence.hpp"
 #include "board_setting.hpp"
-#include "upright/runtime/run_reader.hpp"
+#include "upright/record/run_reader.hpp"
 
 namespace upright::test {
 namespace {
