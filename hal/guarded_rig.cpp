@@ -22,6 +22,7 @@ class GuardedRig final : public Rig {
   StopReport stop() noexcept override { return rig_->stop(); }
   int last_exception() const noexcept override { return rig_->last_exception(); }
   SafetyInputs safety_inputs() const noexcept override { return rig_->safety_inputs(); }
+  DeviceFacts device_facts() const override { return rig_->device_facts(); }
 
   RigReading read() noexcept override {
     RigReading reading = rig_->read();

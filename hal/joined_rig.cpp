@@ -75,6 +75,13 @@ class JoinedRig final : public Rig {
     return of_output;
   }
 
+  DeviceFacts device_facts() const override {
+    DeviceFacts all;
+    for (const Part& part : parts_)
+      for (DeviceFacts::value_type& fact : part.rig->device_facts()) all.push_back(std::move(fact));
+    return all;
+  }
+
   int last_exception() const noexcept override {
     for (const Part& part : parts_)
       if (const int number = part.rig->last_exception(); number != 0) return number;

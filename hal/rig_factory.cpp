@@ -9,6 +9,7 @@
 #include "guarded_rig.hpp"
 #include "joined_rig.hpp"
 #include "modbus/modbus_rig.hpp"
+#include "quanser/quanser_rig.hpp"
 #include "upright/base/error.hpp"
 
 namespace upright {
@@ -43,6 +44,8 @@ std::unique_ptr<Rig> make_part(const RigFile& rig, Backend backend, double perio
       return make_gpio_encoders(rig, period_s);
     case Backend::comedi:
       return std::make_unique<ComediTransport>(rig, period_s);
+    case Backend::quanser_hil:
+      return std::make_unique<QuanserTransport>(rig, period_s);
     case Backend::simulated:
       break;
   }
@@ -52,9 +55,16 @@ std::unique_ptr<Rig> make_part(const RigFile& rig, Backend backend, double perio
 }  // namespace
 
 void require_link_fits(const RigFile& rig, double period_s) {
-  if (!rig.modbus || is_simulated(rig)) return;
   const std::string file = rig.file.string() + ":1: ";
   const std::string period = "the period of " + exact_text(period_s) + " s";
+  // Each cycle serves the card's watchdog once, and a cycle may come late.
+  constexpr double fewest_periods = 2.0;
+  if (rig.quanser && rig.quanser->watchdog_s > 0.0 && rig.quanser->watchdog_s < fewest_periods * period_s)
+    throw ConfigError(file + "quanser_hil.watchdog_s is " + exact_text(rig.quanser->watchdog_s) +
+                      ", less than twice " + period +
+                      ": raise sample_rate_hz in the gain file, or give quanser_hil.watchdog_s at least " +
+                      exact_text(fewest_periods * period_s));
+  if (!rig.modbus || is_simulated(rig)) return;
   if (rig.modbus->response_timeout_s >= period_s)
     throw ConfigError(file + "modbus.response_timeout_s is " + exact_text(rig.modbus->response_timeout_s) +
                       ", and " + period + " is no longer: lower sample_rate_hz in the gain file, or give " +

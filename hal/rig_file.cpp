@@ -9,6 +9,7 @@
 
 #include "comedi/comedi_section.hpp"
 #include "gpio/gpio_section.hpp"
+#include "quanser/quanser_section.hpp"
 #include "quoted.hpp"
 #include "upright/base/error.hpp"
 #include "yaml_words.hpp"
@@ -22,7 +23,7 @@ constexpr int most_registers_per_read = 125;
 constexpr int finer_without_quantisation = 1024;
 constexpr double longest_watchdog_s = 10.0;
 
-constexpr Words<5> backends = {"simulated", "modbus-tcp", "modbus-rtu", "gpio", "comedi"};
+constexpr Words<6> backends = {"simulated", "modbus-tcp", "modbus-rtu", "gpio", "comedi", "quanser-hil"};
 constexpr Words<3> parities = {"none", "even", "odd"};
 constexpr Words<2> exchanges = {"read_write", "separate"};
 constexpr Words<2> word_orders = {"high_first", "low_first"};
@@ -437,6 +438,7 @@ RigFile read_rig(const YamlMap& document) {
     rig.simulated = read_simulated(document.map("simulated"));
   if (serial || uses(rig, Backend::modbus_tcp)) rig.modbus = read_modbus(document.map("modbus"), serial, rig);
   if (uses(rig, Backend::comedi)) rig.comedi = read_comedi(document.map("comedi"), rig);
+  if (uses(rig, Backend::quanser_hil)) rig.quanser = read_quanser(document.map("quanser_hil"), rig);
   if (uses(rig, Backend::gpio) || document.has("gpio")) rig.gpio = read_gpio(document.map("gpio"));
   if (const auto watch = document.optional_map("encoder_watch"))
     rig.encoder_watch = read_encoder_assumptions(*watch);
@@ -462,6 +464,7 @@ std::string rig_text(const RigFile& rig) {
     text += modbus_text(
         *rig.modbus, roles_of(rig, rig.modbus->device.empty() ? Backend::modbus_tcp : Backend::modbus_rtu));
   if (rig.comedi) text += comedi_text(*rig.comedi);
+  if (rig.quanser) text += quanser_text(*rig.quanser);
   if (rig.gpio) text += gpio_text(*rig.gpio);
   if (rig.encoder_watch) text += "encoder_watch: " + encoder_assumptions_text(*rig.encoder_watch) + "\n";
   return text;

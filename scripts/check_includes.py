@@ -152,7 +152,7 @@ def table_of(targets):
     lines = [TABLE_BEGIN, "| folder | holds | uses | other libraries |", "|---|---|---|---|"]
     for target in in_order(targets):
         below = [by_name[name].short for name in target.links if name in by_name]
-        foreign = [name.removeprefix("PkgConfig::").split("::")[0] for name in target.links
+        foreign = [name.removeprefix("PkgConfig::").split("::")[0].replace("${CMAKE_DL_LIBS}", "dl") for name in target.links
                    if name not in by_name and name != "upright_options"]
         lines.append(f"| `{target.folder}` | {target.holds} | {', '.join(below) or '-'} | {', '.join(dict.fromkeys(foreign)) or '-'} |")
     return "\n".join(lines + [TABLE_END])

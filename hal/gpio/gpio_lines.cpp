@@ -161,6 +161,7 @@ class GpioLinesRig final : public Rig {
   }
 
   int last_exception() const noexcept override { return rig_->last_exception(); }
+  DeviceFacts device_facts() const override { return rig_->device_facts(); }
 
   SafetyInputs safety_inputs() const noexcept override {
     return {config_.emergency_stop.has_value(), static_cast<int>(config_.limit_switches.size())};

@@ -15,6 +15,7 @@
 #include "commissioning/rig_check.hpp"
 #include "commissioning/wake_probe.hpp"
 #include "hal/gpio_rig.hpp"
+#include "hal/quanser_proof.hpp"
 #include "histogram_json.hpp"
 #include "progress.hpp"
 #include "record/histogram_text.hpp"
@@ -124,11 +125,22 @@ void examine_simulated(const Arguments& arguments, const RigFile& file, Page& pa
   rig->stop();
 }
 
+/// False: there is no use in looking further.
+bool examine_card(const RigFile& file, Page& page) {
+  bool passed = true;
+  for (const CardStep& step : prove_quanser_card(file)) {
+    page.findings.push_back({step.subject, step.passed ? Health::good : Health::bad, step.what, step.remedy});
+    passed = passed && step.passed;
+  }
+  return passed;
+}
+
 void examine_rig(const Arguments& arguments, const RigFile& file, Page& page) {
   if (is_simulated(file)) {
     examine_simulated(arguments, file, page);
     return;
   }
+  if (file.quanser && !examine_card(file, page)) return;
   const SignalFlag& signal = catch_signals();
   MonotonicClock clock;
   const std::unique_ptr<Rig> rig = make_rig(file, {1.0 / page.rate_hz});

@@ -82,6 +82,8 @@ const char* words_for(RigFault fault) {
       return "edges of an encoder were lost, its counts are wrong";
     case RigFault::edges_too_fast:
       return "an encoder's edges came faster than fastest_edges_per_s, some may be lost";
+    case RigFault::watchdog_expired:
+      return "the device's own watchdog took the voltage away, for it was not served in time";
   }
   return "unknown fault";
 }
@@ -122,6 +124,9 @@ const char* remedy_for(RigFault fault) {
              "again";
     case RigFault::edges_too_fast:
       return "let the encoder turn more slowly or use a hardware counter, then take the zero again";
+    case RigFault::watchdog_expired:
+      return "start again, which unlocks the device; give its watchdog more time where the machine cannot be "
+             "made quieter";
     default:
       return "reset the device and start again";
   }

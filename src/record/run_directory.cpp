@@ -55,12 +55,20 @@ bool is_plain(const std::string& label) {
          });
 }
 
-std::string provenance_text() {
+std::string device_text(const DeviceFacts& facts) {
+  if (facts.empty()) return "";
+  std::string text = "  device:\n";
+  for (const auto& [name, value] : facts) text += "    " + name + ": " + yaml_quoted(value) + "\n";
+  return text;
+}
+
+std::string provenance_text(const DeviceFacts& device) {
   const Provenance p = provenance();
   return "provenance:\n  version: " + yaml_quoted(p.version) +
          "\n  git_commit: " + yaml_quoted(p.git_commit) + "\n  git_dirty: " + yes(p.git_dirty) +
          "\n  compiler: " + yaml_quoted(p.compiler) + "\n  host: " + yaml_quoted(p.host) +
-         "\n  kernel: " + yaml_quoted(p.kernel) + "\n  machine: " + yaml_quoted(p.machine) + "\n";
+         "\n  kernel: " + yaml_quoted(p.kernel) + "\n  machine: " + yaml_quoted(p.machine) + "\n" +
+         device_text(device);
 }
 
 std::string scheduling_text(const RealtimeGrant& grant) {
@@ -252,7 +260,7 @@ void RunDirectory::write_start(const RunSetup& setup) {
       "\n  duration_s: " + exact_text(setup.duration_s) + "\n  virtual_time: " + yes(setup.fast) +
       "\n  seed: " + std::to_string(setup.seed) + "\n";
   if (setup.theta0_rad) text += "  theta0_rad: " + exact_text(*setup.theta0_rad) + "\n";
-  text += provenance_text() + scheduling_text(setup.scheduling) + loop_text(setup);
+  text += provenance_text(setup.device) + scheduling_text(setup.scheduling) + loop_text(setup);
   text += "controller:\n" + indented(gain_text(setup.control));
   text += "rig:\n" + indented(rig_text(setup.rig));
   if (setup.plant) text += plant_text(*setup.plant);

@@ -9,8 +9,10 @@ namespace {
 
 std::string watchdog_words(const StopReport& report) {
   if (report.watchdog_s <= 0.0) return "; the device has no watchdog that would take the voltage away";
-  return "; the device's own watchdog, set and read back before the run, takes the voltage away " +
-         exact_text(report.watchdog_s) + " s after the last request that reached it";
+  return "; the device's own watchdog, " +
+         std::string(report.watchdog_read_back ? "set and read back" : "which accepted its time") +
+         " before the run, takes the voltage away " + exact_text(report.watchdog_s) +
+         " s after the last request that reached it";
 }
 
 }  // namespace

@@ -37,6 +37,7 @@ StopReason reason_for(RigFault fault) {
     case RigFault::line_failed:
     case RigFault::edges_lost:
     case RigFault::edges_too_fast:
+    case RigFault::watchdog_expired:
       return StopReason::rig_fault;
     case RigFault::link_timeout:
     case RigFault::link_lost:

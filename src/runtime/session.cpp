@@ -114,6 +114,7 @@ SessionResult run_to_its_stop(RunSetup setup, Rig& rig, Clock& clock, const Sign
   Controller controller(setup.control, setup.rig.amplifier.limit_v, std::move(options.parts));
   controller.follow(options.source);
   PoseScaler scaler(calibration_in_use(setup.rig));
+  setup.device = rig.device_facts();
   RunDirectory directory(options.out, setup.label);
   keep_plants(directory, setup.control);
   RunLog::Options log_options;

@@ -122,8 +122,20 @@ TEST(CommandLine, ACardThatIsNotThereIsADeviceErrorWithItsRemedy) {
   EXPECT_FALSE(std::filesystem::exists(folder.path() / "runs")) << "nothing ran";
 }
 
+TEST(CommandLine, AQuanserLibraryThatIsNotThereIsADeviceErrorWithItsRemedy) {
+  const TemporaryFolder folder;
+  const CommandResult result = run_upright(
+      "run --unchecked --rig " + shell_quoted(UPRIGHT_SOURCE_DIR "/config/rigs/quanser-q2-usb.yaml") +
+      " --gains " + shell_quoted(UPRIGHT_SOURCE_DIR "/config/gains/exponential.yaml") + " --out " +
+      shell_quoted(folder.path() / "runs"));
+  EXPECT_EQ(result.exit_code, 4);
+  EXPECT_NE(result.err.find("libhil.so"), std::string::npos) << result.err;
+  EXPECT_NE(result.err.find("install Quanser's SDK"), std::string::npos) << result.err;
+  EXPECT_FALSE(std::filesystem::exists(folder.path() / "runs")) << "nothing ran";
+}
+
 TEST(CommandLine, TheVirtualRigServesModbusOnly) {
-  for (const char* rig : {"comedi-multiq3.yaml", "comedi-and-modbus.yaml"}) {
+  for (const char* rig : {"comedi-multiq3.yaml", "comedi-and-modbus.yaml", "quanser-q2-usb.yaml"}) {
     const CommandResult result =
         run_upright(std::string("virtual-rig --tcp 127.0.0.1:0 --rig ") +
                     shell_quoted(UPRIGHT_SOURCE_DIR "/config/rigs/") + rig + " --plant " +

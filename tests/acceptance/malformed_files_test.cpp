@@ -237,6 +237,14 @@ const std::string comedi_rig =
     "  pendulum: {kind: counter, subdevice: 4, channel: 1, lines: {a: 3, b: 11}}\n"
     "  output: {subdevice: 1, channel: 0, range_v: [-5, 5], amplifier_gain: 3}\n";
 
+const std::string quanser_rig = "backend: quanser-hil\n" + rig_head +
+                                "quanser_hil:\n"
+                                "  board_type: q2_usb\n"
+                                "  encoder_channels: {cart: 0, pendulum: 1}\n"
+                                "  analog_output_channel: 0\n"
+                                "  amplifier_gain: 3\n"
+                                "  watchdog_s: 0.05\n";
+
 const std::string rig_with_lines = simulated_rig +
                                    "gpio:\n"
                                    "  chip: gpiochip0\n"
@@ -293,6 +301,7 @@ std::vector<Malformed> malformed_lines() {
 
 std::vector<Malformed> malformed_rigs() {
   const std::string& comedi = comedi_rig;
+  const std::string& quanser = quanser_rig;
   const std::string& sim = simulated_rig;
   const std::string& tcp = modbus_rig;
   const std::string& rtu = serial_rig;
@@ -396,6 +405,20 @@ std::vector<Malformed> malformed_rigs() {
        "number"},
       {"comedi_range_of_a_counter", with(comedi, "lines: {a: 3, b: 11}", "range_v: [-5, 5]"), 13, "range_v",
        "remove it"},
+      {"quanser_section_misspelt", with(quanser, "quanser_hil:", "quanser:"), 10, "quanser",
+       "did you mean quanser_hil?"},
+      {"quanser_without_board", with(quanser, "  board_type: q2_usb\n", ""), 10, "board_type", "add"},
+      {"quanser_channel_not_there", with(quanser, "pendulum: 1}", "pendulum: 2}"), 12, "pendulum", "0 to 1"},
+      {"quanser_channel_twice", with(quanser, "pendulum: 1}", "pendulum: 0}"), 12, "pendulum", "its own"},
+      {"quanser_output_not_there", with(quanser, "output_channel: 0", "output_channel: 2"), 13,
+       "analog_output_channel", "0 to 1"},
+      {"quanser_range_too_small", with(quanser, "amplifier_gain: 3", "output_range_v: [-5, 5]"), 14,
+       "output_range_v", "limit_v at most 5"},
+      {"quanser_range_of_one_sign", with(quanser, "amplifier_gain: 3", "output_range_v: [0, 10]"), 14,
+       "output_range_v", "lower and the upper end"},
+      {"quanser_watchdog_too_long", with(quanser, "0.05\n", "9\n"), 15, "watchdog_s", "to 8.1"},
+      {"quanser_watchdog_zero", with(quanser, "  watchdog_s: 0.05", "  watchdog_s: 0"), 15, "watchdog_s",
+       "number"},
       {"rig_second_document", sim + "---\nbackend: simulated\n", 16, "second", "keep one"},
   };
 }

@@ -13,7 +13,7 @@ namespace upright::test {
 namespace {
 
 constexpr std::array names = {"simulated-fast", "simulated-real-time", "modbus-tcp", "modbus-rtu", "gpio",
-                              "comedi"};
+                              "comedi",         "quanser-hil"};
 
 using Cells = std::array<std::string, names.size()>;
 
@@ -23,8 +23,8 @@ constexpr const char* between_cells = " | ";
 constexpr const char* introduction =
     R"(# Faults and what comes of them
 
-Made by the fault suite from the tests that passed: the first four columns by `ctest -L fault`, the last two by
-`scripts/test-kernel.sh`. Each compares its columns with what it has seen. Each fault is put into a run that balances, and
+Made by the fault suite from the tests that passed: gpio and comedi by `scripts/test-kernel.sh`, the other columns by
+`ctest -L fault`. Each compares its columns with what it has seen. Each fault is put into a run that balances, and
 what the plant was given is looked at, not what the controller says of itself: the voltage that the virtual rig recorded,
 the simulated plant's own input, or what was on the card's output. After a stop the motor is at zero volts for good, the
 reason is in `run.yaml`, no row is missing from the log, and it replays. In the hundreds of milliseconds of a test a busy
@@ -52,13 +52,19 @@ has the pendulum's encoder, emergency stop, limit switches, amplifier enable and
 takes the motor's voltage away when the heart has not beaten for 100 ms; its cart and its output are on cards, since a cart
 makes more edges than lines can count.
 
+Under quanser-hil they are of `upright run` at 200 Hz with a `libhil.so` of the tests' own (`tests/fault/fake_hil`), whose card
+is a process of its own, with 16-bit counters, an enable line and a watchdog of 0.1 s that locks it when it expires; what is
+looked at is the card's record of its output. No card of Quanser's has been tried. HIL reads no output back: zero volts is
+confirmed when the card has taken it, or when its watchdog has.
+
 A dash is a fault without a meaning there: virtual time knows nothing of the machine; a simulated plant ends with its
 program; the Modbus register map has no bits for emergency stop and limit switches, and cards alone have no lines; lines
 and cards answer a call or refuse it, so that no reply is late, lost, corrupt or out of order, and there is no device that
-restarts; edges are counted by the program, which does not wrap; only an analog input is a potentiometer.
+restarts; edges are counted by the program, which does not wrap; only an analog input is a potentiometer; only a card with a
+library of its own has to be opened, and has a watchdog that locks it.
 
-| fault | simulated, virtual time | simulated, real time | modbus-tcp | modbus-rtu | gpio | comedi |
-|---|---|---|---|---|---|---|
+| fault | simulated, virtual time | simulated, real time | modbus-tcp | modbus-rtu | gpio | comedi | quanser-hil |
+|---|---|---|---|---|---|---|---|
 )";
 
 std::filesystem::path file_of(const std::filesystem::path& records, const std::string& fault,
@@ -138,6 +144,10 @@ const std::vector<Fault>& faults() {
       {"slow_disk", "each write and sync of the log takes 0.3 s"},
       {"dead_disk", "one write of the log takes 3 s"},
       {"writer_killed", "the log's writer thread is killed"},
+      {"card_refuses", "the card refuses voltages"},
+      {"card_expires", "the card's watchdog expires though it was served"},
+      {"card_opens_late", "the first two attempts to open the card fail"},
+      {"card_was_locked", "an expired watchdog has locked the card before the run"},
       {"sigterm", "SIGTERM"},
       {"sigkill", "SIGKILL"},
       {"stop_busy", "at the stop the device is busy (exception 06) for 1 s"},

@@ -16,6 +16,7 @@
 #include <utility>
 #include <vector>
 
+#include "../fault/fake_hil/card_process.hpp"
 #include "counted_calls.hpp"
 #include "fake_comedi.hpp"
 #include "hal/virtual_rig.hpp"
@@ -209,6 +210,18 @@ TEST(RealtimeSafety, TheComediRigAndARigOfPartsNeitherAllocateNorLock) {
   file.cart_encoder = file.output = Backend::comedi;
   file.calibration.cart = card.calibration.cart;
   file.amplifier = card.amplifier;
+  MonotonicClock clock;
+  const auto rig = make_rig(file, {control.period_s()});
+  const Counted counted = count_on(*rig, file, control, clock, 1.0, [] {});
+  EXPECT_EQ(counted.allocations, 0);
+  EXPECT_EQ(counted.locks, 0);
+}
+
+TEST(RealtimeSafety, TheQuanserRigNeitherAllocatesNorLocks) {
+  const test::Folder folder;
+  const test::CardProcess card(folder, test::fake_card_rig());
+  const RigFile file = read_rig(YamlMap::from_text(card.rig_text(), "rig.yaml"));
+  const ControlConfig control = slow_gains();
   MonotonicClock clock;
   const auto rig = make_rig(file, {control.period_s()});
   const Counted counted = count_on(*rig, file, control, clock, 1.0, [] {});

@@ -68,14 +68,61 @@ TEST(RigFile, ShippedFilesRead) {
   EXPECT_EQ(lines.gpio->emergency_stop->line, 4);
   EXPECT_EQ(lines.gpio->limit_switches.at(1).end, TrackEnd::minus_x);
   EXPECT_EQ(lines.gpio->pendulum_encoder->bias, LineBias::pull_up);
+  const RigFile quanser = read_rig_file(rigs / "quanser-q2-usb.yaml");
+  EXPECT_TRUE(roles_of(quanser, Backend::quanser_hil).all());
+  EXPECT_EQ(quanser.quanser->library, "libhil.so");
+  EXPECT_EQ(quanser.quanser->pendulum_channel, 1);
+  EXPECT_EQ(quanser.quanser->watchdog_s, 0.05);
 }
 
 TEST(RigFile, WrittenTextReadsBackExactly) {
   for (const char* name : {"simulated.yaml", "modbus-tcp.yaml", "modbus-rtu.yaml", "comedi-multiq3.yaml",
-                           "comedi-and-modbus.yaml", "gpio-and-modbus.yaml"}) {
+                           "comedi-and-modbus.yaml", "gpio-and-modbus.yaml", "quanser-q2-usb.yaml",
+                           "quanser-q8-usb.yaml", "quanser-qpid-e.yaml"}) {
     const std::string text = rig_text(read_rig_file(rigs / name));
     EXPECT_EQ(rig_text(read_rig(YamlMap::from_text(text, "again.yaml"))), text);
   }
+}
+
+/// The shipped Q2-USB with only what the interface asks for.
+std::string plain_quanser() {
+  std::string text = text_of(rigs / "quanser-q2-usb.yaml");
+  for (const char* key : {"  output_range_v:", "  amplifier_gain:"}) {
+    const std::size_t at = text.find(key);
+    text.erase(at, text.find('\n', at) + 1 - at);
+  }
+  return text;
+}
+
+RigFile quanser_with(const std::string& from, const std::string& to) {
+  std::string text = plain_quanser();
+  const std::size_t at = text.find(from);
+  EXPECT_NE(at, std::string::npos) << from;
+  return read_rig(YamlMap::from_text(text.replace(at, from.size(), to), "/rigs/rig.yaml"));
+}
+
+TEST(RigFile, AQuansersCountersAreFollowedAtTheirOwnWidth) {
+  const RigFile rig = quanser_with("sign: 1, width_bits: 16", "sign: 1, width_bits: 32");
+  EXPECT_EQ(rig.calibration.cart.width_bits, 16);
+  const RigFile zero = quanser_with("{at: start, pose: hanging}",
+                                    "{at: counts, cart_counts: 40000, pendulum_counts: -3, pose: hanging}");
+  EXPECT_EQ(signed_counts(zero.calibration.cart_zero_counts, 16), 40000 - 65536);
+  EXPECT_EQ(quanser_with("board_type: q2_usb", "board_type: my_card").calibration.cart.width_bits, 16);
+}
+
+TEST(RigFile, AQuanserPutsOutNoMoreThanItsRange) {
+  EXPECT_EQ(quanser_with("limit_v: 10.0", "limit_v: 15.0").amplifier.limit_v, 10.0);
+  EXPECT_EQ(quanser_with("limit_v: 10.0", "limit_v: 6.0").amplifier.limit_v, 6.0);
+  EXPECT_EQ(quanser_with("  watchdog_s: 0.05", "  amplifier_gain: 3\n  watchdog_s: 0.05").quanser->watchdog_s,
+            0.05);
+}
+
+TEST(RigFile, AQuansersLibraryIsANameOrAPathBesideTheRigFile) {
+  EXPECT_EQ(quanser_with("libhil.so ", "../lib/libhil.so ").quanser->library, "/lib/libhil.so");
+  const RigFile rig = quanser_with("libhil.so ", "./libhil.so ");
+  EXPECT_EQ(rig.quanser->library, "/rigs/libhil.so");
+  const std::string text = rig_text(rig);
+  EXPECT_EQ(rig_text(read_rig(YamlMap::from_text(text, "again.yaml"))), text);
 }
 
 /// A rig file of parts: the Comedi rig's, with another line for the backends and other wiring.

@@ -1,8 +1,11 @@
-// The seam between the control loop and a rig: what every backend (simulated, modbus, gpio, comedi)
-// implements.
+// The seam between the control loop and a rig: what every backend (simulated, modbus, gpio, comedi,
+// quanser-hil) implements.
 #pragma once
 
 #include <cstdint>
+#include <string>
+#include <utility>
+#include <vector>
 
 namespace upright {
 
@@ -33,6 +36,7 @@ enum class RigFault : std::uint8_t {
   line_failed,         ///< a digital line could not be read or set
   edges_lost,          ///< an encoder's edges passed unseen: its counts are wrong from here on
   edges_too_fast,      ///< an encoder's edges came faster than they may, so that some could be lost
+  watchdog_expired,    ///< the device's own watchdog took the voltage away, and keeps it away
 };
 
 constexpr bool is_emergency_stop(RigFault fault) noexcept {
@@ -68,15 +72,19 @@ struct SafetyInputs {
   int limit_switches = 0;
 };
 
+/// What a device says of itself, for the record of a run: "serial_number" and its text, ...
+using DeviceFacts = std::vector<std::pair<std::string, std::string>>;
+
 /// What is known of a stop. Zero volts is confirmed when the device has taken it and, where its output can be
 /// read back, when that reads zero.
 struct StopReport {
   bool zero_confirmed = false;
   bool read_back = false;  ///< the output reads zero; false: the device's acknowledgement is all there is
   bool disabled = true;    ///< the amplifier is disabled, or nothing here can disable it
-  /// The device's own watchdog takes the voltage away so long after the last request, as was programmed and
-  /// read back [s]; 0: it has none.
+  /// The device's own watchdog takes the voltage away so long after the last request, as was programmed [s];
+  /// 0: it has none.
   double watchdog_s = 0.0;
+  bool watchdog_read_back = true;   ///< its time was read back, too; false: the device has accepted it
   RigFault fault = RigFault::none;  ///< of the latest attempt: why zero volts is not confirmed
   int exception = 0;                ///< behind a fault: the number that the device answered with
 
@@ -111,6 +119,8 @@ class Rig {
   virtual int last_exception() const noexcept { return 0; }
   /// What is wired, of an open rig. A rig around another one passes on that one's.
   virtual SafetyInputs safety_inputs() const noexcept { return {}; }
+  /// Of an open rig, outside the loop. A rig around another one passes on that one's.
+  virtual DeviceFacts device_facts() const { return {}; }
 };
 
 }  // namespace upright

@@ -13,10 +13,11 @@
 #include "upright/hal/comedi_wiring.hpp"
 #include "upright/hal/gpio.hpp"
 #include "upright/hal/modbus_registers.hpp"
+#include "upright/hal/quanser_wiring.hpp"
 
 namespace upright {
 
-enum class Backend : std::uint8_t { simulated, modbus_tcp, modbus_rtu, gpio, comedi };
+enum class Backend : std::uint8_t { simulated, modbus_tcp, modbus_rtu, gpio, comedi, quanser_hil };
 
 /// "simulated", "modbus-tcp", ...
 std::string backend_name(Backend backend);
@@ -108,6 +109,7 @@ struct RigFile {
   std::optional<SimulatedRig> simulated;
   std::optional<ModbusRig> modbus;
   std::optional<ComediRig> comedi;
+  std::optional<QuanserRig> quanser;
   std::optional<GpioRig> gpio;
   std::optional<EncoderAssumptions> encoder_watch;
 };

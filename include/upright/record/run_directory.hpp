@@ -26,6 +26,7 @@ struct RunSetup {
   RigFile rig;  ///< its calibration with the zero already known
   std::optional<Plant> plant;
   LoopLimits limits;
+  DeviceFacts device;  ///< what the rig's device says of itself
   RealtimeGrant scheduling;
   std::string experiment_text;  ///< the section `experiment` of run.yaml; empty: none
 };

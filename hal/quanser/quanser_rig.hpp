@@ -1,0 +1,51 @@
+// A rig on a Quanser card, or the parts of one that are.
+//
+// Each call of the loop is one of the HIL library's in the loop's own thread: one that reads both encoders,
+// one that serves the card's watchdog, one that puts out the voltage. What the library does within a call is
+// not known: a reading that took longer than most of a period is stale; a call that hangs makes the cycle
+// late, which the loop counts as missed periods and ends at zero volts. Meanwhile the card's own watchdog
+// takes the voltage away. So a rig file should give it a time.
+//
+// The watchdog starts with the first voltage and stops once a stop is confirmed. When it expires the card is
+// at zero volts and refuses everything until the rig is opened again: that is a confirmed zero.
+#pragma once
+
+#include <memory>
+
+#include "../rig_lock.hpp"
+#include "quanser_card.hpp"
+#include "upright/hal/rig.hpp"
+#include "upright/hal/rig_file.hpp"
+
+namespace upright {
+
+class QuanserTransport final : public Rig {
+ public:
+  QuanserTransport(const RigFile& rig, double period_s);
+  ~QuanserTransport() override;
+  QuanserTransport(const QuanserTransport&) = delete;
+  QuanserTransport& operator=(const QuanserTransport&) = delete;
+
+  void open() override;
+  RigReading read() noexcept override;
+  RigFault write(double voltage_v) noexcept override;
+  StopReport stop() noexcept override;
+  DeviceFacts device_facts() const override;
+
+ private:
+  void open_card();
+  RigFault serve_watchdog() noexcept;
+  RigFault enable_once() noexcept;
+  bool has_expired() noexcept;
+  void take_voltage_away(StopReport& report) noexcept;
+
+  RigFile rig_;
+  std::int64_t patience_ns_;
+  RigLock lock_;
+  std::unique_ptr<QuanserCard> card_;
+  std::uint64_t sequence_ = 0;
+  std::int64_t served_ns_ = 0;  // when the watchdog was last
+  bool watching_ = false, enabled_ = false, stopped_ = true;
+};
+
+}  // namespace upright

@@ -1,0 +1,161 @@
+// The Quanser backend on a library and a card of the tests' own: opening, refusals, the watchdog's lock, the
+// doctor's proof, and what a run records of the card.
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "../fault/fake_hil/card_process.hpp"
+#include "hal/quanser_proof.hpp"
+#include "upright/hal/rig_factory.hpp"
+#include "upright/base/error.hpp"
+#include "upright/record/run_reader.hpp"
+
+namespace upright::test {
+namespace {
+
+constexpr double period_s = 0.05;
+
+void sleep_s(double seconds) {
+  std::this_thread::sleep_for(std::chrono::duration<double>(seconds));
+}
+
+/// The card, and a rig on it.
+struct Bench {
+  explicit Bench(const std::string& wired = fake_card_rig(), const std::vector<std::string>& flags = {})
+      : card(folder, wired, flags),
+        file(read_rig(YamlMap::from_text(card.rig_text(), "rig.yaml"))),
+        rig(make_rig(file, {period_s})) {}
+
+  CardRow last() const { return card.record().back(); }
+
+  Folder folder;
+  CardProcess card;
+  RigFile file;
+  std::unique_ptr<Rig> rig;
+};
+
+std::string refusal_of(Rig& rig) {
+  try {
+    rig.open();
+  } catch (const DeviceError& error) {
+    return error.what();
+  }
+  return "";
+}
+
+TEST(QuanserCard, OpensAtZeroVoltsAndReadsItsCounts) {
+  Bench bench;
+  bench.rig->open();
+  EXPECT_EQ(bench.last().analog_v, 0.0);
+  EXPECT_FALSE(bench.last().enabled);
+  const RigReading reading = bench.rig->read();
+  EXPECT_EQ(reading.status, RigStatus::fresh);
+  EXPECT_EQ(reading.cart_counts, 0);
+  EXPECT_EQ(reading.pendulum_counts, 34) << "3 degrees of 4096 counts per turn";
+}
+
+TEST(QuanserCard, PutsOutTheVoltageThroughTheAmplifiersGainAndSign) {
+  Bench bench(replaced(replaced(fake_card_rig(), "amplifier_gain: 1", "amplifier_gain: 3"),
+                       "limit_v: 10.0, sign: 1", "limit_v: 10.0, sign: -1"));
+  bench.rig->open();
+  EXPECT_EQ(bench.rig->write(6.0), RigFault::none);
+  EXPECT_DOUBLE_EQ(bench.last().analog_v, -2.0);
+  EXPECT_TRUE(bench.last().enabled);
+  EXPECT_EQ(bench.rig->write(std::nan("")), RigFault::not_finite);
+  EXPECT_EQ(bench.last().analog_v, 0.0);
+  EXPECT_TRUE(bench.rig->stop().done());
+  EXPECT_FALSE(bench.last().enabled);
+  EXPECT_EQ(bench.rig->write(6.0), RigFault::none) << "a stop is latched";
+  EXPECT_EQ(bench.last().analog_v, 0.0);
+}
+
+TEST(QuanserCard, AnExpiredWatchdogIsAConfirmedZeroThatLocksTheCardUntilItIsOpenedAgain) {
+  Bench bench;
+  bench.rig->open();
+  ASSERT_EQ(bench.rig->write(2.0), RigFault::none);
+  sleep_s(0.25);
+  EXPECT_TRUE(bench.last().locked);
+  EXPECT_EQ(bench.last().analog_v, 0.0);
+  EXPECT_EQ(bench.rig->read().fault, RigFault::watchdog_expired);
+  EXPECT_EQ(bench.rig->write(2.0), RigFault::watchdog_expired);
+  EXPECT_EQ(bench.last().analog_v, 0.0);
+  EXPECT_TRUE(bench.rig->stop().done());
+  bench.rig->open();
+  EXPECT_FALSE(bench.last().locked);
+  EXPECT_EQ(bench.rig->write(2.0), RigFault::none);
+  EXPECT_EQ(bench.last().analog_v, 2.0);
+}
+
+TEST(QuanserCard, ASecondControllerIsRefused) {
+  Bench bench;
+  bench.rig->open();
+  const auto second = make_rig(bench.file, {period_s});
+  EXPECT_NE(refusal_of(*second).find("already has a controller"), std::string::npos);
+}
+
+TEST(QuanserCard, OpeningIsTriedThreeTimesAndThenRefusedWithTheRemedy) {
+  Bench bench(fake_card_rig(), {"--failed-openings", "3"});
+  const std::string sentence = refusal_of(*bench.rig);
+  EXPECT_NE(sentence.find("error 108: no such board"), std::string::npos) << sentence;
+  EXPECT_NE(sentence.find("plug the card in"), std::string::npos) << sentence;
+  EXPECT_EQ(refusal_of(*bench.rig), "") << "the fourth attempt succeeds";
+}
+
+TEST(QuanserCard, ALibraryThatIsAnotherIsRefused) {
+  RigFile file = read_rig(YamlMap::from_text(fake_card_rig(), "rig.yaml"));
+  file.quanser->library = "libm.so.6";
+  const std::string sentence = refusal_of(*make_rig(file, {period_s}));
+  EXPECT_NE(sentence.find("is no HIL library"), std::string::npos) << sentence;
+}
+
+TEST(QuanserCard, AWatchdogShorterThanTwoPeriodsIsRefused) {
+  const RigFile file = read_rig(YamlMap::from_text(fake_card_rig(), "rig.yaml"));
+  EXPECT_THROW(require_link_fits(file, 0.06), ConfigError);
+  EXPECT_NO_THROW(require_link_fits(file, 0.05));
+}
+
+TEST(QuanserCard, CountersBeginAtZeroWhereTheZeroIsTakenAtTheStart) {
+  Bench bench(replaced(fake_card_rig(), "{at: counts, cart_counts: 0, pendulum_counts: 0, pose: upright}",
+                       "{at: start, pose: upright}"));
+  bench.rig->open();
+  EXPECT_EQ(bench.rig->read().pendulum_counts, 0);
+}
+
+TEST(QuanserCard, IsProvedStepByStep) {
+  Bench bench(fake_card_rig(), {"--locked", "true"});
+  std::vector<std::string> passed;
+  for (const CardStep& step : prove_quanser_card(bench.file)) {
+    EXPECT_TRUE(step.passed) << step.subject << ": " << step.remedy;
+    passed.push_back(step.subject);
+  }
+  EXPECT_EQ(passed, (std::vector<std::string>{"Quanser library", "Quanser card", "Quanser card's output",
+                                              "Quanser card's encoders", "Quanser card's watchdog"}));
+  EXPECT_FALSE(bench.last().locked);
+  for (const CardRow& row : bench.card.record()) EXPECT_EQ(row.analog_v, 0.0);
+}
+
+TEST(QuanserCard, ARunRecordsWhichCardAndLibraryItWas) {
+  Folder folder;
+  const CardProcess card(folder, fake_card_rig());
+  std::ofstream(folder / "rig.yaml") << card.rig_text();
+  std::ofstream(folder / "gains.yaml")
+      << replaced(text_of(UPRIGHT_SOURCE_DIR "/config/gains/exponential.yaml"), "sample_rate_hz: 1000",
+                  "sample_rate_hz: 200");
+  Process run({UPRIGHT_BINARY, "run", "--rig", folder / "rig.yaml", "--gains", folder / "gains.yaml",
+               "--duration", "0.5", "--out", folder / "runs", "--json", "--unchecked"});
+  const nlohmann::json document = nlohmann::json::parse(run.rest());
+  EXPECT_EQ(run.wait(), 0) << document;
+  const std::string text = text_of(only_entry(folder / "runs") / "run.yaml");
+  for (const char* fact : {"serial_number: '12345'", "library_version: '9.8.7'", "product: 'Fake Q2-USB'"})
+    EXPECT_NE(text.find(fact), std::string::npos) << fact;
+  EXPECT_TRUE(read_run(only_entry(folder / "runs")).outcome.has_value());
+}
+
+}  // namespace
+}  // namespace upright::test
