@@ -12,8 +12,8 @@
 
 #include "../fault/fake_hil/card_process.hpp"
 #include "hal/quanser_proof.hpp"
-#include "upright/hal/rig_factory.hpp"
 #include "upright/base/error.hpp"
+#include "upright/hal/rig_factory.hpp"
 #include "upright/record/run_reader.hpp"
 
 namespace upright::test {

@@ -4,16 +4,31 @@
 #include <pthread.h>
 #include <stdlib.h>
 
+#include <utility>
+
 namespace upright::test {
 
 constinit thread_local bool armed = false;
 constinit thread_local int allocations = 0;
 constinit thread_local int locks = 0;
 
+namespace {
+
+/// The function that this one stands before. The loader may allocate while it looks, which is not counted.
+template <class Function>
+Function following(const char* name) {
+  const bool was_armed = std::exchange(armed, false);
+  const auto found = reinterpret_cast<Function>(dlsym(RTLD_NEXT, name));
+  armed = was_armed;
+  return found;
+}
+
+}  // namespace
 }  // namespace upright::test
 
 using upright::test::allocations;
 using upright::test::armed;
+using upright::test::following;
 using upright::test::locks;
 
 extern "C" {
@@ -52,19 +67,19 @@ void free(void* memory) {
 
 int pthread_mutex_lock(pthread_mutex_t* mutex) {
   using Function = int (*)(pthread_mutex_t*);
-  static const Function real = reinterpret_cast<Function>(dlsym(RTLD_NEXT, "pthread_mutex_lock"));
+  static const Function real = following<Function>("pthread_mutex_lock");
   if (armed) ++locks;
   return real(mutex);
 }
 int pthread_rwlock_wrlock(pthread_rwlock_t* lock) {
   using Function = int (*)(pthread_rwlock_t*);
-  static const Function real = reinterpret_cast<Function>(dlsym(RTLD_NEXT, "pthread_rwlock_wrlock"));
+  static const Function real = following<Function>("pthread_rwlock_wrlock");
   if (armed) ++locks;
   return real(lock);
 }
 int pthread_rwlock_rdlock(pthread_rwlock_t* lock) {
   using Function = int (*)(pthread_rwlock_t*);
-  static const Function real = reinterpret_cast<Function>(dlsym(RTLD_NEXT, "pthread_rwlock_rdlock"));
+  static const Function real = following<Function>("pthread_rwlock_rdlock");
   if (armed) ++locks;
   return real(lock);
 }
