@@ -17,6 +17,7 @@
 #include "run_report.hpp"
 #include "sweep/sweep.hpp"
 #include "upright/base/error.hpp"
+#include "upright/control/delay_line.hpp"
 #include "upright/control/model_parts.hpp"
 #include "upright/model/linear_plant.hpp"
 #include "upright/model/plant_file.hpp"
@@ -73,7 +74,8 @@ std::vector<SweepRun> simulate(const Plant& plant, const RunRecord& run,
   }
   SweepExecutor::Group cases;
   constexpr int count = 60;
-  for (int i = 0; i <= count; ++i) cases.push_back({theta0, 1.2 * longest * i / count});
+  const double drawn_to_s = std::min(1.2 * longest, DelayLine::longest_delay_s);
+  for (int i = 0; i <= count; ++i) cases.push_back({theta0, drawn_to_s * i / count});
   std::vector<SweepRun> runs;
   const std::size_t most = std::max<std::size_t>(1, sweep_group_size(config));
   for (std::size_t begin = 0; begin < cases.size(); begin += most) {
