@@ -177,6 +177,7 @@ void check_registers(const YamlMap& map, const ModbusRig& rig, const RigRoles& r
   if (roles.cart) read.push_back({"counters", rig.cart_address, rig.counter.registers});
   if (roles.pendulum) read.push_back({"counters", rig.pendulum_address, rig.counter.registers});
   if (rig.boot_count_address) read.push_back({"boot_count_address", *rig.boot_count_address, 1});
+  if (rig.status_address) read.push_back({"status_address", *rig.status_address, 1});
   std::vector<Block> written;
   if (carries_voltage(rig, roles))
     written.push_back({"voltage", rig.voltage_address, rig.voltage.registers()});
@@ -196,7 +197,7 @@ void check_registers(const YamlMap& map, const ModbusRig& rig, const RigRoles& r
     end = std::max(end, block.first + block.count);
   }
   if (end - first > most_registers_per_read)
-    map.fail("counters", "span " + std::to_string(end - first) + " registers, the boot count included",
+    map.fail("counters", "span " + std::to_string(end - first) + " registers, boot count and status included",
              "put them within 125 registers, one request reads them all");
   if (rig.exchange == ModbusExchange::read_write && rig.input_registers)
     map.fail("exchange", "is read_write, which reads holding registers only",
@@ -218,6 +219,7 @@ ModbusRig read_modbus(const YamlMap& map, bool serial, const RigFile& rig_file) 
   if (roles.encoders()) read_counters(map.map("counters"), rig_file.calibration, roles, rig);
   if (map.has("boot_count_address"))
     rig.boot_count_address = small_integer(map, "boot_count_address", 0, last_address);
+  if (map.has("status_address")) rig.status_address = small_integer(map, "status_address", 0, last_address);
   if (carries_voltage(rig, roles)) read_voltage(map.map("voltage"), rig_file.amplifier.limit_v, rig);
   if (roles.output) {
     if (map.has("enable_address")) rig.enable_address = small_integer(map, "enable_address", 0, last_address);
@@ -357,6 +359,7 @@ std::string modbus_text(const ModbusRig& rig, const RigRoles& roles) {
   if (roles.encoders()) text += counters_text(rig, roles);
   if (rig.boot_count_address)
     text += "  boot_count_address: " + std::to_string(*rig.boot_count_address) + "\n";
+  if (rig.status_address) text += "  status_address: " + std::to_string(*rig.status_address) + "\n";
   if (carries_voltage(rig, roles))
     text += "  voltage: {address: " + std::to_string(rig.voltage_address) +
             ", encoding: " + word_of(rig.voltage.encoding, encodings) +

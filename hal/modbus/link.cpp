@@ -14,7 +14,7 @@ namespace upright {
 
 namespace {
 
-constexpr int illegal_function = 1;
+constexpr int illegal_function = 1, device_failure = 4;
 
 /// The IPv4 address of a host.
 std::string address_of(const std::string& host) {
@@ -71,6 +71,7 @@ void ModbusLink::find_block() noexcept {
   if (roles_.cart) include(config_.cart_address, config_.counter.registers);
   if (roles_.pendulum) include(config_.pendulum_address, config_.counter.registers);
   if (config_.boot_count_address) include(*config_.boot_count_address, 1);
+  if (config_.status_address) include(*config_.status_address, 1);
   // Function 0x17 has to read something: without counters it is the voltage it has just written.
   if (end == 0 && config_.exchange == ModbusExchange::read_write)
     include(config_.voltage_address, config_.voltage.registers());
@@ -141,9 +142,19 @@ RigFault ModbusLink::read_block(int registers, double held_v) noexcept {
   return read_registers(read_write_request(range, config_.voltage_address, used), registers);
 }
 
+/// A device that has no counts to give says why in its status, where it has one.
+RigFault ModbusLink::named(RigFault fault) noexcept {
+  if (fault != RigFault::device_refused || exception_ != device_failure || !config_.status_address)
+    return fault;
+  const auto function = config_.input_registers ? ModbusFunction::read_input : ModbusFunction::read_holding;
+  if (read_registers(read_request(function, {*config_.status_address, 1}), 1) != RigFault::none) return fault;
+  const RigFault cause = fault_in_status(registers_[0]);
+  return cause == RigFault::none ? fault : cause;
+}
+
 RigFault ModbusLink::read(double held_v, DeviceReading& reading) noexcept {
   if (block_ == 0) return write_voltage(held_v);
-  if (const RigFault fault = read_block(block_, held_v); fault != RigFault::none) return fault;
+  if (const RigFault fault = read_block(block_, held_v); fault != RigFault::none) return named(fault);
   const auto at = [&](int address) {
     return std::span<const std::uint16_t>(registers_).subspan(static_cast<std::size_t>(address - first_), 2);
   };
@@ -151,11 +162,13 @@ RigFault ModbusLink::read(double held_v, DeviceReading& reading) noexcept {
   if (roles_.pendulum)
     reading.pendulum_counts = decode_counter(at(config_.pendulum_address), config_.counter);
   reading.boot_count = config_.boot_count_address ? at(*config_.boot_count_address)[0] : 0;
+  reading.stopped_by =
+      config_.status_address ? fault_in_status(at(*config_.status_address)[0]) : RigFault::none;
   return RigFault::none;
 }
 
 RigFault ModbusLink::write_voltage(double voltage_v) noexcept {
-  if (config_.exchange == ModbusExchange::read_write) return read_block(block_, voltage_v);
+  if (config_.exchange == ModbusExchange::read_write) return named(read_block(block_, voltage_v));
   const auto words = voltage_words(voltage_v);
   const auto used = std::span(words).first(static_cast<std::size_t>(config_.voltage.registers()));
   return ask(write_multiple_request(config_.voltage_address, used));
@@ -202,7 +215,7 @@ RigFault ModbusLink::read_register(int address, int& value) noexcept {
 RigFault ModbusLink::resynchronise(double held_v) noexcept {
   int value = 0;
   const RigFault fault =
-      block_ == 0 ? read_register(config_.voltage_address, value) : read_block(other_block_, held_v);
+      block_ == 0 ? read_register(config_.voltage_address, value) : named(read_block(other_block_, held_v));
   if (fault == RigFault::none) in_step_ = true;
   return fault;
 }

@@ -18,6 +18,7 @@ struct DeviceReading {
   std::int64_t cart_counts = 0;
   std::int64_t pendulum_counts = 0;
   int boot_count = 0;
+  RigFault stopped_by = RigFault::none;  ///< by its status: why the device itself has stopped the motor
 };
 
 class ModbusLink {
@@ -68,6 +69,7 @@ class ModbusLink {
   RigFault ask(const Pdu& request) noexcept;
   RigFault read_registers(const Pdu& request, int count) noexcept;
   RigFault read_block(int registers, double held_v) noexcept;
+  RigFault named(RigFault fault) noexcept;
 
   ModbusRig config_;
   int amplifier_sign_;

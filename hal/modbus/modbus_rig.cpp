@@ -98,6 +98,11 @@ void ModbusTransport::fail(RigFault fault, const std::string& doing) {
                       "the amplifier off and check the device; where that register is no copy of the output, "
                       "give modbus.voltage read_back: false in " +
                       file);
+  if (fault == RigFault::edges_lost)
+    throw DeviceError(
+        device +
+        " has lost edges of an encoder, so that its counts are wrong: check wiring and speed of the "
+        "encoders, and restart the device");
   throw DeviceError(std::string(words_for(fault)) + " from " + device + " while " + doing +
                     ": check that it is on, wired and configured as " + file + " says");
 }
@@ -352,6 +357,7 @@ void ModbusTransport::serve_read(std::uint32_t number) noexcept {
     answer.fault = certain(noted(link_.read(fresh_voltage_v(), reading)), reads_refused_in_a_row_);
     answer.time_ns = asked_ns + (now_ns() - asked_ns) / 2;
     if (answer.fault == RigFault::none) answer.fault = same_device(reading);
+    if (answer.fault == RigFault::none) answer.fault = reading.stopped_by;
     if (answer.fault == RigFault::none) {
       answer.cart_counts = signed_counts(reading.cart_counts, rig_.calibration.cart.width_bits);
       answer.pendulum_counts = signed_counts(reading.pendulum_counts, rig_.calibration.pendulum.width_bits);

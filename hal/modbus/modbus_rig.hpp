@@ -36,6 +36,10 @@ class ModbusTransport final : public Rig {
   /// The thread tries from now on (stop_sequence.hpp) until it is done, or until the rig is destroyed.
   StopReport stop() noexcept override;
   int last_exception() const noexcept override { return exception_.load(std::memory_order_relaxed); }
+  /// A status register shows an emergency stop and a limit switch at either end.
+  SafetyInputs safety_inputs() const noexcept override {
+    return rig_.modbus->status_address ? SafetyInputs{true, 2} : SafetyInputs{};
+  }
 
  private:
   void end_thread() noexcept;

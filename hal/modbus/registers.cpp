@@ -88,4 +88,13 @@ double decode_voltage(std::span<const std::uint16_t> registers, const VoltageFor
          format.counts_per_v;
 }
 
+RigFault fault_in_status(std::uint16_t status) noexcept {
+  // Counts that are wrong matter most, and somebody's hand more than a switch.
+  if ((status & 8u) != 0) return RigFault::edges_lost;
+  if ((status & 1u) != 0) return RigFault::emergency_stop;
+  if ((status & 2u) != 0) return RigFault::limit_switch_plus;
+  if ((status & 4u) != 0) return RigFault::limit_switch_minus;
+  return RigFault::none;
+}
+
 }  // namespace upright

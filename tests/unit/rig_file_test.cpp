@@ -163,7 +163,8 @@ TEST(RigFile, RigsOfPartsReadBackExactly) {
         of_parts("{cart_encoder: comedi, pendulum_encoder: modbus-tcp, output: comedi}",
                  output_and_cart + "modbus: {host: 10.0.0.1, port: 502, unit: 1, response_timeout_s: 0.001, "
                                    "exchange: separate, counters: {table: holding, pendulum_address: 1, "
-                                   "registers: 2, word_order: high_first}, boot_count_address: 0}\n")}) {
+                                   "registers: 2, word_order: high_first}, boot_count_address: 0, "
+                                   "status_address: 3}\n")}) {
     const std::string text = rig_text(read_rig(YamlMap::from_text(file, "rig.yaml")));
     EXPECT_EQ(rig_text(read_rig(YamlMap::from_text(text, "again.yaml"))), text);
   }
@@ -338,6 +339,7 @@ TEST(RigFile, RefusesWhatCannotBeMeant) {
       {"registers: 2", "registers: 3", "registers"},
       {"word_order: high_first", "word_order: big", "high_first"},
       {"boot_count_address: 4", "boot_count_address: 3", "shares a register"},
+      {"boot_count_address: 4", "boot_count_address: 4\n  status_address: 4", "shares a register"},
       {"address: 16", "address: 2", "shares a register"},
       {"enable_address: 17", "enable_address: 16", "shares a register"},
       {"encoding: int16", "encoding: int8", "did you mean int16"},

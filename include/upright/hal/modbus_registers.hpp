@@ -5,6 +5,8 @@
 #include <cstdint>
 #include <span>
 
+#include "upright/hal/rig.hpp"
+
 namespace upright {
 
 enum class WordOrder : std::uint8_t { high_first, low_first };
@@ -36,5 +38,9 @@ void encode_counter(std::int64_t counts, const CounterFormat& format,
 std::array<std::uint16_t, 2> encode_voltage(double voltage_v, const VoltageFormat& format) noexcept;
 /// May be not finite with float32: the registers hold whatever the other side wrote.
 double decode_voltage(std::span<const std::uint16_t> registers, const VoltageFormat& format) noexcept;
+
+/// What a device's status register says has stopped the motor. Bit 0: the emergency stop; 1 and 2: the limit
+/// switches at the +x and the -x end; 3: edges of an encoder were lost.
+RigFault fault_in_status(std::uint16_t status) noexcept;
 
 }  // namespace upright

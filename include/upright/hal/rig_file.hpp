@@ -89,6 +89,8 @@ struct ModbusRig {
   bool voltage_reads_back = true;
   std::optional<int> enable_address;      ///< holding register: 1 enables the amplifier, 0 disables it
   std::optional<int> boot_count_address;  ///< same table as the counters: changes when the device restarts
+  /// Same table as the counters: why the device has stopped the motor by itself, see fault_in_status().
+  std::optional<int> status_address;
   std::optional<DeviceWatchdog> watchdog;
 };
 
