@@ -8,7 +8,16 @@
 
 namespace upright::test {
 
-enum class Bench { simulated_fast, simulated_real_time, modbus_tcp, modbus_rtu, gpio, comedi, quanser_hil };
+enum class Bench {
+  simulated_fast,
+  simulated_real_time,
+  modbus_tcp,
+  modbus_rtu,
+  gpio,
+  comedi,
+  quanser_hil,
+  board
+};
 
 /// The name of a bench's records: "modbus-tcp", ...; none: there is no such bench.
 std::optional<Bench> bench_named(const std::string& name);

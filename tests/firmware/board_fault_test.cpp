@@ -1,0 +1,189 @@
+// The fault suite on a board: `upright run` drives a plant behind the emulated board, whose pins the plant
+// sees and which is what judges it.
+#include <gtest/gtest.h>
+
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "../fault/broken_run.hpp"
+#include "../fault/evidence.hpp"
+#include "board_setting.hpp"
+#include "upright/runtime/run_reader.hpp"
+
+namespace upright::test {
+namespace {
+
+constexpr double period_s = 0.005;
+constexpr double watchdog_s = 0.1;
+constexpr double processor_watchdog_s = 0.016;
+
+struct Case {
+  ProcessCase process;
+  LineFaults line = {};
+  Mishap mishap = Mishap::none;
+  bool cuts = false;
+  const char* cause = "";  ///< a part of the run's sentence
+  const char* more = "";   ///< of the test's name, where a fault has several
+};
+
+Case on_the_line(const char* fault, const LineFaults& line) {
+  return {.process = {.fault = fault, .expectation = goes_on()}, .line = line};
+}
+
+Case mishap(const char* fault, Mishap what, const char* cause, Expectation expectation,
+            const char* more = "") {
+  constexpr double long_enough_s = 4.0;
+  return {.process = {.fault = fault,
+                      .expectation = std::move(expectation),
+                      .begins = Begins::when_done,
+                      .duration_s = long_enough_s},
+          .mishap = what,
+          .cause = cause,
+          .more = more};
+}
+
+std::vector<Case> line_cases() {
+  const Expectation lost = stops({"link_lost", "stale_encoder"}, watchdog_s + period_s);
+  std::vector<Case> cases = {
+      on_the_line("late", {.late_replies_every = 20, .late_s = 0.007}),
+      on_the_line("drop", {.drop_replies_every = 20}),
+      on_the_line("corrupt", {.corrupt_replies_every = 20}),
+      on_the_line("corrupt_request", {.corrupt_requests_every = 20}),
+      on_the_line("noise", {.noise_every = 20}),
+  };
+  cases.push_back({.process = {.fault = "silent", .expectation = lost, .begins = Begins::at_the_start},
+                   .line = {.drop_replies_every = 1}});
+  cases.push_back({.process = {.fault = "always_late", .expectation = lost, .begins = Begins::at_the_start},
+                   .line = {.late_replies_every = 1, .late_s = 0.3}});
+  cases.push_back(
+      {.process = {.fault = "cut", .expectation = lost, .begins = Begins::when_done}, .cuts = true});
+  return cases;
+}
+
+std::vector<Case> device_cases() {
+  const Expectation stuck = stops({"stuck_encoder"}, stuck_noticed_s);
+  const Expectation at_once = stops({"rig_fault"}, period_s);
+  const Expectation at_the_track_end = stops({"track_limit"}, period_s);
+  return {
+      mishap("stuck_cart", Mishap::cart_sticks, "the cart's encoder did not count", stuck),
+      mishap("stuck_pendulum", Mishap::pendulum_sticks, "the pendulum's encoder did not count", stuck),
+      mishap("restart", Mishap::device_restarts, "restarted", at_once),
+      mishap("device_hangs", Mishap::program_hangs, "restarted", stops({"rig_fault"}, processor_watchdog_s)),
+      mishap("emergency_stop", Mishap::emergency_stop, "the emergency stop was pressed",
+             stops({"emergency_stop"}, period_s)),
+      mishap("limit_switch", Mishap::plus_switch, "the limit switch at the +x end was hit", at_the_track_end,
+             "_plus"),
+      mishap("limit_switch", Mishap::minus_switch, "the limit switch at the -x end was hit", at_the_track_end,
+             "_minus"),
+      mishap("edges_lost", Mishap::edges_too_fast, "edges of an encoder were lost", at_once),
+  };
+}
+
+std::vector<Case> all() {
+  // The board's watchdog takes the voltage away while the controller stands still.
+  const Expectation stood_still = stops({"overrun"}, watchdog_s + period_s);
+  std::vector<Case> cases = line_cases();
+  for (const Case& c : device_cases()) cases.push_back(c);
+  for (const std::vector<ProcessCase>& list : {sign_cases(), machine_cases(period_s, stood_still)})
+    for (const ProcessCase& c : list) cases.push_back({.process = c});
+  return cases;
+}
+
+void PrintTo(const Case& c, std::ostream* out) {
+  *out << c.process.fault << c.more;
+}
+
+/// The case with what befalls the board as something to do to the run.
+ProcessCase process_of(const Case& c, BoardRig& board) {
+  ProcessCase process = c.process;
+  if (c.mishap != Mishap::none)
+    process.action = [&board, what = c.mishap](const Running&) {
+      board.suffer(what);
+      return true;
+    };
+  if (c.cuts)
+    process.action = [&board](const Running&) {
+      board.cut();
+      return true;
+    };
+  return process;
+}
+
+std::optional<Evidence> evidence_of(const Case& c, BoardSetting& setting) {
+  const ProcessCase process = process_of(c, setting.board());
+  const ProcessFiles files = setting.files(process.duration_s);
+  const std::optional<double> done_s = run_with(process, files);
+  if (!done_s || !std::filesystem::exists(files.runs)) return std::nullopt;
+  sleep_s(watchdog_s + period_s);
+  const std::vector<TraceRow> trace = setting.board().record();
+  Evidence evidence;
+  evidence.run = only_entry(files.runs);
+  evidence.plant = plant_rows(trace);
+  evidence.fault_s = begin_of(process, files, let_go_s(trace), *done_s, *done_s);
+  evidence.log_may_end = process.begins == Begins::when_the_log_ends;
+  return evidence;
+}
+
+class BoardFault : public testing::TestWithParam<Case> {};
+
+TEST_P(BoardFault, HasItsOutcome) {
+  const Case& c = GetParam();
+  std::optional<BoardSetting> setting;
+  const auto attempt = [&] {
+    setting.emplace(c.process, c.line);
+    return evidence_of(c, *setting);
+  };
+  ASSERT_NO_FATAL_FAILURE(judge_attempts(attempt, c.process.expectation));
+  EXPECT_TRUE(setting->board().at_rest());
+  const std::string sentence = read_run(only_entry(setting->runs())).outcome->text("sentence");
+  EXPECT_NE(sentence.find(c.cause), std::string::npos) << sentence;
+  if (!HasFailure()) record(c.process.fault, Bench::board, cell_of(c.process.expectation));
+}
+
+INSTANTIATE_TEST_SUITE_P(, BoardFault, testing::ValuesIn(all()), [](const auto& item) {
+  return std::string(item.param.process.fault) + item.param.more;
+});
+
+TEST(BoardBroken, StopsWhenAValueIsNotANumber) {
+  const Expectation expectation = stops({"not_finite"}, period_s);
+  std::optional<BoardSetting> setting;
+  const auto attempt = [&]() -> std::optional<Evidence> {
+    setting.emplace();
+    const std::optional<BrokenRun> run =
+        broken_run(setting->rig_file(), setting->gain_file(), setting->runs());
+    if (!run) return std::nullopt;
+    sleep_s(watchdog_s);
+    return Evidence{plant_rows(setting->board().record()), run->began_s, run->directory, false, false};
+  };
+  ASSERT_NO_FATAL_FAILURE(judge_attempts(attempt, expectation));
+  EXPECT_TRUE(setting->board().at_rest());
+  if (!HasFailure()) record("nan", Bench::board, cell_of(expectation));
+}
+
+struct Killed {
+  double killed_s = 0.0, on_until_s = 0.0;
+  std::size_t rows = 0;
+};
+
+std::optional<Killed> killed() {
+  BoardSetting setting;
+  const std::optional<double> killed_s = kill_run(setting.files(60.0));
+  if (!killed_s) return std::nullopt;
+  sleep_s(2 * watchdog_s);
+  const double on_until_s = last_voltage_s(setting.board().record());
+  return Killed{*killed_s, on_until_s, read_run(only_entry(setting.runs())).samples.rows.size()};
+}
+
+TEST(BoardKilled, ItsWatchdogTakesTheVoltageAway) {
+  const std::optional<Killed> run = tried(killed);
+  ASSERT_TRUE(run.has_value()) << never_came_about;
+  EXPECT_GT(run->on_until_s, run->killed_s) << "the board kept the last voltage";
+  EXPECT_LT(run->on_until_s - run->killed_s, watchdog_s + period_s);
+  EXPECT_GT(run->rows, 0u) << "the log reads";
+  if (!HasFailure()) record("sigkill", Bench::board, "the device's watchdog: 0 V within 100 ms");
+}
+
+}  // namespace
+}  // namespace upright::test
