@@ -10,7 +10,7 @@
 #include "../fault/broken_run.hpp"
 #include "../fault/evidence.hpp"
 #include "board_setting.hpp"
-#include "upright/runtime/run_reader.hpp"
+#include "upright/record/run_reader.hpp"
 
 namespace upright::test {
 namespace {

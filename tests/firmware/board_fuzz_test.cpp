@@ -31,6 +31,7 @@ class Account {
   /// What has to come of bytes that follow a silence and that a silence follows.
   std::vector<Answer> take(Bytes bytes, double now_s) {
     expire(now_s);
+    shortest_watchdog_ms_ = watchdog_in_use_ms();
     std::vector<Answer> answers;
     while (bytes.size() >= 4 && bytes[0] == 1) {
       const std::size_t size = size_of(bytes);
@@ -46,7 +47,9 @@ class Account {
   void expire(double now_s) {
     if (now_s >= expires_s()) voltage_mv_ = 0;
   }
-  double expires_s() const { return fed_s_ + 1e-3 * (watchdog_ms_ != 0 ? watchdog_ms_ : 100); }
+  double expires_s() const { return fed_s_ + 1e-3 * watchdog_in_use_ms(); }
+  /// Of those in use since the last bytes began.
+  int shortest_watchdog_ms() const { return shortest_watchdog_ms_; }
   double voltage_v() const {
     return enabled_ ? std::clamp(1e-3 * voltage_mv_, -Board::supply_v, Board::supply_v) : 0.0;
   }
@@ -125,11 +128,14 @@ class Account {
       if (address == 17) enabled_ = list[i] == 1;
       if (address == 17 && list[i] == 0) voltage_mv_ = 0;
       if (address == 18) watchdog_ms_ = list[i];
+      shortest_watchdog_ms_ = std::min(shortest_watchdog_ms_, watchdog_in_use_ms());
     }
     return 0;
   }
 
-  int voltage_mv_ = 0, watchdog_ms_ = 0;
+  int watchdog_in_use_ms() const { return watchdog_ms_ != 0 ? watchdog_ms_ : 100; }
+
+  int voltage_mv_ = 0, watchdog_ms_ = 0, shortest_watchdog_ms_ = 0;
   bool enabled_ = false;
   double fed_s_ = -1.0;
 };
@@ -233,8 +239,7 @@ class Fuzzed {
     ++bursts;
     move_shafts();
     // Within several requests at once a short watchdog may expire, and nobody outside can tell between which.
-    const int parts = account_.value(18) < shortest_told_ms || !stream_.one_in(8) ? 1 : 3;
-    const Bytes bytes = stream_.burst(parts);
+    const Bytes bytes = stream_.one_in(8) ? several() : stream_.burst(1);
     const std::pair<std::int64_t, std::int64_t> before = counts();
     replies_.clear();
     board_.send(bytes);
@@ -252,6 +257,17 @@ class Fuzzed {
 
  private:
   static constexpr int shortest_told_ms = 20;
+
+  Bytes several() {
+    Bytes bytes;
+    Account trial = account_;
+    do {
+      bytes = stream_.burst(3);
+      trial = account_;
+      trial.take(bytes, now_s());
+    } while (trial.shortest_watchdog_ms() < shortest_told_ms);
+    return bytes;
+  }
 
   static bool near(double time_s, double from_s, double to_s) { return time_s > from_s && time_s < to_s; }
   std::pair<std::int64_t, std::int64_t> counts() const {
