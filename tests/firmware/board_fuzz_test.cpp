@@ -48,6 +48,7 @@ class Account {
     if (now_s >= expires_s()) voltage_mv_ = 0;
   }
   double expires_s() const { return fed_s_ + 1e-3 * watchdog_in_use_ms(); }
+  int watchdog_in_use_ms() const { return watchdog_ms_ != 0 ? watchdog_ms_ : 100; }
   /// Of those in use since the last bytes began.
   int shortest_watchdog_ms() const { return shortest_watchdog_ms_; }
   double voltage_v() const {
@@ -132,8 +133,6 @@ class Account {
     }
     return 0;
   }
-
-  int watchdog_in_use_ms() const { return watchdog_ms_ != 0 ? watchdog_ms_ : 100; }
 
   int voltage_mv_ = 0, watchdog_ms_ = 0, shortest_watchdog_ms_ = 0;
   bool enabled_ = false;
@@ -239,7 +238,8 @@ class Fuzzed {
     ++bursts;
     move_shafts();
     // Within several requests at once a short watchdog may expire, and nobody outside can tell between which.
-    const Bytes bytes = stream_.one_in(8) ? several() : stream_.burst(1);
+    const bool can_be_several = account_.watchdog_in_use_ms() >= shortest_told_ms;
+    const Bytes bytes = can_be_several && stream_.one_in(8) ? several() : stream_.burst(1);
     const std::pair<std::int64_t, std::int64_t> before = counts();
     replies_.clear();
     board_.send(bytes);
