@@ -66,6 +66,8 @@ program; the virtual rig's registers have no bits for emergency stop and limit s
 and cards answer a call or refuse it, so that no reply is late, lost, corrupt or out of order, and there is no device that
 restarts; edges are counted by the program, which does not wrap, or by the board in 32 bits; a board's lines show no jump; only
 an analog input is a potentiometer; only a card with a library of its own has to be opened, and has a watchdog that locks it.
+Requests are disturbed and a device's program hangs on the board only; a reply given twice or out of order, and what a device
+does at the stop, are not repeated there, where the program's side is modbus-rtu's.
 
 | fault | simulated, virtual time | simulated, real time | modbus-tcp | modbus-rtu | gpio | comedi | quanser-hil | board |
 |---|---|---|---|---|---|---|---|---|

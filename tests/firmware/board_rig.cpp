@@ -47,7 +47,7 @@ void BoardWires::show(const EncoderCounts& counts) {
 
 void BoardWires::suffer(Mishap mishap) {
   constexpr std::int64_t burst_counts = 1000;
-  constexpr Board::Cycles burst_spacing = Board::hz / 400'000;
+  constexpr Board::Cycles burst_spacing = Board::hz / 200'000;
   mishap_ = mishap;
   switch (mishap) {
     case Mishap::edges_too_fast:
