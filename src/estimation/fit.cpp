@@ -12,7 +12,6 @@
 #include <utility>
 
 #include "base/parallel.hpp"
-#include "upright/model/elementary.hpp"
 #include "upright/sim/simulator.hpp"
 
 namespace upright {
@@ -61,8 +60,8 @@ void start_segment(Simulator<S>& simulator, const Measurement& run, const Segmen
     S acting = lagged;
     S now = S(run.time_s[k]);
     const auto relax = [&](const S& until) {
-      lagged =
-          acting + (lagged - acting) * elementary::exp(S(-(until - now) / dynamics.motor_time_constant_s()));
+      using std::exp;
+      lagged = acting + (lagged - acting) * exp(-(until - now) / dynamics.motor_time_constant_s());
       now = until;
     };
     for (std::size_t j = k; j < segment.first; ++j) {

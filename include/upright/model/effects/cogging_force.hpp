@@ -4,7 +4,6 @@
 #include <cmath>
 
 #include "upright/model/effect.hpp"
-#include "upright/model/elementary.hpp"
 
 namespace upright::effects {
 
@@ -23,7 +22,8 @@ struct CoggingForce {
 
   template <class S>
   static S cart_force(const S* p, const S& x, const S& /*v*/) {
-    return p[0] * elementary::sin(two_pi * x / p[1] + p[2]);
+    using std::sin;
+    return p[0] * sin(two_pi * x / p[1] + p[2]);
   }
 
   static double rate_radps(const double* p, double v, double mass) {
