@@ -100,7 +100,7 @@ std::vector<On> all() {
 }
 
 /// The rig and its controller's files, for either link.
-class Setting {
+class Setting : public RunFolder {
  public:
   Setting(bool serial, const Case& c) {
     // The machine may be busy: what is tested here is what is done, not how fast.
@@ -108,23 +108,12 @@ class Setting {
         text_of(config + "rigs/" + (serial ? "modbus-rtu.yaml" : "modbus-tcp.yaml")),
         {{serial ? "response_timeout_s: 0.002" : "response_timeout_s: 0.0008", "response_timeout_s: 0.003"}});
     rig_ = changed(rig_, c.rig);
-    server_ = std::make_unique<VirtualRigProcess>(folder_, rig_, serial, c.inject);
+    server_ = std::make_unique<VirtualRigProcess>(folder(), rig_, serial, c.inject);
     std::ofstream(rig_file()) << as_read(
         c.process, serial ? replaced(rig_, "/dev/ttyUSB0", server_->name())
                           : replaced(rig_, "port: 1502", "port: " + std::to_string(server_->port())));
     std::ofstream(gain_file()) << replaced(text_of(config + "gains/exponential.yaml"), "sample_rate_hz: 1000",
                                            "sample_rate_hz: 200");
-  }
-  std::filesystem::path rig_file() const { return folder_ / "rig.yaml"; }
-  std::filesystem::path gain_file() const { return folder_ / "gains.yaml"; }
-  std::filesystem::path runs() const { return folder_ / "runs"; }
-  std::vector<std::string> command(double duration_s) const {
-    return {UPRIGHT_BINARY, "run",       "--rig",      rig_file(),
-            "--gains",      gain_file(), "--duration", std::to_string(duration_s),
-            "--out",        runs(),      "--json",     "--unchecked"};
-  }
-  ProcessFiles files(double duration_s) const {
-    return {command(duration_s), rig_file(), runs(), folder_ / "struck"};
   }
   VirtualRigProcess& server() { return *server_; }
 
@@ -134,7 +123,6 @@ class Setting {
     return text;
   }
 
-  Folder folder_;
   std::string rig_;
   std::unique_ptr<VirtualRigProcess> server_;
 };

@@ -127,6 +127,16 @@ std::string as_read(const ProcessCase& c, std::string rig_text) {
   return rig_text.replace(sign, right.size(), ", sign: -1");
 }
 
+std::vector<std::string> RunFolder::command(double duration_s) const {
+  return {UPRIGHT_BINARY, "run",       "--rig",      rig_file(),
+          "--gains",      gain_file(), "--duration", std::to_string(duration_s),
+          "--out",        runs(),      "--json",     "--unchecked"};
+}
+
+ProcessFiles RunFolder::files(double duration_s) const {
+  return {command(duration_s), rig_file(), runs(), folder_ / "struck"};
+}
+
 std::optional<double> run_with(const ProcessCase& c, const ProcessFiles& files) {
   std::vector<std::string> command = files.command;
   if (!c.shim.empty())

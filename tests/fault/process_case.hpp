@@ -57,6 +57,22 @@ struct ProcessFiles {
   std::filesystem::path rig_file, runs, mark;
 };
 
+/// A folder with the rig file and the gain file of an `upright run`, and the folder of its runs.
+class RunFolder {
+ public:
+  std::filesystem::path rig_file() const { return folder_ / "rig.yaml"; }
+  std::filesystem::path gain_file() const { return folder_ / "gains.yaml"; }
+  std::filesystem::path runs() const { return folder_ / "runs"; }
+  std::vector<std::string> command(double duration_s) const;
+  ProcessFiles files(double duration_s) const;
+
+ protected:
+  const Folder& folder() const { return folder_; }
+
+ private:
+  Folder folder_;
+};
+
 /// Runs `c` to its end. When its action was begun, 0 without one; none: the run does not begin, or ends
 /// before its fault comes about.
 std::optional<double> run_with(const ProcessCase& c, const ProcessFiles& files);

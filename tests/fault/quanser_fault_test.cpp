@@ -80,30 +80,19 @@ void PrintTo(const Case& c, std::ostream* out) {
 }
 
 /// The card and its controller's files.
-class Setting {
+class Setting : public RunFolder {
  public:
   explicit Setting(const Case& c) {
     std::string wired = fake_card_rig();
     for (const auto& [from, to] : c.rig) wired = replaced(wired, from, to);
-    card_ = std::make_unique<CardProcess>(folder_, wired, c.mishap);
+    card_ = std::make_unique<CardProcess>(folder(), wired, c.mishap);
     std::ofstream(rig_file()) << as_read(c.process, card_->rig_text());
     std::ofstream(gain_file()) << replaced(text_of(config + "gains/exponential.yaml"), "sample_rate_hz: 1000",
                                            "sample_rate_hz: 200");
   }
-  std::filesystem::path rig_file() const { return folder_ / "rig.yaml"; }
-  std::filesystem::path gain_file() const { return folder_ / "gains.yaml"; }
-  std::filesystem::path runs() const { return folder_ / "runs"; }
-  ProcessFiles files(double duration_s) const {
-    const std::vector<std::string> command = {
-        UPRIGHT_BINARY, "run",       "--rig",      rig_file(),
-        "--gains",      gain_file(), "--duration", std::to_string(duration_s),
-        "--out",        runs(),      "--json",     "--unchecked"};
-    return {command, rig_file(), runs(), folder_ / "struck"};
-  }
   CardProcess& card() { return *card_; }
 
  private:
-  Folder folder_;
   std::unique_ptr<CardProcess> card_;
 };
 

@@ -11,24 +11,12 @@
 
 namespace upright::test {
 
-class BoardSetting {
+class BoardSetting : public RunFolder {
  public:
   explicit BoardSetting(const ProcessCase& c = {}, const LineFaults& faults = {})
-      : board_(rig_text(), Pose{0.0, theta0_rad}, folder_ / "trace.csv", faults) {
+      : board_(rig_text(), Pose{0.0, theta0_rad}, folder() / "trace.csv", faults) {
     std::ofstream(rig_file()) << as_read(c, replaced(rig_text(), "/dev/ttyACM0", board_.line()));
     std::ofstream(gain_file()) << text_of(UPRIGHT_SOURCE_DIR "/config/gains/exponential-200hz.yaml");
-  }
-
-  std::filesystem::path rig_file() const { return folder_ / "rig.yaml"; }
-  std::filesystem::path gain_file() const { return folder_ / "gains.yaml"; }
-  std::filesystem::path runs() const { return folder_ / "runs"; }
-  std::vector<std::string> command(double duration_s) const {
-    return {UPRIGHT_BINARY, "run",       "--rig",      rig_file(),
-            "--gains",      gain_file(), "--duration", std::to_string(duration_s),
-            "--out",        runs(),      "--json",     "--unchecked"};
-  }
-  ProcessFiles files(double duration_s) const {
-    return {command(duration_s), rig_file(), runs(), folder_ / "struck"};
   }
   BoardRig& board() { return board_; }
 
@@ -44,7 +32,6 @@ class BoardSetting {
         "response_timeout_s: 0.002", "response_timeout_s: 0.003");
   }
 
-  Folder folder_;
   BoardRig board_;
 };
 
