@@ -6,20 +6,14 @@ target_compile_options(upright_options INTERFACE -Wall -Wextra -Wpedantic -Wshad
 if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND CMAKE_CXX_COMPILER_VERSION VERSION_LESS 13)
   target_compile_options(upright_options INTERFACE -Wno-maybe-uninitialized)
 endif()
-# Built where it runs: the machine's own SIMD makes fits and sweeps several times faster. All targets share the flag,
-# since Eigen's alignment must be the same everywhere.
-if(UPRIGHT_NATIVE)
-  # GCC 12 warns of its own AVX-512 intrinsics.
-  target_compile_options(upright_options INTERFACE -march=native -ffp-contract=off -Wno-maybe-uninitialized)
-  # QEMU's processor, which runs the tests of GPIO and Comedi, has none.
-  if(NOT UPRIGHT_AVX512)
-    include(CheckCXXCompilerFlag)
-    check_cxx_compiler_flag("-mno-avx512f -mno-avxvnni" UPRIGHT_CAN_LEAVE_AVX512)
-    if(UPRIGHT_CAN_LEAVE_AVX512)
-      target_compile_options(upright_options INTERFACE -mno-avx512f -mno-avxvnni)
-    endif()
-  endif()
+# A voltage, a simulated motion and a log have the same bits on every machine of an architecture: all is compiled for its
+# baseline, and no product is fused into a sum. Only lanes and fits are compiled for more (UPRIGHT_WIDE_ARCH).
+target_compile_options(upright_options INTERFACE -ffp-contract=off)
+if(CMAKE_SYSTEM_PROCESSOR MATCHES "^(x86_64|AMD64)$")
+  target_compile_options(upright_options INTERFACE -march=x86-64)
 endif()
+# What a fit allocates others free, and the other way round: Eigen's alignment is that of AVX-512 everywhere.
+target_compile_definitions(upright_options INTERFACE EIGEN_MAX_ALIGN_BYTES=64 EIGEN_MAX_STATIC_ALIGN_BYTES=64)
 if(UPRIGHT_WERROR)
   target_compile_options(upright_options INTERFACE -Werror)
 endif()
@@ -50,6 +44,39 @@ function(upright_library name)
     target_include_directories(${name} INTERFACE ${PROJECT_SOURCE_DIR}/include)
     target_link_libraries(${name} INTERFACE ${arg_LINK})
   endif()
+endfunction()
+
+# upright_own_object(NAME INTO LIBRARY SOURCES... [ARCH -march] [OPTIONS COMPILE-OPTIONS...] LINK TARGETS...): sources of a
+# library with compile options of their own, as one object file. An inline function that these and other files use would be
+# linked from either; so what is inline stays inside the object file (keep_inside.sh), which offers only its own functions.
+function(upright_own_object name)
+  cmake_parse_arguments(arg "" "INTO;ARCH" "SOURCES;OPTIONS;LINK" ${ARGN})
+  add_library(${name} OBJECT ${arg_SOURCES})
+  target_include_directories(${name} PRIVATE ${PROJECT_SOURCE_DIR}/include ${PROJECT_SOURCE_DIR}/src ${PROJECT_SOURCE_DIR})
+  # A target of its own, and the last one: then these options win over those before.
+  add_library(${name}_options INTERFACE)
+  target_compile_options(${name}_options INTERFACE ${arg_OPTIONS})
+  if(arg_ARCH)
+    target_compile_options(${name}_options INTERFACE -march=${arg_ARCH})
+  endif()
+  # objcopy leaves GNU's unique symbols global.
+  if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
+    target_compile_options(${name}_options INTERFACE -fno-gnu-unique)
+  endif()
+  # Nothing near the motor, and with the sanitizers' checks lanes and dual numbers would take longer to compile than all
+  # else together.
+  if(UPRIGHT_SANITIZE)
+    target_compile_options(${name}_options INTERFACE -fno-sanitize=all)
+  endif()
+  target_link_libraries(${name} PRIVATE ${arg_LINK} upright_options ${name}_options)
+  set(script ${PROJECT_SOURCE_DIR}/cmake/keep_inside.sh)
+  set(object ${CMAKE_CURRENT_BINARY_DIR}/${name}.o)
+  add_custom_command(OUTPUT ${object}
+    COMMAND ${script} ${CMAKE_LINKER} ${CMAKE_NM} ${CMAKE_OBJCOPY} ${object} $<TARGET_OBJECTS:${name}>
+    DEPENDS ${script} ${name} $<TARGET_OBJECTS:${name}> COMMAND_EXPAND_LISTS VERBATIM)
+  set_source_files_properties(${object} PROPERTIES EXTERNAL_OBJECT TRUE GENERATED TRUE)
+  target_sources(${arg_INTO} PRIVATE ${object})
+  set_property(GLOBAL APPEND PROPERTY UPRIGHT_OWN_OBJECTS ${object})
 endfunction()
 
 # real_time_test(NAME SECONDS PROGRAM ARGUMENTS...): a ctest entry of what needs real time: tried again for so long while

@@ -15,7 +15,7 @@ import tempfile
 
 TOOLS = {"compiler": "clang++-14", "tidy": "clang-tidy-14"}
 # What g++ understands and clang does not.
-FOREIGN = re.compile(r"-fno-sanitize-recover.*|-ffp-contract=.*|-mmemset-strategy=.*|-Wno-maybe-uninitialized|-W(all|extra|pedantic|shadow|error)")
+FOREIGN = re.compile(r"-fno-gnu-unique|-fno-sanitize-recover.*|-ffp-contract=.*|-mmemset-strategy=.*|-Wno-maybe-uninitialized|-W(all|extra|pedantic|shadow|error)")
 
 
 def flags_of(command):

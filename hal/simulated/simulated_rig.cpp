@@ -1,9 +1,12 @@
 #include "upright/hal/simulated_rig.hpp"
 
 #include <cmath>
+#include <optional>
 #include <random>
+#include <utility>
 
 #include "upright/base/error.hpp"
+#include "upright/model/elementary.hpp"
 #include "upright/model/plant_file.hpp"
 #include "upright/sim/simulator.hpp"
 
@@ -20,6 +23,30 @@ PlantState<double> initial_state(const SimulatedRig& rig, const std::optional<do
   return state;
 }
 
+/// Numbers of the standard normal distribution, by Marsaglia's polar method. That of the standard library
+/// takes libm's logarithm, so that a seed would give other noise on another machine.
+class NormalNoise {
+ public:
+  double operator()(std::mt19937_64& random) {
+    if (spare_) return *std::exchange(spare_, std::nullopt);
+    double x = 0.0, y = 0.0, square = 0.0;
+    do {
+      x = 2.0 * share(random) - 1.0;
+      y = 2.0 * share(random) - 1.0;
+      square = x * x + y * y;
+    } while (square > 1.0 || square == 0.0);
+    const double scale = std::sqrt(-2.0 * elementary::log(square) / square);
+    spare_ = x * scale;
+    return y * scale;
+  }
+
+ private:
+  /// Even over 0 to 1.
+  static double share(std::mt19937_64& random) { return 0x1p-64 * static_cast<double>(random()); }
+
+  std::optional<double> spare_;
+};
+
 class SimulatedPlantRig final : public SimulatedRigWithHand {
  public:
   SimulatedPlantRig(const RigFile& rig, const Plant& plant, Clock& clock, const SimulatedRigOptions& options)
@@ -34,7 +61,7 @@ class SimulatedPlantRig final : public SimulatedRigWithHand {
 
   void open() override {
     random_.seed(seed_);
-    normal_.reset();
+    normal_ = {};
     sequence_ = 0;
     hand_ = {};
     held_ = true;
@@ -121,7 +148,7 @@ class SimulatedPlantRig final : public SimulatedRigWithHand {
   std::unique_ptr<Simulator<double>> simulator_;
   Hand hand_;
   std::mt19937_64 random_;
-  std::normal_distribution<double> normal_;
+  NormalNoise normal_;
   std::uint64_t sequence_ = 0;
   std::int64_t start_ns_ = 0, hold_until_ns_ = 0;
   bool held_ = true, touched_ = false;

@@ -567,8 +567,8 @@ class ContinuousRuns {
 
 }  // namespace
 
-void run_continuous_on_lanes(const LoopSetup& setup, std::span<const LoopCase> cases,
-                             std::span<LoopResult> results) {
+void UPRIGHT_LANES::run_continuous_on_lanes(const LoopSetup& setup, std::span<const LoopCase> cases,
+                                            std::span<LoopResult> results) {
   const PlantModel<Lanes> model = on_lanes(setup.model);
   const bool sticks = Dynamics<Lanes>(model).cart_can_stick();
   with_effects(setup.model.present, [&](const auto& present) {

@@ -1,5 +1,3 @@
-#include "fast_loop.hpp"
-
 #include <algorithm>
 #include <bit>
 #include <optional>
@@ -7,6 +5,7 @@
 
 #include "continuous_lanes.hpp"
 #include "event_lane.hpp"
+#include "lane_builds.hpp"
 #include "lane_model.hpp"
 #include "lane_results.hpp"
 #include "upright/control/delay_line.hpp"
@@ -248,17 +247,13 @@ void run_with(const LoopSetup& setup, const Present& present, std::span<const Lo
 
 }  // namespace
 
-bool lanes_can_run(const LoopSetup& setup) {
-  if (setup.make_parts || setup.model.cart_locked || !setup.model.has_pendulum) return false;
-  const Dynamics<Lanes> physics(on_lanes(setup.model));
-  if (physics.has_motor_lag() || physics.pivot_has_kink()) return false;
-  if (setup.sampled && any(physics.input_delay_s() > Lanes(0.0))) return false;
-  // Faster plants than that need steps that the lanes do not take.
-  constexpr double fastest_radps = 1e3;
-  return fastest_rate_radps(setup.model) < fastest_radps;
+namespace UPRIGHT_LANES {
+
+std::size_t runs_side_by_side() {
+  return lane_count;
 }
 
-void run_on_lanes(const LoopSetup& setup, std::span<const LoopCase> cases, std::span<LoopResult> results) {
+void run(const LoopSetup& setup, std::span<const LoopCase> cases, std::span<LoopResult> results) {
   if (!setup.sampled) return run_continuous_on_lanes(setup, cases, results);
   with_effects(setup.model.present, [&](const auto& present) {
     for (std::size_t first = 0; first < cases.size(); first += lane_count) {
@@ -267,5 +262,7 @@ void run_on_lanes(const LoopSetup& setup, std::span<const LoopCase> cases, std::
     }
   });
 }
+
+}  // namespace UPRIGHT_LANES
 
 }  // namespace upright

@@ -1,6 +1,6 @@
 // A scalar that is many: runs side by side in SIMD registers, for the generic physics. Two registers
-// of eight on AVX-512, of four on AVX2, so that one hides the latency of the other. A comparison gives a
-// LaneMask, with which `select` chooses lane by lane.
+// of eight on AVX-512, of four on AVX2, of two on the baseline, so that one hides the latency of the other. A
+// comparison gives a LaneMask, with which `select` chooses lane by lane.
 //
 // The functions are as exact as the sweeps need (relative 2e-12, angles of any size), not correctly rounded.
 #pragma once
@@ -8,8 +8,6 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-
-#include "lane_count.hpp"
 
 // GCC 12 takes its own AVX-512 intrinsics for uses of uninitialised values (bug 105593).
 #pragma GCC diagnostic push
@@ -24,6 +22,10 @@
 #define UPRIGHT_LANES_INLINE [[gnu::always_inline]] inline
 
 namespace upright {
+
+/// How many runs go side by side. Two registers, so that one hides the latency of the other; more would not
+/// stay in registers.
+constexpr std::size_t lane_count = 2 * xsimd::batch<double>::size;
 
 namespace lanes_detail {
 

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "upright/model/elementary.hpp"
+
 namespace upright {
 
 namespace {
@@ -29,7 +31,7 @@ DrivenCart::DrivenCart(const EncoderAssumptions& assumptions, double breakaway_v
       lag_s_(lag_s) {}
 
 double DrivenCart::step(double voltage_v, double duration_s) noexcept {
-  acting_v_ += (voltage_v - acting_v_) * (lag_s_ > 0.0 ? -std::expm1(-duration_s / lag_s_) : 1.0);
+  acting_v_ += (voltage_v - acting_v_) * (lag_s_ > 0.0 ? -elementary::expm1(-duration_s / lag_s_) : 1.0);
   if (velocity_mps_ == 0.0 && std::abs(acting_v_) <= breakaway_v_) return std::abs(travel_m_);
   const double direction = velocity_mps_ != 0.0 ? velocity_mps_ : acting_v_;
   const double driving_v = acting_v_ - std::copysign(breakaway_v_, direction);

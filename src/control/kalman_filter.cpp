@@ -4,6 +4,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "upright/model/elementary.hpp"
+
 namespace upright {
 
 namespace {
@@ -42,8 +44,8 @@ KalmanFilter::KalmanFilter(const ControlConfig& config, const Plant& plant)
   known_force_n_ = model.known_force_n + actuator_.actuate(0.0) / model.volts_per_newton;
   if (const PlantEffect* zone = plant.find("voltage_dead_zone")) dead_zone_v_ = zone->values[0];
   const Resolution steps = resolution_of(config.state_estimator);
-  unsure_v_ = std::hypot(config.gains.cart_position_v_per_m * steps.cart_m,
-                         config.gains.pendulum_angle_v_per_rad * steps.angle_rad) /
+  unsure_v_ = elementary::hypot(config.gains.cart_position_v_per_m * steps.cart_m,
+                                config.gains.pendulum_angle_v_per_rad * steps.angle_rad) /
               std::sqrt(12.0);
   drives_.resize(input_periods_ + 2);
   KalmanFilter::start(0.0, 0.0);

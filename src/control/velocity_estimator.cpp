@@ -5,6 +5,7 @@
 
 #include "upright/base/error.hpp"
 #include "upright/base/yaml_reader.hpp"
+#include "upright/model/elementary.hpp"
 
 namespace upright {
 
@@ -23,18 +24,20 @@ EstimatorStep second_order_step(double wc, double zeta, double period) {
   if (root * period < nearly_critical) {
     // sinh(u)/u and cosh(u) about u = 0; the next terms are below 1e-17.
     const double u2 = disc * period * period;
-    const double fade = std::exp(-decay * period);
+    const double fade = elementary::exp(-decay * period);
     s = fade * period * (1.0 + u2 / 6.0);
     s_rate = fade * (1.0 + u2 / 2.0) - decay * s;
   } else if (disc > 0.0) {
     // Written with both roots, so that a large damping does not overflow.
-    const double slow = std::exp((root - decay) * period), fast = std::exp(-(root + decay) * period);
+    const double slow = elementary::exp((root - decay) * period),
+                 fast = elementary::exp(-(root + decay) * period);
     s = (slow - fast) / (2.0 * root);
     s_rate = 0.5 * (slow + fast) - decay * s;
   } else {
-    const double fade = std::exp(-decay * period);
-    s = fade * std::sin(root * period) / root;
-    s_rate = fade * std::cos(root * period) - decay * s;
+    const double fade = elementary::exp(-decay * period);
+    const auto [sine, cosine] = elementary::sine_and_cosine(root * period);
+    s = fade * sine / root;
+    s_rate = fade * cosine - decay * s;
   }
   EstimatorStep step;
   step.p11 = s_rate + 2.0 * decay * s;

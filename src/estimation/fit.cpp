@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "base/parallel.hpp"
+#include "upright/model/elementary.hpp"
 #include "upright/sim/simulator.hpp"
 
 namespace upright {
@@ -60,8 +61,8 @@ void start_segment(Simulator<S>& simulator, const Measurement& run, const Segmen
     S acting = lagged;
     S now = S(run.time_s[k]);
     const auto relax = [&](const S& until) {
-      using std::exp;
-      lagged = acting + (lagged - acting) * exp(-(until - now) / dynamics.motor_time_constant_s());
+      lagged =
+          acting + (lagged - acting) * elementary::exp(S(-(until - now) / dynamics.motor_time_constant_s()));
       now = until;
     };
     for (std::size_t j = k; j < segment.first; ++j) {

@@ -8,6 +8,7 @@
 #include "experiment.hpp"
 #include "upright/base/error.hpp"
 #include "upright/control/model_parts.hpp"
+#include "upright/model/elementary.hpp"
 #include "upright/model/plant_file.hpp"
 
 namespace upright {
@@ -84,7 +85,7 @@ void refuse_short_travel(const Piece& piece, const ExperimentSetup& setup) {
     ControlState now;
     now.cart_velocity_mps = speed;
     const double stop = ExperimentScript(piece, context).stop_position_m(now);
-    return speed * (3.0 * tau - tau * (1.0 - std::exp(-3.0)) + steady_s) + stop + 0.03;
+    return speed * (3.0 * tau - tau * (1.0 - elementary::exp(-3.0)) + steady_s) + stop + 0.03;
   };
   for (const double v : piece.voltages_v) {
     if (m.force_per_volt_n * v <= 1.05 * m.sliding_n)

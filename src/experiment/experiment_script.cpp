@@ -4,6 +4,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "upright/model/elementary.hpp"
+
 namespace upright {
 
 namespace {
@@ -239,7 +241,8 @@ Demand ExperimentScript::settle(const ControlState& now) noexcept {
   const ServoModel& m = context_.servo;
   double speed = arrived_ ? 0.0 : approach_per_s * (target - now.cart_m);
   if (m.pendulum_m > 0.0)
-    speed -= 2.0 * swing_damping * std::sqrt(m.gravity_mps2 * m.pendulum_m) * std::sin(hanging_lean(now));
+    speed -=
+        2.0 * swing_damping * std::sqrt(m.gravity_mps2 * m.pendulum_m) * elementary::sin(hanging_lean(now));
   speed = std::clamp(speed, -fastest_approach_mps, fastest_approach_mps);
   if (leaves_travel(now)) speed = 0.0;
   const double voltage = servo(speed, now);
@@ -323,7 +326,8 @@ Demand ExperimentScript::swing_up(const ControlState& now) noexcept {
   former_rate_ = now.pendulum_rate_radps;
   former_lean_ = lean;
   if (leaves_travel(now)) return put(servo(0.0, now));
-  const double c = std::cos(now.theta_rad), s = std::sin(now.theta_rad), w = now.pendulum_rate_radps;
+  const auto [s, c] = elementary::sine_and_cosine(now.theta_rad);
+  const double w = now.pendulum_rate_radps;
   const double energy = 0.5 * w * w + m.gravity_mps2 / m.pendulum_m * (c - 1.0 - surplus_);
   const double pumping = w * c;
   double pump = pump_gain * energy * pumping / (std::abs(pumping) + 0.3);
@@ -354,7 +358,7 @@ Demand ExperimentScript::catch_upright(const ControlState& now) noexcept {
   still_s_ = still ? still_s_ + elapsed_s_ : 0.0;
   if (still_s_ > held_s) return engage(now);
   const Gains& k = context_.gains;
-  const double reference = caught_m_ * std::exp(-caught_s_ / recentring_s);
+  const double reference = caught_m_ * elementary::exp(-caught_s_ / recentring_s);
   caught_s_ += elapsed_s_;
   return put(k.cart_position_v_per_m * (now.cart_m - reference) + k.pendulum_angle_v_per_rad * lean +
              k.cart_velocity_v_per_mps * now.cart_velocity_mps +
@@ -399,17 +403,18 @@ double ExperimentScript::excitation(const Stroke& stroke, const ControlState& no
     }
     case Kind::multisine: {
       double sum = 0.0;
-      const double ratio = std::pow(piece_.highest_hz / piece_.lowest_hz, 1.0 / (piece_.lines - 1));
+      const double ratio = elementary::power(piece_.highest_hz / piece_.lowest_hz, 1.0 / (piece_.lines - 1));
       double frequency = piece_.lowest_hz;
       for (int i = 0; i < piece_.lines; ++i, frequency *= ratio)
-        sum += std::sin(2.0 * pi * frequency * t + phases_[static_cast<std::size_t>(i)]);
+        sum += elementary::sin(2.0 * pi * frequency * t + phases_[static_cast<std::size_t>(i)]);
       return std::clamp(2.0 * sum / piece_.lines, -1.0, 1.0) * stroke.voltage_v;
     }
     case Kind::sine: {
       const double omega = 2.0 * pi / piece_.period_s;
-      const double wanted_m = piece_.amplitude_m * std::sin(omega * t);
+      const double wanted_m = piece_.amplitude_m * elementary::sin(omega * t);
       return servo(
-          piece_.amplitude_m * omega * std::cos(omega * t) + approach_per_s * (wanted_m - now.cart_m), now);
+          piece_.amplitude_m * omega * elementary::cos(omega * t) + approach_per_s * (wanted_m - now.cart_m),
+          now);
     }
     case Kind::observe:
     case Kind::decay:

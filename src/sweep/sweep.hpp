@@ -13,7 +13,10 @@
 
 namespace upright {
 
-enum class SweepEngine : std::uint8_t { fast, reference };
+/// Both fast ones are the lanes, or the event engine where they do not reach: `fast` on this processor's
+/// registers, with last digits of its own, `reproducible` on the baseline's, with the same bits on every
+/// machine.
+enum class SweepEngine : std::uint8_t { fast, reproducible, reference };
 
 /// A sweep file (interface: "Sweep file") with the files it names read.
 struct SweepConfig {

@@ -7,20 +7,33 @@
 
 namespace upright {
 
+namespace {
+
+bool runs_on_lanes(const SweepConfig& config) {
+  return config.engine != SweepEngine::reference && lanes_can_run(config.setup);
+}
+
+LaneRegisters registers_of(const SweepConfig& config) {
+  return config.engine == SweepEngine::fast ? LaneRegisters::wide : LaneRegisters::baseline;
+}
+
+}  // namespace
+
 std::size_t sweep_group_size(const SweepConfig& config) {
-  if (config.engine != SweepEngine::fast || !lanes_can_run(config.setup)) return 1;
+  if (!runs_on_lanes(config)) return 1;
+  const std::size_t together = runs_side_by_side(registers_of(config));
   // Lanes of continuous loops go on with the next run when they end, so that more of them waste less.
-  return config.setup.sampled ? lane_count : 4 * lane_count;
+  return config.setup.sampled ? together : 4 * together;
 }
 
 std::vector<SweepRun> run_sweep_group(const SweepConfig& config, const SweepExecutor::Group& group) {
   std::vector<LoopResult> results(group.size());
-  if (config.engine == SweepEngine::fast && lanes_can_run(config.setup)) {
-    run_on_lanes(config.setup, group, results);
+  if (runs_on_lanes(config)) {
+    run_on_lanes(config.setup, group, results, registers_of(config));
   } else {
     for (std::size_t i = 0; i < group.size(); ++i)
-      results[i] = config.engine == SweepEngine::fast ? run_with_events(config.setup, group[i])
-                                                      : run_with_reference(config.setup, group[i]);
+      results[i] = config.engine == SweepEngine::reference ? run_with_reference(config.setup, group[i])
+                                                           : run_with_events(config.setup, group[i]);
   }
   std::vector<SweepRun> runs;
   for (std::size_t i = 0; i < group.size(); ++i)

@@ -11,6 +11,7 @@
 #include "upright/control/gain_file.hpp"
 #include "upright/control/model_parts.hpp"
 #include "upright/hal/rig_file.hpp"
+#include "upright/model/elementary.hpp"
 #include "upright/model/plant_file.hpp"
 
 namespace upright {
@@ -39,7 +40,8 @@ std::vector<double> spaced(const YamlMap& map, const Range& range) {
   std::vector<double> values;
   for (std::int64_t i = 0; i < count; ++i) {
     const double part = count > 1 ? static_cast<double>(i) / static_cast<double>(count - 1) : 0.0;
-    values.push_back(tidied(logarithmic ? from * std::pow(to / from, part) : from + (to - from) * part));
+    values.push_back(
+        tidied(logarithmic ? from * elementary::power(to / from, part) : from + (to - from) * part));
   }
   return values;
 }
@@ -151,8 +153,10 @@ SweepConfig read_sweep_file(const std::filesystem::path& file) {
       static_cast<double>(config.theta0_rad.size()) * static_cast<double>(config.delay_s.size());
   if (runs > most_runs) map.fail("theta0_deg", "makes too many runs with delay_s", "keep them below 1e8");
   setup.duration_s = map.number("duration_s", Range{0.0, 1e5, true});
-  const std::string engine = map.choice("engine", {"fast", "reference"});
-  config.engine = engine == "fast" ? SweepEngine::fast : SweepEngine::reference;
+  const std::string engine = map.choice("engine", {"fast", "reproducible", "reference"});
+  config.engine = engine == "fast"           ? SweepEngine::fast
+                  : engine == "reproducible" ? SweepEngine::reproducible
+                                             : SweepEngine::reference;
   setup.model = make_model<double>(plant);
   config.plant = plant;
   config.plant_file = map.path("plant");

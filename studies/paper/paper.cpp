@@ -120,7 +120,7 @@ class Paper : private PaperPage {
     const auto steps = static_cast<int>(2.0 * period_s / step_s);
     for (int i = 0; i < steps; ++i) {
       const auto rate = [&](double t, double z) {
-        state.cart_mps = 0.8 * std::sin(0.5 * t);
+        state.cart_mps = 0.8 * elementary::sin(0.5 * t);
         state.bristle_m = z;
         return bristles.derivative(state, 0.0, {}).bristle_m;
       };
@@ -447,7 +447,8 @@ class Paper : private PaperPage {
         SweepConfig config = sweep_of(on_rig(model, "exponential"), {}, 0.4);
         config.setup = rig_setup(model, predicts, file);
         config.delay_s.erase(config.delay_s.begin());  // a logarithmic axis has no zero
-        for (int i = 0; i <= 12; ++i) config.theta0_rad.push_back(0.01 * std::pow(1000.0, i / 12.0) * degree);
+        for (int i = 0; i <= 12; ++i)
+          config.theta0_rad.push_back(0.01 * elementary::power(1000.0, i / 12.0) * degree);
         Series line;
         line.name = std::string(predicts ? "predictor, " : "gain (7), ") + model + " plant";
         line.color = color::curve(color++);

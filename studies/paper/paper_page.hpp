@@ -18,6 +18,7 @@
 #include "upright/base/error.hpp"
 #include "upright/control/gain_file.hpp"
 #include "upright/hal/rig_file.hpp"
+#include "upright/model/elementary.hpp"
 #include "upright/model/plant_file.hpp"
 
 namespace upright {
@@ -112,6 +113,7 @@ class PaperPage {
 
   SweepConfig sweep_of(const PaperLoop& c, std::vector<double> theta0_rad, double longest_s) const {
     SweepConfig config;
+    config.engine = SweepEngine::reproducible;
     config.setup = setup_of(c);
     config.theta0_rad = std::move(theta0_rad);
     for (int i = 0; i <= static_cast<int>(std::lround(longest_s * 1e3)); ++i)
@@ -178,7 +180,7 @@ class PaperPage {
   void add_transitions(const PaperLoop& c, const std::string& name, std::size_t color, bool rests,
                        std::vector<Series>& all) const {
     std::vector<double> angles;
-    for (int i = 0; i <= 24; ++i) angles.push_back(0.01 * std::pow(1000.0, i / 24.0) * degree);
+    for (int i = 0; i <= 24; ++i) angles.push_back(0.01 * elementary::power(1000.0, i / 24.0) * degree);
     Series falls_line, rests_line;
     falls_line.name = name + ": falls";
     rests_line.name = name + ": oscillates";

@@ -12,6 +12,7 @@
 #include "report/plot.hpp"
 #include "sweep/sweep.hpp"
 #include "upright/control/model_parts.hpp"
+#include "upright/model/elementary.hpp"
 #include "upright/model/plant_file.hpp"
 
 namespace upright {
@@ -125,11 +126,12 @@ Series falls_of(const LoopSetup& setup, unsigned threads) {
   constexpr double longest_s = 0.12, least_deg = 0.1, most_deg = 10.0;
   constexpr int starts = 12;
   SweepConfig config;
+  config.engine = SweepEngine::reproducible;
   config.setup = setup;
   for (int i = 0; i <= std::lround(longest_s * 1e3); ++i) config.delay_s.push_back(1e-3 * i);
   for (int i = 0; i <= starts; ++i)
-    config.theta0_rad.push_back(least_deg * std::pow(most_deg / least_deg, static_cast<double>(i) / starts) *
-                                degree);
+    config.theta0_rad.push_back(
+        least_deg * elementary::power(most_deg / least_deg, static_cast<double>(i) / starts) * degree);
   Series line;
   for (const Transition& t : find_transitions(config, *make_thread_executor(config, threads))) {
     line.x.push_back(t.falls_from_s);

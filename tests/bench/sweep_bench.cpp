@@ -219,11 +219,12 @@ void cores() {
   SweepConfig config;
   config.setup = setup_for("exponential", 100.0);
   std::vector<SweepExecutor::Group> groups;
+  const std::size_t together = runs_side_by_side();
   const std::vector<LoopCase> cases = cases_240();
-  for (std::size_t first = 0; first < cases.size(); first += lane_count)
+  for (std::size_t first = 0; first < cases.size(); first += together)
     for (int repeat = 0; repeat < 12; ++repeat)
       groups.emplace_back(cases.begin() + static_cast<std::ptrdiff_t>(first),
-                          cases.begin() + static_cast<std::ptrdiff_t>(first + lane_count));
+                          cases.begin() + static_cast<std::ptrdiff_t>(first + together));
   // In turn, and the best of each: other work on the machine disturbs some of them.
   double best_s[2] = {1e300, 1e300};
   for (int repeat = 0; repeat < 9; ++repeat) {

@@ -13,7 +13,6 @@
 #include "design/delay_margin.hpp"
 #include "sim/loop/closed_loop.hpp"
 #include "sim/loop/fast_loop.hpp"
-#include "sim/loop/lanes.hpp"
 #include "upright/base/error.hpp"
 #include "upright/model/plant_file.hpp"
 #include "upright/sim/event_engine.hpp"
@@ -53,27 +52,6 @@ void expect_lanes_agree(const LoopSetup& setup, double tolerance_rad) {
     EXPECT_NEAR(lanes[i].end.theta_rad, alone.end.theta_rad, tolerance_rad);
     EXPECT_NEAR(lanes[i].end.cart_m, alone.end.cart_m, tolerance_rad);
     EXPECT_NEAR(lanes[i].theta_amplitude_rad, alone.theta_amplitude_rad, tolerance_rad);
-  }
-}
-
-TEST(Lanes, FunctionsAreThoseOfTheLibrary) {
-  std::mt19937_64 random(1);
-  for (const double scale : {1e-6, 0.1, 1.0, 3.0, 40.0}) {
-    std::uniform_real_distribution<double> within(-scale, scale);
-    for (int repeat = 0; repeat < 200; ++repeat) {
-      std::array<double, lane_count> x;
-      for (double& value : x) value = within(random);
-      const Lanes lanes = Lanes::load(x.data());
-      const auto s = sin(lanes).values(), c = cos(lanes).values(), e = exp(lanes).values(),
-                 t = tanh(lanes).values(), q = (Lanes(1.0) / lanes).values();
-      for (std::size_t i = 0; i < lane_count; ++i) {
-        EXPECT_NEAR(s[i], std::sin(x[i]), 1e-11);
-        EXPECT_NEAR(c[i], std::cos(x[i]), 1e-11);
-        EXPECT_NEAR(e[i] / std::exp(x[i]), 1.0, 2e-12);
-        EXPECT_NEAR(t[i], std::tanh(x[i]), 1e-12);
-        EXPECT_NEAR(q[i] * x[i], 1.0, 1e-12);
-      }
-    }
   }
 }
 

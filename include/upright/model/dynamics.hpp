@@ -10,6 +10,7 @@
 #include <cmath>
 #include <cstdint>
 
+#include "upright/model/elementary.hpp"
 #include "upright/model/plant_model.hpp"
 #include "upright/model/scalar.hpp"
 
@@ -226,8 +227,8 @@ class Dynamics {
     rate.cart_m = select(rests, S(0.0), state.cart_mps);
     rate.theta_rad = state.theta_radps;
     if (model_.has_pendulum) {
-      using std::sin;
-      const S turn = (gravity_torque_ * sin(state.theta_rad) + torque) / base_.inertia_about_pivot_kgm2;
+      const S turn =
+          (gravity_torque_ * elementary::sin(state.theta_rad) + torque) / base_.inertia_about_pivot_kgm2;
       rate.theta_radps = select(rests, turn, rate.theta_radps);
     }
     return rate;
@@ -240,7 +241,7 @@ class Dynamics {
     at_rest.cart_mps = S(0.0);
     const S force = cart_smooth_force(at_rest, motor_v);
     if (!model_.has_pendulum) return force;
-    const auto [s, c] = sine_and_cosine(state.theta_rad);
+    const auto [s, c] = elementary::sine_and_cosine(state.theta_rad);
     S theta_acceleration(0.0);
     if (!(pivot == Contact::stick && pivot_can_stick())) {
       S torque = pivot_smooth_torque(state.theta_radps);
@@ -252,15 +253,14 @@ class Dynamics {
 
   /// The torque that dry friction would have to balance to hold a resting pendulum, with the cart as it is.
   S pivot_load(const PlantState<S>& state, const S& motor_v, Contact cart) const {
-    using std::cos;
-    using std::sin;
-    const S gravity = gravity_torque_ * sin(state.theta_rad);
+    const auto [s, c] = elementary::sine_and_cosine(state.theta_rad);
+    const S gravity = gravity_torque_ * s;
     const bool cart_rests = model_.cart_locked || (cart == Contact::stick && cart_can_stick());
     if (cart_rests) return gravity;
     PlantState<S> at_rest = state;
     at_rest.theta_radps = S(0.0);
     const PlantState<S> rate = derivative(at_rest, motor_v, {cart, Contact::stick});
-    return gravity - coupling_ * cos(state.theta_rad) * rate.cart_mps;
+    return gravity - coupling_ * c * rate.cart_mps;
   }
 
   /// Fastest rate of the motion here [1/s]; engines keep their steps below a fraction of its inverse. Without
@@ -335,9 +335,8 @@ class Dynamics {
   }
 
   S cart_sliding_force(const PlantState<S>& state, Contact contact) const {
-    using std::tanh;
     if (model_.smoothing > 0.0) {
-      const S direction = tanh(S(model_.smoothing) * state.cart_mps);
+      const S direction = elementary::tanh(S(model_.smoothing) * state.cart_mps);
       return -cart_dry_level(state.cart_m, absolute(state.cart_mps), direction) * direction;
     }
     if (contact == Contact::stick) return S(0.0);
@@ -346,8 +345,7 @@ class Dynamics {
   }
 
   S pivot_sliding_torque(const S& omega, Contact contact) const {
-    using std::tanh;
-    if (model_.smoothing > 0.0) return -pivot_dry_level() * tanh(S(model_.smoothing) * omega);
+    if (model_.smoothing > 0.0) return -pivot_dry_level() * elementary::tanh(S(model_.smoothing) * omega);
     return -pivot_dry_level() * S(static_cast<double>(contact));
   }
 
@@ -359,7 +357,7 @@ class Dynamics {
       if (!cart_rests) rate.cart_mps = force / total_mass_;
       return;
     }
-    const auto [s, c] = sine_and_cosine(state.theta_rad);
+    const auto [s, c] = elementary::sine_and_cosine(state.theta_rad);
     const S push = force + coupling_ * s * state.theta_radps * state.theta_radps;
     if (pivot_rests) {
       if (!cart_rests) rate.cart_mps = push / total_mass_;

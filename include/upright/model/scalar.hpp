@@ -3,8 +3,6 @@
 // follows from it.
 #pragma once
 
-#include <cmath>
-
 namespace upright {
 
 /// Either of two values by a condition; both are evaluated, so that lanes may differ.
@@ -33,26 +31,6 @@ bool is_plainly(const S& /*x*/, double /*number*/) {
 }
 inline bool is_plainly(double x, double number) {
   return x == number;
-}
-
-/// Both for the price of one, where a scalar has them so.
-template <class S>
-struct SineAndCosine {
-  S sine, cosine;
-};
-template <class S>
-SineAndCosine<S> sine_and_cosine(const S& angle) {
-  using std::cos;
-  using std::sin;
-  return {sin(angle), cos(angle)};
-}
-template <class S>
-requires requires(const S& x) {
-  x.v;
-}
-SineAndCosine<S> sine_and_cosine(const S& angle) {
-  const SineAndCosine<double> plain = sine_and_cosine(angle.a);
-  return {S(plain.sine, plain.cosine * angle.v), S(plain.cosine, -plain.sine * angle.v)};
 }
 
 template <class S>

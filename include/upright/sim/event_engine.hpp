@@ -11,6 +11,7 @@
 #include <type_traits>
 
 #include "upright/model/dynamics.hpp"
+#include "upright/model/elementary.hpp"
 #include "upright/sim/contacts.hpp"
 #include "upright/sim/runge_kutta.hpp"
 
@@ -278,17 +279,16 @@ class EventEngine {
   template <class T>
   static LaggedMotor<T> lagged_motor(const Dynamics<T>& dynamics, const T& motor_v, const T& drive,
                                      const T& h) {
-    using std::exp;
     const T gap = motor_v - drive;
     const T r = h / dynamics.motor_time_constant_s();
     constexpr double smooth_within_step = 0.1;
     if (value_of(r) < smooth_within_step) {
-      const T half = exp(T(-0.5) * r);
+      const T half = elementary::exp(T(T(-0.5) * r));
       return {motor_v, drive + gap * half, drive + gap * half * half, drive + gap * half * half};
     }
     // The parabola with the same zeroth, first and second moment as exp(-r u), u in [0, 1]: the step then
     // gets the whole impulse right, however short the lag.
-    const T e = exp(-r);
+    const T e = elementary::exp(T(-r));
     const T m0 = (T(1.0) - e) / r;
     const T m1 = (m0 - e) / r;
     const T m2 = (T(2.0) * m1 - e) / r;

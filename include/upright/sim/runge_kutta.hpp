@@ -7,6 +7,7 @@
 #include <type_traits>
 
 #include "upright/model/dynamics.hpp"
+#include "upright/model/elementary.hpp"
 
 namespace upright {
 
@@ -93,7 +94,7 @@ struct Relaxation {
     explicit Phi(double at) : c(at) {
       constexpr double series_within = 1.0;
       if (std::abs(c) > series_within) {
-        zero = std::exp(c);
+        zero = elementary::exp(c);
         one = (zero - 1.0) / c;
         two = (one - 1.0) / c;
         three = (two - 0.5) / c;

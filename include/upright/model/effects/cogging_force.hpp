@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "upright/model/effect.hpp"
+#include "upright/model/elementary.hpp"
 
 namespace upright::effects {
 
@@ -22,8 +23,7 @@ struct CoggingForce {
 
   template <class S>
   static S cart_force(const S* p, const S& x, const S& /*v*/) {
-    using std::sin;
-    return p[0] * sin(two_pi * x / p[1] + p[2]);
+    return p[0] * elementary::sin(two_pi * x / p[1] + p[2]);
   }
 
   static double rate_radps(const double* p, double v, double mass) {

@@ -6,6 +6,7 @@
 #include <type_traits>
 
 #include "upright/model/effect.hpp"
+#include "upright/model/elementary.hpp"
 #include "upright/model/scalar.hpp"
 
 namespace upright::effects {
@@ -37,15 +38,13 @@ struct StribeckFriction {
  private:
   template <class S>
   static S decay(const S& u, const S& shape) {
-    using std::exp;
-    using std::log;
-    if (is_plainly(shape, 2.0)) return exp(-(u * u));
-    if (is_plainly(shape, 1.0)) return exp(-u);
+    if (is_plainly(shape, 2.0)) return elementary::exp(S(-(u * u)));
+    if (is_plainly(shape, 1.0)) return elementary::exp(S(-u));
     if constexpr (std::is_same_v<S, double>) {
-      return std::exp(-std::pow(u, shape));
+      return elementary::exp(-elementary::power(u, shape));
     } else {
       constexpr double smallest = 1e-12;  // keeps log finite at rest, where the excess is whole anyway
-      return exp(-exp(shape * log(u + S(smallest))));
+      return elementary::exp(S(-elementary::exp(S(shape * elementary::log(S(u + S(smallest)))))));
     }
   }
 };
