@@ -17,6 +17,13 @@ std::string printed(const char* format, int digits, double value) {
   return buffer;
 }
 
+/// The power of ten of the first digit: -1 of 0.25. By printing, which rounds alike on every machine; log10
+/// of libm does not.
+int decimal_exponent(double value) {
+  const std::string text = printed("%.*e", 16, value);
+  return std::atoi(text.c_str() + text.find('e') + 1);
+}
+
 /// 3.1e-07 as 3.1 × 10⁻⁷.
 std::string with_power(const std::string& text) {
   constexpr const char* raised[] = {"⁰", "¹", "²", "³", "⁴", "⁵", "⁶", "⁷", "⁸", "⁹"};
@@ -46,10 +53,10 @@ std::string number_within(double value, double low, double high) {
   if (!(half_width > 0.0) || !std::isfinite(half_width) || !std::isfinite(value))
     return number_text(value, 5);
   constexpr int most_decimals = 8;
-  const int decimals = 1 - static_cast<int>(std::floor(std::log10(half_width)));
+  const int decimals = 1 - decimal_exponent(half_width);
   if (decimals > most_decimals || half_width >= least_exponential) return number_text(value, 5);
   // Without decimals, digits that the width does not bear become zeros.
-  const double step = std::pow(10.0, -decimals);
+  const double step = std::strtod(("1e" + std::to_string(-decimals)).c_str(), nullptr);
   const std::string text = printed("%.*f", std::max(decimals, 0), std::round(value / step) * step);
   return text.find_first_of("123456789") == std::string::npos && text.front() == '-' ? text.substr(1) : text;
 }
