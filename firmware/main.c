@@ -1,5 +1,5 @@
 // A board that is the Modbus RTU device of config/rigs/board.yaml: two encoders, a motor bridge, stop inputs, and a watchdog
-// that takes the voltage away. docs/diy-rig.md says how to build one.
+// that takes the voltage away. docs/how-to/build-a-board.md says how to build one.
 #include <avr/eeprom.h>
 #include <avr/interrupt.h>
 #include <avr/wdt.h>

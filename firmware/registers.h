@@ -1,4 +1,4 @@
-// The device's register map (docs/diy-rig.md), and what writing to it does.
+// The device's register map (docs/how-to/build-a-board.md), and what writing to it does.
 #pragma once
 
 #include <stdbool.h>

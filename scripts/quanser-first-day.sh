@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # The first ten minutes with a Quanser card, step by step, and the evidence of them in one folder:
 #   scripts/quanser-first-day.sh RIG GAINS [--without-motor]
-# Begins with the amplifier off and the pendulum hanging at rest, and asks before anything moves. docs/rig-setup.md says
+# Begins with the amplifier off and the pendulum hanging at rest, and asks before anything moves. docs/how-to/first-rig.md says
 # what it is for.
 set -uo pipefail
 

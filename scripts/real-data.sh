@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Measurements of other laboratories, diagnosed: writes a dataset and a plant file for each, lets `upright diagnose` and
-# `upright report` run, and prints the table of what was found (docs/real-data.md holds a measured one).
+# `upright report` run, and prints the table of what was found (docs/results/real-data.md holds a measured one).
 #   scripts/real-data.sh DATA [OUT] [NAME...]    DATA holds the folders emps, aau, uw and canterbury, which are not part of
 #                                                this repository; OUT is a new temporary folder when none is named; NAMEs
 #                                                (as in the table) choose some of the diagnoses

@@ -23,7 +23,7 @@ import time
 ROOT = pathlib.Path(__file__).resolve().parents[1]
 FAULTS = {"late": 400, "drop": 2000, "corrupt": 4000, "stale": 4000, "reorder": 4000}  # one reply in so many
 LATE_MS = 6
-MISSED, HELD = 128, 3  # bits of the column flags: see docs/run-directory.md
+MISSED, HELD = 128, 3  # bits of the column flags: see docs/reference/run-directory.md
 
 WARM_SHARE = 0.3           # of a part's time, in which memory may still grow
 MOST_GROWTH_KIB = 512      # from then on, of the resident memory, in all

@@ -67,14 +67,14 @@ copy() {
   done
 }
 
-# What the fault suite has seen in the guest, against its columns of docs/faults.md.
+# What the fault suite has seen in the guest, against its columns of docs/reference/faults.md.
 compare_outcomes() {
   local records=$build/kernel_fault_records name cell
   [[ $(cat "$guest/programs") == *kernel_fault_test* ]] || return 0
   rm -rf "$records"
   mkdir -p "$records"
   sed -n 's/^guest: outcome //p' "$consoles"/* | while read -r name cell; do printf '%s' "$cell" >"$records/$name"; done
-  "$build/tests/fault/faults_document" "$records" docs/faults.md gpio comedi
+  "$build/tests/fault/faults_document" "$records" docs/reference/faults.md gpio comedi
 }
 
 write_init() {

@@ -38,7 +38,7 @@ struct NamedGains {
   std::filesystem::path file;
 };
 
-/// One piece. Which fields count depends on the kind; docs/experiments.md has the table.
+/// One piece. Which fields count depends on the kind; docs/reference/experiment-files.md has the table.
 struct Piece {
   PieceKind kind = PieceKind::observe;
   std::string label;

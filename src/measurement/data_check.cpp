@@ -451,9 +451,9 @@ void refuse_mistakes(const std::vector<Measurement>& runs, const Plant& plant) {
     others += (others.empty() ? "; likewise " : ", ") + runs[mistakes[i].run].name;
   const std::string remedy =
       first.lines.empty()
-          ? "correct in a dataset file (docs/datasets.md) which columns are read, and their units by scale, "
+          ? "correct in a dataset file (docs/reference/dataset-files.md) which columns are read, and their units by scale, "
             "or the plant file"
-          : "put into the columns of its dataset file (docs/datasets.md): " + joined(first.lines, "; ");
+          : "put into the columns of its dataset file (docs/reference/dataset-files.md): " + joined(first.lines, "; ");
   const std::string alternatives =
       first.or_else.empty() ? "" : "; or it may be that " + joined(first.or_else, ", or that ");
   throw ConfigError(file + " contradicts the plant file: " + first.cause + ": " + remedy + alternatives +

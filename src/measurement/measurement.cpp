@@ -70,13 +70,13 @@ class Collector {
     if (!has(voltage) && !dataset_.cart_locked)
       throw ConfigError(at + "there is no column for voltage_v" + columns_of(table) +
                         ": map it in a dataset file, or set cart_locked: true there if the pendulum swings "
-                        "alone (docs/datasets.md)");
+                        "alone (docs/reference/dataset-files.md)");
     refuse_other_units(table);
   }
 
   static constexpr const char* map_them =
       ": name the columns time_s, voltage_v, cart_m, theta_rad, or map them in a dataset file "
-      "(docs/datasets.md)";
+      "(docs/reference/dataset-files.md)";
 
   static std::string columns_of(const CsvTable& table) {
     constexpr std::size_t most = 20;
@@ -171,7 +171,7 @@ class Collector {
                       exact_text(m_.time_s.back()) + " then " + exact_text(time_s) +
                       "): sort the rows by time and remove doubled ones; if the time was rounded, write it "
                       "with more digits; if the rows are in order and came at a steady rate, give time_s its "
-                      "period_s in a dataset file (docs/datasets.md)");
+                      "period_s in a dataset file (docs/reference/dataset-files.md)");
   }
 
   /// Undoes the wrap of an angle that was folded, mostly into one turn: no real pendulum turns half around

@@ -1,5 +1,5 @@
 // Files that come from somebody else: pages show what they say and never do it, and what would eat the
-// machine is refused at once. docs/security.md says what each of these is about.
+// machine is refused at once. docs/explanation/security.md says what each of these is about.
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 

@@ -31,7 +31,7 @@ reason is in `run.yaml`, no row is missing from the log, and it replays. In the 
 machine may add 50 ms to the times given.
 
 A stuck encoder is noticed when something must have moved that it does not show. Where the plant is known, or the rig file has
-`encoder_watch` ([rig-setup.md](rig-setup.md)), that took 0.15 to 0.26 s in the median for the cart (longest of 720: 1.56 s) and
+`encoder_watch` ([first-rig.md](../how-to/first-rig.md)), that took 0.15 to 0.26 s in the median for the cart (longest of 720: 1.56 s) and
 0.12 s for the pendulum (2.27 s), on both shipped plants at 200, 500 and 1000 Hz. Without either, the watch allows for every usual
 cart: a stuck cart took 1.8 s in the median, and 8 of 360 were not noticed before the run of 10 s was over.
 
@@ -58,7 +58,7 @@ looked at is the card's record of its output. No card of Quanser's has been trie
 confirmed when the card has taken it, or when its watchdog has.
 
 Under board they are of `upright run` at 200 Hz over `config/rigs/board.yaml` against a board with our firmware
-([diy-rig.md](diy-rig.md)), executed instruction by instruction in an emulator. The plant turns its encoders' lines and takes
+([build-a-board.md](../how-to/build-a-board.md)), executed instruction by instruction in an emulator. The plant turns its encoders' lines and takes
 the voltage from its PWM, direction and enable pins.
 
 A dash is a fault without a meaning there: virtual time knows nothing of the machine; a simulated plant ends with its

@@ -1,4 +1,4 @@
-// The faults of the suite, and the page docs/faults.md that it makes of what it has seen.
+// The faults of the suite, and the page docs/reference/faults.md that it makes of what it has seen.
 #pragma once
 
 #include <filesystem>

@@ -11,7 +11,7 @@ namespace upright::test {
 namespace {
 
 constexpr double begin_s = 0.02;
-/// What docs/diy-rig.md promises.
+/// What docs/how-to/build-a-board.md promises.
 constexpr int promised_edges_per_s = 110'000;
 
 std::int32_t count_at(const Words& words, std::size_t place) {

@@ -20,7 +20,7 @@ double number_of(const char* variable, double otherwise) {
   return text ? std::stod(text) : otherwise;
 }
 
-/// What the registers of the device hold, by the documentation of its map (docs/diy-rig.md).
+/// What the registers of the device hold, by the documentation of its map (docs/how-to/build-a-board.md).
 class Account {
  public:
   struct Answer {

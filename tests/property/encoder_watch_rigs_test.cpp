@@ -1,5 +1,5 @@
 // The watch on the encoders over random rigs: none whose encoders count is stopped, however its friction, lag
-// and delay make the cart rest; an encoder that sticks is found in the time of docs/faults.md.
+// and delay make the cart rest; an encoder that sticks is found in the time of docs/reference/faults.md.
 #include <gtest/gtest.h>
 
 #include <cmath>

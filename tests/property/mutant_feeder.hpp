@@ -14,7 +14,7 @@ inline const std::filesystem::path config = std::filesystem::path(UPRIGHT_SOURCE
 
 /// Processor time under the sanitizers that a mutant may take: to be read and used where the work is that of
 /// a file; where a motion is simulated, whose steps are bounded; where an experiment is planned, which has a
-/// bound of its own (docs/experiments.md).
+/// bound of its own (docs/reference/experiment-files.md).
 inline constexpr double longest_read_s = 2.0, longest_motion_s = 20.0, longest_plan_s = 60.0;
 
 /// How many mutants of each kind: UPRIGHT_MUTANTS, 60 where it is not set.
