@@ -450,10 +450,11 @@ void refuse_mistakes(const std::vector<Measurement>& runs, const Plant& plant) {
   for (std::size_t i = 1; i < mistakes.size(); ++i)
     others += (others.empty() ? "; likewise " : ", ") + runs[mistakes[i].run].name;
   const std::string remedy =
-      first.lines.empty()
-          ? "correct in a dataset file (docs/reference/dataset-files.md) which columns are read, and their units by scale, "
-            "or the plant file"
-          : "put into the columns of its dataset file (docs/reference/dataset-files.md): " + joined(first.lines, "; ");
+      first.lines.empty() ? "correct in a dataset file (docs/reference/dataset-files.md) which columns are "
+                            "read, and their units by scale, "
+                            "or the plant file"
+                          : "put into the columns of its dataset file (docs/reference/dataset-files.md): " +
+                                joined(first.lines, "; ");
   const std::string alternatives =
       first.or_else.empty() ? "" : "; or it may be that " + joined(first.or_else, ", or that ");
   throw ConfigError(file + " contradicts the plant file: " + first.cause + ": " + remedy + alternatives +

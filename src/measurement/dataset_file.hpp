@@ -1,4 +1,5 @@
-// Dataset files: how a foreign CSV is read as a measurement. docs/reference/dataset-files.md explains every key.
+// Dataset files: how a foreign CSV is read as a measurement. docs/reference/dataset-files.md explains every
+// key.
 #pragma once
 
 #include <array>

@@ -166,7 +166,8 @@ std::string delay_map(const PaperOptions& options, const RigFile& rig, const Kee
 
 std::string paper_with_quiet(const PaperOptions& options, const RigFile& rig, const KeepFile& keep) {
   return "## The same figures with the quiet controller\n\n"
-         "`config/gains/quiet.yaml` ([quiet-control.md](explanation/quiet-control.md)): a Kalman filter on the viscous plant that "
+         "`config/gains/quiet.yaml` ([quiet-control.md](explanation/quiet-control.md)): a Kalman filter on "
+         "the viscous plant that "
          "also "
          "estimates the force nobody modelled; `quiet-friction.yaml`: an extended one on the exponential "
          "plant. Figures 2, 4 and 6 with it beside: 10 V, encoders, 1 kHz, "

@@ -3,7 +3,8 @@
 //
 //   data_check_rates CASES [SEED [FOLDER]]
 //
-// FOLDER keeps the runs, so that they are made once. Prints a Markdown table for docs/reference/dataset-files.md.
+// FOLDER keeps the runs, so that they are made once. Prints a Markdown table for
+// docs/reference/dataset-files.md.
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>

@@ -1,6 +1,6 @@
-// faults_document RECORDS PAGE BENCH... [--write]: compares the columns of docs/reference/faults.md that these benches
-// have with what the fault suite has seen of them, or writes them. The other columns stay as they are. Ends
-// with 77 (skipped) when the machine kept the suite from seeing all.
+// faults_document RECORDS PAGE BENCH... [--write]: compares the columns of docs/reference/faults.md that
+// these benches have with what the fault suite has seen of them, or writes them. The other columns stay as
+// they are. Ends with 77 (skipped) when the machine kept the suite from seeing all.
 #include <filesystem>
 #include <fstream>
 #include <iostream>
