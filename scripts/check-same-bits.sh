@@ -12,7 +12,7 @@ mkdir -p "$folder/results"
 folder=$(realpath "$folder")
 programs=()
 for arch in x86-64 x86-64-v3 x86-64-v4; do
-  cmake --preset release -B "$folder/$arch" -DUPRIGHT_WIDE_ARCH=$arch -DBUILD_TESTING=OFF \
+  cmake --preset ci -B "$folder/$arch" -DUPRIGHT_WIDE_ARCH=$arch -DBUILD_TESTING=OFF \
     -DCMAKE_CXX_COMPILER_LAUNCHER="$(command -v ccache || true)" >/dev/null
   CCACHE_BASEDIR=$PWD CCACHE_NOHASHDIR=1 cmake --build "$folder/$arch" --target upright -- -v >"$folder/$arch.log" ||
     { tail -n 30 "$folder/$arch.log" >&2; exit 1; }
