@@ -4,7 +4,7 @@
 //   data_check_rates CASES [SEED [FOLDER]]
 //
 // FOLDER keeps the runs, so that they are made once. Prints a Markdown table for
-// docs/reference/dataset-files.md.
+// docs/results/data-check.md.
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
