@@ -17,7 +17,7 @@ constexpr double any_smoothing = 100.0;
 
 /// With a predictor, friction is carried forward over the delay, in which it may turn round: it is followed
 /// less eagerly, and fades. Measured on the paper's plants at 10 to 300 ms; see
-/// docs/explanation/quiet-control.md.
+/// docs/results/quiet-control.md.
 constexpr double predicted_force_share = 0.25;
 constexpr double predicted_force_decay_s = 0.1;
 /// Beyond this delay it fades the quicker the longer the delay.

@@ -89,7 +89,7 @@ TEST_F(ControllersInTurns, RunFromTheSameStartsReplayAndAreComparedInPairs) {
     EXPECT_NEAR(difference.at("difference").get<double>(),
                 difference.at("to").get<double>() - difference.at("from").get<double>(), 1e-12);
     if (difference.at("quantity") != "voltage_rms_v") continue;
-    // docs/explanation/quiet-control.md: 2.8 V rms with gain (7), 0.7 V with the quiet controller.
+    // docs/results/quiet-control.md: 2.8 V rms with gain (7), 0.7 V with the quiet controller.
     EXPECT_LT(difference.at("difference_ci95").at(1).get<double>(), -0.5);
     EXPECT_TRUE(difference.at("clear"));
   }
