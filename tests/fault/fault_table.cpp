@@ -21,53 +21,64 @@ constexpr const char* no_test = "-";
 constexpr const char* between_cells = " | ";
 
 constexpr const char* introduction =
-    R"(# Faults and what comes of them
+    R"(# Faults and what happens then
 
-Made by the fault suite from the tests that passed: gpio and comedi by `scripts/test-kernel.sh`, the other columns by
-`ctest -L fault`. Each compares its columns with what it has seen. Each fault is put into a run that balances, and
-what the plant was given is looked at, not what the controller says of itself: the voltage that the virtual rig recorded,
-the simulated plant's own input, what was on the card's output, or on the board's pins. After a stop the motor is at zero volts for good, the
-reason is in `run.yaml`, no row is missing from the log, and it replays. In the hundreds of milliseconds of a test a busy
-machine may add 50 ms to the times given.
+This page is for users who want to know how upright reacts when something fails. Find the fault in the first column and your backend in
+the first row. The fault suite writes the table from the tests that passed: `scripts/test-kernel.sh` for gpio and comedi,
+`ctest -L fault` for the other columns. Each of them compares its columns with what it observed.
 
-A stuck encoder is noticed when something must have moved that it does not show. Where the plant is known, or the rig file has
-`encoder_watch` ([first-rig.md](../how-to/first-rig.md)), that took 0.15 to 0.26 s in the median for the cart (longest of 720: 1.56 s) and
-0.12 s for the pendulum (2.27 s), on both shipped plants at 200, 500 and 1000 Hz. Without either, the watch allows for every usual
-cart: a stuck cart took 1.8 s in the median, and 8 of 360 were not noticed before the run of 10 s was over.
+- *goes on*: the run continues.
+- *`reason`, 0 V within T*: the run stops with this reason, and the motor is at zero volts within the time T.
+- A dash means not applicable ([why](#when-a-dash-is-in-a-cell)).
 
-One fault is not in the table, because the suite reads the folder that is then gone. When another program removes a run's folder
-during the run, the run ends with `log_failed`, 0 V within 250 ms and exit code 3 (test `RemovedRun`).
+After each stop the motor stays at zero volts, the reason is in `run.yaml`, no row is missing from the log, and the log
+replays. A busy machine may add 50 ms to the times in the hundreds of milliseconds.
 
-At the stop means: the device is driven, then it misbehaves, and then the rig is stopped. What is looked at is the device's own
-record of the voltages it accepted (`tests/integration/fake_device.cpp`, a device that shares no code with the program's link).
-It has no watchdog of its own unless the row says so. Where it misbehaves for good, somebody presses Ctrl-C once more; otherwise
-the program gives up after 10 s.
+## How the faults are tested
 
-Over Modbus the other runs are of `upright run` against `upright virtual-rig`, as processes of their own, at 200 Hz with
-`watchdog_s: 0.1`.
+Each fault occurs during a run that balances. The verdict comes from the plant and not from the controller: the voltage that the
+virtual rig recorded, the input of the simulated plant, the output of the card, or the pins of the board.
 
-Under gpio and comedi they are of `upright run` at 200 Hz in a guest with Debian's kernel, whose simulated chip and cards a
-plant moves (`tests/kernel`). comedi is cards alone: two potentiometers (counters where they wrap) and the output. gpio
-has the pendulum's encoder, emergency stop, limit switches, amplifier enable and heartbeat on lines, and a watchdog that
-takes the motor's voltage away when the heart has not beaten for 100 ms; its cart and its output are on cards, since a cart
-makes more edges than lines can count.
+- **Simulated.** `upright run` on the simulated rig, in virtual time and in real time.
+- **modbus-tcp, modbus-rtu.** `upright run` against `upright virtual-rig`, as separate processes, at 200 Hz with `watchdog_s: 0.1`.
+- **At the stop.** In the rows that begin with "at the stop", the device is driven, then it misbehaves, and then the rig is stopped. The
+  verdict comes from the device's own record of the voltages that it accepted (`tests/integration/fake_device.cpp`, a device that
+  shares no code with the link of the program). The device has no watchdog unless the row says so. If it misbehaves for good,
+  Ctrl-C is pressed once more; otherwise the program gives up after 10 s.
+- **gpio, comedi.** `upright run` at 200 Hz in a virtual machine with Debian's kernel, whose simulated chip and cards are moved by a plant
+  (`tests/kernel`). comedi uses cards only: two potentiometers (counters where they wrap) and the output. gpio has the pendulum encoder,
+  emergency stop, limit switches, amplifier enable and heartbeat on lines, and a watchdog that switches the motor off when the
+  heartbeat has stopped for 100 ms. Its cart encoder and output are on cards, since a cart makes more edges than lines can count.
+- **quanser-hil.** `upright run` at 200 Hz with a test version of `libhil.so` (`tests/fault/fake_hil`). Its card is a separate process
+  with 16-bit counters, an enable line, and a watchdog of 0.1 s that locks the card when it expires. The verdict comes from the card's
+  record of its output. No real Quanser card has been tested. HIL cannot read outputs back: zero volts is confirmed when the card or
+  its watchdog has set it.
+- **board.** `upright run` at 200 Hz over `config/rigs/board.yaml` against a board with the firmware of this repository
+  ([build-a-board.md](../how-to/build-a-board.md)), executed instruction by instruction in an emulator. The plant turns the encoder
+  lines and reads the voltage from the PWM, direction and enable pins.
 
-Under quanser-hil they are of `upright run` at 200 Hz with a `libhil.so` of the tests' own (`tests/fault/fake_hil`), whose card
-is a process of its own, with 16-bit counters, an enable line and a watchdog of 0.1 s that locks it when it expires; what is
-looked at is the card's record of its output. No card of Quanser's has been tried. HIL reads no output back: zero volts is
-confirmed when the card has taken it, or when its watchdog has.
+## How fast a stuck encoder is found
 
-Under board they are of `upright run` at 200 Hz over `config/rigs/board.yaml` against a board with our firmware
-([build-a-board.md](../how-to/build-a-board.md)), executed instruction by instruction in an emulator. The plant turns its encoders' lines and takes
-the voltage from its PWM, direction and enable pins.
+A stuck encoder is found when something must have moved and the encoder does not show it. If the plant is known, or the rig file has
+`encoder_watch` ([first-rig.md](../how-to/first-rig.md)), this took 0.15 to 0.26 s in the median for the cart (longest of 720: 1.56 s)
+and 0.12 s for the pendulum (2.27 s), on both shipped plants at 200, 500 and 1000 Hz. Without either, the watch allows for every usual
+cart: a stuck cart encoder took 1.8 s in the median, and 8 of 360 were not found before the end of the 10 s run.
 
-A dash is a fault without a meaning there: virtual time knows nothing of the machine; a simulated plant ends with its
-program; the virtual rig's registers have no bits for emergency stop and limit switches, and cards alone have no lines; lines
-and cards answer a call or refuse it, so that no reply is late, lost, corrupt or out of order, and there is no device that
-restarts; edges are counted by the program, which does not wrap, or by the board in 32 bits; a board's lines show no jump; only
-an analog input is a potentiometer; only a card with a library of its own has to be opened, and has a watchdog that locks it.
-Requests are disturbed and a device's program hangs on the board only; a reply given twice or out of order, and what a device
-does at the stop, are not repeated there, where the program's side is modbus-rtu's.
+## When a dash is in a cell
+
+- Virtual time does not depend on the machine, and a simulated plant ends with its program.
+- The registers of the virtual rig have no bits for emergency stop and limit switches. Cards alone have no lines.
+- Lines and cards answer a call or refuse it. So no reply is late, lost, corrupt or out of order, and no device restarts.
+- Edges are counted by the program, which does not wrap, or by the board in 32 bits. The lines of a board cannot jump.
+- Only an analog input is a potentiometer.
+- Only a card with its own library must be opened, and only such a card has a watchdog that locks it.
+- Requests are disturbed, and the program of a device hangs, on the board only. A reply that arrives twice or out of order and the
+  behaviour at the stop are not tested again on the board: its link is that of modbus-rtu.
+
+One fault is not in the table, because the suite reads the folder that the fault removes. If another program removes the folder of a
+run, the run ends with `log_failed`, 0 V within 250 ms and exit code 3 (test `RemovedRun`).
+
+## The table
 
 | fault | simulated, virtual time | simulated, real time | modbus-tcp | modbus-rtu | gpio | comedi | quanser-hil | board |
 |---|---|---|---|---|---|---|---|---|
