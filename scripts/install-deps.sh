@@ -3,8 +3,8 @@
 #   scripts/install-deps.sh         what building and the demo need
 #   scripts/install-deps.sh --test  also the browser that the live page is tested in
 #   scripts/install-deps.sh --kernel  also what boots a kernel for the tests of GPIO and Comedi
-#   scripts/install-deps.sh --dev   also what .ci/run needs: all these, clang's formatter, linter, sanitizers, fuzzer; ccache; and what
-#                                   compiles and emulates the firmware of a board
+#   scripts/install-deps.sh --dev   also what .ci/run needs: all these, clang's formatter, linter, sanitizers, fuzzer; ccache; what
+#                                   compiles and emulates the firmware of a board; and a spelling checker
 set -euo pipefail
 
 packages=(
@@ -18,7 +18,7 @@ test_packages=(chromium chromium-driver)
 kernel_packages=(qemu-system-x86 busybox-static libelf1)
 development_packages=(
   clang-14 clang-format-14 clang-tidy-14 clang-tools-14 libclang-rt-14-dev libomp-14-dev ccache
-  gcc-avr avr-libc libsimavr-dev
+  gcc-avr avr-libc libsimavr-dev codespell
 )
 case "${1:-}" in
   '') ;;
