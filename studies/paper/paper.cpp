@@ -21,13 +21,12 @@ class Paper : private PaperPage {
 
   void write() {
     say("# The paper, recomputed\n");
-    say("Written by `scripts/reproduce-paper.sh`. Every number under \"here\" is from a run made by that "
-        "command; "
-        "the paper's are quoted beside it. Delays at which the outcome changes are found by bisection to 0.1 "
-        "ms, "
-        "runs last 20 s, \"stable\" is an amplitude (half of peak to peak over the last third) below 0.0016 "
-        "rad, "
-        "\"falls\" is 1 rad.\n");
+    say("This page is for readers of the paper by Campbell, Crawford and Morris. It compares its figures and "
+        "tables with runs of this program.\n\nThe page is written by `scripts/reproduce-paper.sh`. Every "
+        "number under \"here\" comes from a run of that command; the numbers of the paper are quoted beside "
+        "it. The delays at which the outcome changes are found by bisection to 0.1 ms. Runs last 20 s. "
+        "\"Stable\" means an amplitude (half of peak to peak over the last third) below 0.0016 rad, and "
+        "\"falls\" means 1 rad.\n");
     gains();
     critical_delays();
     friction_curves();
@@ -53,9 +52,9 @@ class Paper : private PaperPage {
     say("| model | | k1 | k2 | k3 | k4 |\n|---|---|---|---|---|---|");
     gain_rows("exponential");
     gain_rows("dynamic");
-    say("\nWith bristles, z - x drifts away from the control: `upright design` eliminates it and gives the "
-        "gain on x "
-        "as k1. The printed k1 is half of it; the other half would act on z, which is not measured.\n");
+    say("\nWith bristles, no voltage can move the combination z - x. `upright design` eliminates it and "
+        "gives the gain on x as k1. The printed k1 is half of this value. The other half would act on z, "
+        "which is not measured.\n");
   }
 
   void gain_rows(const std::string& model) {
@@ -72,8 +71,8 @@ class Paper : private PaperPage {
   void critical_delays() {
     part("critical delays");
     say("## Critical delays of the linear analysis\n");
-    say("Continuous loop, V(t) = gains . state(t - delay), sgn(v) as tanh(100 v). Each is confirmed by the "
-        "rightmost characteristic root, 0.1 percent below and above it.\n");
+    say("Continuous loop, V(t) = gains . state(t - delay), sgn(v) as tanh(100 v). Each critical delay is "
+        "confirmed by the rightmost characteristic root 0.1 percent below and above it.\n");
     say("| plant | gain | paper [s] | here [s] | crossing [rad/s] | root below [1/s] | root above [1/s] "
         "|\n|---|---|---|---|---|---|---|");
     Gains whole = gains_of("dynamic");
@@ -84,7 +83,7 @@ class Paper : private PaperPage {
     margin_row("dynamic", "(10) as printed", gains_of("dynamic"), "0.1169");
     margin_row("viscous", "(7): what large motions feel", gains_of("exponential"), "-");
     margin_row("viscous", "of the viscous model", gains_of("viscous"), "-");
-    say("\nThe paper's 0.1169 s is not met by either reading of (10).\n");
+    say("\nNeither reading of (10) gives the paper's 0.1169 s.\n");
   }
 
   void margin_row(const std::string& model, const std::string& name, const Gains& gains,
@@ -144,10 +143,11 @@ class Paper : private PaperPage {
   void time_courses() {
     part("figures 2, 4 and 6");
     say("## Figures 2, 4 and 6: the three controllers on the rig\n");
-    say("Simulated with a 10 V limit, encoders, velocity filter and 1 kHz, 40 s; peak to peak over the last "
-        "third. Starts of 0.06 rad, for Figure 6 of 0.02 rad, as the captions say. The viscous gain (not "
-        "printed in the paper) is the LQR gain of the viscous model. The paper shows what it calls small "
-        "oscillations for it, and much smaller noise, from quantization, for the other two.\n");
+    say("The runs are simulated with a 10 V limit, encoders, the velocity filter and 1 kHz for 40 s. The "
+        "table gives peak-to-peak values over the last third. The starting angle is 0.06 rad, for Figure 6 "
+        "0.02 rad, as the captions say. The viscous gain is not printed in the paper; here it is the LQR "
+        "gain of the viscous model. For this gain the paper shows what it calls small oscillations. For the "
+        "other two it shows much smaller noise, from quantization.\n");
     say("| gain | plant | cart [mm] | angle [degree] |\n|---|---|---|---|");
     // Starts as in the captions; Figure 2 names none.
     const std::tuple<const char*, const char*, double> figures[] = {
@@ -181,8 +181,8 @@ class Paper : private PaperPage {
            240);
       plot(std::string(file) + "-cart", figure_texts_.back().second, "time [s]", "cart [mm]", positions, 240);
     }
-    say("\nThe viscous gain hunts: friction it does not know of holds the cart, the pendulum leans away, the "
-        "cart breaks loose. The gains of the friction models move the cart 0.4 times as far or less.\n");
+    say("\nThe viscous gain hunts: unmodelled friction holds the cart, the pendulum leans away, and the cart "
+        "breaks loose. The gains of the friction models move the cart 0.4 times as far or less.\n");
     for (const auto& [file, title] : figure_texts_) {
       show(file, title);
       show(file.substr(0, 8) + "-cart", title);
@@ -191,10 +191,10 @@ class Paper : private PaperPage {
 
   void saturation() {
     part("saturation");
-    say("## The amplifier's limit makes the band of oscillation\n");
-    say("Continuous delay, starts of 1, 3 and 5 degrees (a range where they differ). The paper's simulations "
-        "name no "
-        "limit: exponential friction falls from 0.041 s, dynamic from 0.028 s.\n");
+    say("## The voltage limit causes the band of oscillation\n");
+    say("Continuous delay, starts of 1, 3 and 5 degrees (a range if they differ). The paper's simulations "
+        "mention no voltage limit. In them, exponential friction falls from 0.041 s and dynamic friction "
+        "from 0.028 s.\n");
     say("| limit [V] | exponential, gain (7): oscillates from [s] | falls from [s] | dynamic, gain (10): "
         "oscillates from [s] | falls from [s] |\n|---|---|---|---|---|");
     for (const double limit : {6.0, 7.0, 8.0, 8.5, 9.0, 10.0, 12.0, 15.0, 0.0}) {
@@ -207,7 +207,7 @@ class Paper : private PaperPage {
     }
     PaperLoop smooth;
     smooth.smoothing = paper_smoothing;
-    say("\nWith tanh(100 v) in place of the sign and no limit the exponential model falls from " +
+    say("\nWith tanh(100 v) in place of the sign and without a limit, the exponential model falls from " +
         text_of(changes(smooth, rig_starts()).falls) + " s.\n");
   }
 
@@ -223,12 +223,12 @@ class Paper : private PaperPage {
     simulation_rows("exponential, tanh(100 v)", smooth, {0.11, 0.3, 1.0, 3.0, 5.9}, "above 0.1",
                     "about 0.007", "0.041");
     simulation_rows("dynamic", dynamic, {1.0, 2.0, 3.0, 4.0, 5.0}, "1 to 5", "0.022", "0.028");
-    say("\nA range is over the starts. As printed, without a limit, the equations have no band of large "
-        "oscillation between rest and fall: a start that does not come back falls. With a limit of 8.5 V the "
-        "band is there and the exponential model falls where the paper's does. With the true sgn a small "
-        "stick-slip cycle is there at every delay, since the pendulum cannot rest while the cart sticks; "
-        "\"stable\" depends on what amplitude counts as rest, here 0.0016 rad, one step of the angle "
-        "encoder.\n");
+    say("\nRanges are over the starts. Without a limit, as printed, the equations have no band of large "
+        "oscillation between rest and fall: a start that does not return to rest falls. With a limit of 8.5 "
+        "V the band exists, and the exponential model falls where the paper's model does. With the true sgn "
+        "a small stick-slip cycle exists at every delay, because the pendulum cannot rest while the cart "
+        "sticks. So \"stable\" depends on the amplitude that counts as rest, here 0.0016 rad, one step of "
+        "the angle encoder.\n");
   }
 
   void simulation_rows(const std::string& name, PaperLoop c, const std::vector<double>& starts_deg,
@@ -259,10 +259,10 @@ class Paper : private PaperPage {
     add_transitions(c, "tanh(100 v), no limit", 2, false, all);
     basin("figure-7", "Figure 7: where the outcome changes, exponential friction", all, linear_s);
     say("The dotted line is the critical delay of the linear analysis, " + seconds(linear_s) +
-        " s. Left of the dashed line of "
-        "a colour the pendulum comes to rest (below 0.0016 rad), right of the full line it "
-        "falls. Where the two coincide there is no band of oscillation. As in the paper, smaller starts with "
-        "tanh(100 v) reach the linear value, and the true sgn, which has no linear range, does not.\n");
+        " s. For each colour, the pendulum comes to rest (below 0.0016 rad) left of the dashed line and "
+        "falls right of the full line. If the two coincide, there is no band of oscillation. As in the "
+        "paper, small starts with tanh(100 v) reach the linear value. The true sgn has no linear range and "
+        "does not reach it.\n");
   }
 
   void basin_of_dynamic() {
@@ -277,8 +277,8 @@ class Paper : private PaperPage {
     add_transitions(c, "9 V", 1, true, all);
     basin("figure-8", "Figure 8: where the outcome changes, dynamic friction", all, linear_s);
     say("The dotted line is the critical delay of the linear analysis with gain (10), " + seconds(linear_s) +
-        " s. Small starts reach it, as in the paper; starts that an experiment can make fall far below "
-        "it.\n");
+        " s. Small starts reach it, as in the paper. Starts that an experiment can make fall at much shorter "
+        "delays.\n");
   }
 
   void prediction() {
@@ -292,16 +292,16 @@ class Paper : private PaperPage {
         "here [s] | off |\n|---|---|---|---|---|---|---|---|");
     rig_row("exponential", "(7)", 0.025, 0.041);
     rig_row("dynamic", "(10)", 0.023, 0.028);
-    say("\n\"Off\" compares the middle of a range. The exponential plant is the one that predicts both.\n");
-    say("From rest to oscillation, on the exponential plant; on the rig as here a limit cycle of the "
-        "encoders' "
-        "steps and stick-slip is there at every delay, so that \"stable\" is below 0.5 degrees here.\n");
+    say("\n\"Off\" is the deviation from the experiment, taken from the middle of a range. Only the "
+        "exponential plant predicts both.\n");
+    say("The next table shows the transition from rest to oscillation on the exponential plant. Encoder "
+        "steps and stick-slip cause a limit cycle at every delay, on the rig and here. So \"stable\" means "
+        "below 0.5 degrees in this table.\n");
     say("| gain | | stable until [s] | falls from [s] |\n|---|---|---|---|");
     growth_rows("exponential", "(7)", "0.010", "0.025");
     growth_rows("dynamic", "(10)", "0.009", "0.023");
-    say("\nThe growth sets in later here than the experiment saw oscillation; what amplitude counted there "
-        "is not "
-        "said.\n");
+    say("\nHere the oscillation begins to grow at longer delays than in the experiment. The paper does not "
+        "say which amplitude counted as oscillation.\n");
   }
 
   void growth_rows(const std::string& gain, const std::string& name, const std::string& stable,
@@ -326,9 +326,8 @@ class Paper : private PaperPage {
   void effect_by_effect() {
     part("effect by effect");
     say("## How the gap closes, effect by effect\n");
-    say("Falls from [s], starts of 1, 3 and 5 degrees, and how far that is from the experiment. Each line "
-        "adds to the one "
-        "above.\n");
+    say("The table gives the delays [s] from which starts of 1, 3 and 5 degrees fall, and their deviation "
+        "from the experiment. Each line adds one effect to the line above.\n");
     say("| model | exponential, gain (7) | off 0.025 | dynamic, gain (10) | off 0.023 "
         "|\n|---|---|---|---|---|");
     PaperLoop a, b;
@@ -352,7 +351,7 @@ class Paper : private PaperPage {
     line("+ velocity filter 50 Hz");
     both([](PaperLoop& c) { c.encoders = true; });
     line("+ encoders");
-    say("\nOne left out of the whole:\n");
+    say("\nThe complete model without one effect:\n");
     say("| left out | exponential, gain (7) | off 0.025 | dynamic, gain (10) | off 0.023 "
         "|\n|---|---|---|---|---|");
     const PaperLoop whole_a = a, whole_b = b;
@@ -371,7 +370,7 @@ class Paper : private PaperPage {
 
   void compensation() {
     part("compensation");
-    say("## The answer to the delay: the predictor beside gain (7)\n");
+    say("## Compensation of the delay: the predictor and gain (7)\n");
     const std::filesystem::path file = options_.config / "gains/compensated.yaml";
     const GainDesign design = design_sampled_gains(plant("viscous"), {}, paper_smoothing, 1000.0, 0.1).design;
     say("The rig as above (" + number_text(rig_.amplifier.limit_v) +
@@ -380,7 +379,7 @@ class Paper : private PaperPage {
         "those of `upright design config/plants/viscous.yaml --delay 0.1`: " +
         number_text(design.gains[0], 6) + ", " + number_text(design.gains[1], 6) + ", " +
         number_text(design.gains[2], 6) + ", " + number_text(design.gains[3], 6) +
-        ". Cells: the largest angle of the last third, or when it fell.\n");
+        ". Each cell gives the largest angle of the last third, or the time of the fall.\n");
     say("| delay [s] | exponential plant, gain (7) | dynamic plant, gain (7) | exponential plant, predictor "
         "| "
         "dynamic plant, predictor |\n|---|---|---|---|---|");
@@ -394,8 +393,8 @@ class Paper : private PaperPage {
     say("\nWith every parameter of the prediction model 5 percent up or down, at 0.150 s, 100 seeds:\n");
     say("| plant | fell | largest angle of the worst |\n|---|---|---|");
     for (const char* model : {"exponential", "dynamic"}) say(mistaken_row(model, file));
-    say("\nThe paper's map with it, on the rig: where starts fall, with gain (7) and with the predictor. "
-        "A plant without a line does not fall up to 0.4 s.\n");
+    say("\nThe map of the paper for the rig: the delay from which each start falls, with gain (7) and with "
+        "the predictor. A plant without a line does not fall up to 0.4 s.\n");
     basin_with_predictor(file);
   }
 

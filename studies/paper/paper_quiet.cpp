@@ -165,15 +165,12 @@ std::string delay_map(const PaperOptions& options, const RigFile& rig, const Kee
 }  // namespace
 
 std::string paper_with_quiet(const PaperOptions& options, const RigFile& rig, const KeepFile& keep) {
-  return "## The same figures with the quiet controller\n\n"
-         "`config/gains/quiet.yaml` ([quiet-control.md](explanation/quiet-control.md)): a Kalman filter on "
-         "the viscous plant that "
-         "also "
-         "estimates the force nobody modelled; `quiet-friction.yaml`: an extended one on the exponential "
-         "plant. Figures 2, 4 and 6 with it beside: 10 V, encoders, 1 kHz, "
-         "starts as in the captions, the quiet controllers' 0.06 rad; peak to peak and root mean square over "
-         "the "
-         "last third of 40 s.\n" +
+  return "## The same figures with the quiet controller\n\n`config/gains/quiet.yaml` "
+         "([quiet-control.md](explanation/quiet-control.md)) has a Kalman filter on the viscous plant that "
+         "also estimates the unmodelled force. `quiet-friction.yaml` has an extended Kalman filter on the "
+         "exponential plant. The table repeats Figures 2, 4 and 6 with these controllers: 10 V, encoders, 1 "
+         "kHz, starts as in the captions (0.06 rad for the quiet controllers). It gives peak-to-peak and RMS "
+         "values over the last third of 40 s.\n" +
          time_courses(options, rig, keep) + "The delay map on the rig (" +
          number_text(rig.amplifier.limit_v) +
          " V, 20 s), without a predictor; the estimators know the delay.\n\n" + delay_map(options, rig, keep);

@@ -60,7 +60,7 @@ virtual rig recorded, the input of the simulated plant, the output of the card, 
 ## How fast a stuck encoder is found
 
 A stuck encoder is found when something must have moved and the encoder does not show it. If the plant is known, or the rig file has
-`encoder_watch` ([first-rig.md](../how-to/first-rig.md)), this took 0.15 to 0.26 s in the median for the cart (longest of 720: 1.56 s)
+`encoder_watch` ([rig files](rig-files.md#encoder-watch)), this took 0.15 to 0.26 s in the median for the cart (longest of 720: 1.56 s)
 and 0.12 s for the pendulum (2.27 s), on both shipped plants at 200, 500 and 1000 Hz. Without either, the watch allows for every usual
 cart: a stuck cart encoder took 1.8 s in the median, and 8 of 360 were not found before the end of the 10 s run.
 
