@@ -25,12 +25,7 @@ RigFile multiq3_file() {
 
 /// Both encoders on a card of National Instruments, the output on its analog output.
 RigFile ni_file() {
-  RigFile rig = multiq3_file();
-  rig.calibration.cart.width_bits = rig.calibration.pendulum.width_bits = 32;
-  rig.calibration.zero_at_start = true;
-  rig.comedi->cart = {device, 2, 0, ComediEncoderKind::counter, ComediLines{8, 10}, {}, {}, 0.0};
-  rig.comedi->pendulum = {device, 3, 0, ComediEncoderKind::counter, ComediLines{3, 11}, {}, {}, 0.0};
-  return rig;
+  return read_rig_file(rigs / "comedi-ni-pcimio.yaml");
 }
 
 std::unique_ptr<Rig> opened(const RigFile& file) {
@@ -186,24 +181,27 @@ TEST_F(ComediRigTest, SetsUpACounterOfNationalInstrumentsOnce) {
   const lsampl_t mode = NI_GPCT_COUNTING_MODE_QUADRATURE_X4_BITS | NI_GPCT_COUNTING_DIRECTION_HW_UP_DOWN_BITS;
   const lsampl_t off = 0x8000;
   const std::vector<GivenInstruction> of_cart = {
-      {INSN_CONFIG, 2, 0, {INSN_CONFIG_RESET}},
-      {INSN_WRITE, 2, 0, {0}},
-      {INSN_WRITE, 2, 1, {0}},
-      {INSN_WRITE, 2, 2, {0}},
-      {INSN_CONFIG, 2, 0, {INSN_CONFIG_SET_GATE_SRC, 0, off}},
-      {INSN_CONFIG, 2, 0, {INSN_CONFIG_SET_GATE_SRC, 1, off}},
-      {INSN_CONFIG, 2, 0, {INSN_CONFIG_SET_OTHER_SRC, NI_GPCT_SOURCE_ENCODER_A, NI_GPCT_PFI_OTHER_SELECT(8)}},
+      {INSN_CONFIG, 11, 0, {INSN_CONFIG_RESET}},
+      {INSN_WRITE, 11, 0, {0}},
+      {INSN_WRITE, 11, 1, {0}},
+      {INSN_WRITE, 11, 2, {0}},
+      {INSN_CONFIG, 11, 0, {INSN_CONFIG_SET_GATE_SRC, 0, off}},
+      {INSN_CONFIG, 11, 0, {INSN_CONFIG_SET_GATE_SRC, 1, off}},
       {INSN_CONFIG,
-       2,
+       11,
+       0,
+       {INSN_CONFIG_SET_OTHER_SRC, NI_GPCT_SOURCE_ENCODER_A, NI_GPCT_PFI_OTHER_SELECT(8)}},
+      {INSN_CONFIG,
+       11,
        0,
        {INSN_CONFIG_SET_OTHER_SRC, NI_GPCT_SOURCE_ENCODER_B, NI_GPCT_PFI_OTHER_SELECT(10)}},
-      {INSN_CONFIG, 2, 0, {INSN_CONFIG_SET_OTHER_SRC, NI_GPCT_SOURCE_ENCODER_Z, off}},
-      {INSN_CONFIG, 2, 0, {INSN_CONFIG_SET_COUNTER_MODE, mode}},
-      {INSN_CONFIG, 2, 0, {INSN_CONFIG_ARM, 0}},
+      {INSN_CONFIG, 11, 0, {INSN_CONFIG_SET_OTHER_SRC, NI_GPCT_SOURCE_ENCODER_Z, off}},
+      {INSN_CONFIG, 11, 0, {INSN_CONFIG_SET_COUNTER_MODE, mode}},
+      {INSN_CONFIG, 11, 0, {INSN_CONFIG_ARM, 0}},
   };
   ASSERT_EQ(card().set_up.size(), 2 * of_cart.size());
   EXPECT_TRUE(std::equal(of_cart.begin(), of_cart.end(), card().set_up.begin()));
-  EXPECT_EQ(card().set_up.back(), (GivenInstruction{INSN_CONFIG, 3, 0, {INSN_CONFIG_ARM, 0}}));
+  EXPECT_EQ(card().set_up.back(), (GivenInstruction{INSN_CONFIG, 12, 0, {INSN_CONFIG_ARM, 0}}));
   card().set_up.clear();
   rig->open();
   EXPECT_TRUE(card().set_up.empty()) << "opened again in the same run, the counters go on";
@@ -230,14 +228,10 @@ TEST_F(ComediRigTest, RefusesCountsOfAnEarlierStartWhereCountersBeginAnew) {
 
 TEST_F(ComediRigTest, SetsUpTheS626) {
   fake_cards()[device] = fake_s626();
-  RigFile file = multiq3_file();
-  file.calibration.zero_at_start = true;
-  file.comedi->cart->subdevice = file.comedi->pendulum->subdevice = 2;
-  file.comedi->output->range = {-10, 10};
-  const auto rig = opened(file);
+  const auto rig = opened(read_rig_file(rigs / "comedi-s626.yaml"));
   EXPECT_EQ(card().set_up,
-            (std::vector<GivenInstruction>{{INSN_CONFIG, 2, 0, {0}}, {INSN_CONFIG, 2, 1, {0}}}));
-  card().subdevices[2].data[1] = 0xfffffe;
+            (std::vector<GivenInstruction>{{INSN_CONFIG, 5, 0, {0}}, {INSN_CONFIG, 5, 1, {0}}}));
+  card().subdevices[5].data[1] = 0xfffffe;
   EXPECT_EQ(rig->read().pendulum_counts, -2);
 }
 

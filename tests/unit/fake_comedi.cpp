@@ -78,6 +78,9 @@ FakeCard fake_s626() {
   card.driver = "s626";
   card.subdevices = {subdevice(COMEDI_SUBD_AI, 16, 0x3fff, 0x2000, {five_v, ten_v}),
                      subdevice(COMEDI_SUBD_AO, 4, 0x3fff, 0, {ten_v}),
+                     subdevice(COMEDI_SUBD_DIO, 16, 1, 0),
+                     subdevice(COMEDI_SUBD_DIO, 16, 1, 0),
+                     subdevice(COMEDI_SUBD_DIO, 16, 1, 0),
                      subdevice(COMEDI_SUBD_COUNTER, 6, 0xffffff, 0)};
   return card;
 }
@@ -85,10 +88,10 @@ FakeCard fake_s626() {
 FakeCard fake_ni_pcimio() {
   FakeCard card;
   card.driver = "ni_pcimio";
-  card.subdevices = {subdevice(COMEDI_SUBD_AI, 16, 0xffff, 0x8000, {ten_v, five_v}),
-                     subdevice(COMEDI_SUBD_AO, 2, 0xffff, 0, {ten_v, five_v}),
-                     subdevice(COMEDI_SUBD_COUNTER, 3, 0xffffffff, 0),
-                     subdevice(COMEDI_SUBD_COUNTER, 3, 0xffffffff, 0)};
+  card.subdevices.resize(14);  // those between are of no concern here
+  card.subdevices[0] = subdevice(COMEDI_SUBD_AI, 16, 0xffff, 0x8000, {ten_v, five_v});
+  card.subdevices[1] = subdevice(COMEDI_SUBD_AO, 2, 0xffff, 0, {ten_v, five_v});
+  card.subdevices[11] = card.subdevices[12] = subdevice(COMEDI_SUBD_COUNTER, 3, 0xffffffff, 0);
   return card;
 }
 

@@ -76,9 +76,10 @@ TEST(RigFile, ShippedFilesRead) {
 }
 
 TEST(RigFile, WrittenTextReadsBackExactly) {
-  for (const char* name : {"simulated.yaml", "modbus-tcp.yaml", "modbus-rtu.yaml", "comedi-multiq3.yaml",
-                           "comedi-and-modbus.yaml", "gpio-and-modbus.yaml", "quanser-q2-usb.yaml",
-                           "quanser-q8-usb.yaml", "quanser-qpid-e.yaml"}) {
+  for (const char* name :
+       {"simulated.yaml", "modbus-tcp.yaml", "modbus-rtu.yaml", "comedi-multiq3.yaml",
+        "comedi-ni-pcimio.yaml", "comedi-s626.yaml", "comedi-and-modbus.yaml", "gpio-and-modbus.yaml",
+        "quanser-q2-usb.yaml", "quanser-q8-usb.yaml", "quanser-qpid-e.yaml"}) {
     const std::string text = rig_text(read_rig_file(rigs / name));
     EXPECT_EQ(rig_text(read_rig(YamlMap::from_text(text, "again.yaml"))), text);
   }
