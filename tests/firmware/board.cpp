@@ -77,6 +77,8 @@ void Board::run_until(Cycles time) {
   // The core runs to the next timer; this one ends it in time.
   while (avr_->cycle < time) {
     avr_->run_cycle_limit = std::min<Cycles>(time - avr_->cycle, pwm_cycles);
+    // The limit counts from the next timer on; until then the core runs on what was left of the call before.
+    avr_->run_cycle_count = std::min<Cycles>(avr_->run_cycle_count, time - avr_->cycle);
     const int state = avr_run(avr_);
     if (state == cpu_Crashed || state == cpu_Done) throw std::runtime_error("the firmware has crashed");
     if (was_reset_) after_reset();

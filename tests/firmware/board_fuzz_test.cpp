@@ -20,46 +20,81 @@ double number_of(const char* variable, double otherwise) {
   return text ? std::stod(text) : otherwise;
 }
 
+/// When something happened, as far as it can be told from outside.
+struct Span {
+  double from_s, to_s;
+};
+
 /// What the registers of the device hold, by the documentation of its map (docs/how-to/build-a-board.md).
 class Account {
  public:
   struct Answer {
-    Bytes reply;            ///< with zeros where the device's own numbers are
-    std::vector<int> read;  ///< the addresses in it
+    Bytes reply;                         ///< with zeros where the device's own numbers are
+    std::vector<int> read;               ///< the addresses in it
+    std::vector<std::vector<int>> held;  ///< for each of them what it may have held; empty: not told here
   };
 
-  /// What has to come of bytes that follow a silence and that a silence follows.
-  std::vector<Answer> take(Bytes bytes, double now_s) {
-    expire(now_s);
-    shortest_watchdog_ms_ = watchdog_in_use_ms();
+  /// What has to come of bytes that follow a silence and that a silence follows. The first is whole at
+  /// `first_s`.
+  std::vector<Answer> take(const Bytes& bytes, double first_s) {
     std::vector<Answer> answers;
-    while (bytes.size() >= 4 && bytes[0] == 1) {
-      const std::size_t size = size_of(bytes);
-      if (size > longest || size > bytes.size()) break;
-      const Bytes frame(bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(size));
+    double free_s = first_s;  // the board takes no further bytes while it sends a reply
+    std::size_t place = 0;
+    while (bytes.size() - place >= 4 && bytes[place] == 1) {
+      const Bytes rest(bytes.begin() + static_cast<std::ptrdiff_t>(place), bytes.end());
+      const std::size_t size = size_of(rest);
+      if (size > longest || size > rest.size()) break;
+      const Bytes frame(rest.begin(), rest.begin() + static_cast<std::ptrdiff_t>(size));
       if (check_sum(frame) != 0) break;
-      answers.push_back(answer(frame, now_s));
-      bytes.erase(bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(size));
+      place += size;
+      const double whole_s = first_s + byte_s * static_cast<double>(place - 1);
+      const double taken_s = free_s + longest_per_byte_s * static_cast<double>(size);
+      const Span obeyed{whole_s, std::max(whole_s, taken_s) + longest_to_obey_s};
+      answers.push_back(answer(frame, obeyed));
+      free_s = obeyed.to_s + longest_per_byte_s * static_cast<double>(size_of(answers.back()));
     }
     return answers;
   }
 
-  void expire(double now_s) {
-    if (now_s >= expires_s()) voltage_mv_ = 0;
+  /// The bytes of its reply.
+  static std::size_t size_of(const Answer& answer) {
+    return answer.read.empty() ? answer.reply.size() : 5 + 2 * answer.read.size();
   }
-  double expires_s() const { return fed_s_ + 1e-3 * watchdog_in_use_ms(); }
-  int watchdog_in_use_ms() const { return watchdog_ms_ != 0 ? watchdog_ms_ : 100; }
-  /// Of those in use since the last bytes began.
-  int shortest_watchdog_ms() const { return shortest_watchdog_ms_; }
+
+  /// Whether the watchdog may act within the span.
+  bool may_expire_in(Span span) const {
+    const Span expiry = expires();
+    return voltage_mv_ != 0 && span.to_s > expiry.from_s && span.from_s < expiry.to_s;
+  }
+  /// The watchdog's part of the account, up to some moment within the span.
+  void expire(Span span) {
+    if (may_expire_in(span)) may_have_expired_ = true;
+    if (span.from_s >= expires().to_s) set_voltage(0);
+  }
+  /// Whether the pins may give this; what they give then tells whether a watchdog in doubt has acted.
+  bool agrees(double seen_v, double accuracy_v) {
+    const bool driven = std::abs(seen_v - voltage_v()) < accuracy_v, still = std::abs(seen_v) < accuracy_v;
+    if (may_have_expired_ && enabled_ && driven != still) {
+      if (still) set_voltage(0);
+      may_have_expired_ = false;
+      return true;
+    }
+    return driven;
+  }
   double voltage_v() const {
     return enabled_ ? std::clamp(1e-3 * voltage_mv_, -Board::supply_v, Board::supply_v) : 0.0;
-  }
-  int value(int address) const {
-    return address == 16 ? voltage_mv_ & 0xffff : address == 17 ? int{enabled_} : watchdog_ms_;
   }
 
  private:
   static constexpr std::size_t longest = 256;
+  static constexpr double byte_s = 1.0 / (Board::hz / Board::byte_cycles);
+  // A byte of the line's time, a round of the board's loop, and the check sum of the longest reply.
+  static constexpr double longest_to_obey_s = 0.2e-3;
+  // It takes or sends a byte per round of its loop, which an interrupt has more than half of.
+  static constexpr double longest_per_byte_s = 3 * byte_s;
+  // The board counts ticks of 64 us: the one that has begun, and a fraction of one, may be missing; it acts a
+  // round later.
+  static constexpr double earlier_s = 0.15e-3, later_s = 0.1e-3;
 
   static std::size_t size_of(const Bytes& bytes) {
     const std::uint8_t function = bytes[1];
@@ -76,17 +111,40 @@ class Account {
     return inside(first, count, 0, 9) || inside(first, count, 16, 19);
   }
 
-  Answer answer(const Bytes& frame, double now_s) {
+  Span expires() const {
+    const double watchdog_s = 1e-3 * (watchdog_ms_ != 0 ? watchdog_ms_ : 100);
+    return {fed_.from_s + watchdog_s - earlier_s, fed_.to_s + watchdog_s + later_s};
+  }
+  void set_voltage(int millivolts) {
+    voltage_mv_ = millivolts;
+    may_have_expired_ = false;
+  }
+  std::vector<int> held(int address) const {
+    if (address == 17) return {int{enabled_}};
+    if (address == 18) return {watchdog_ms_};
+    if (address != 16) return {};
+    if (may_have_expired_) return {voltage_mv_ & 0xffff, 0};
+    return {voltage_mv_ & 0xffff};
+  }
+
+  Answer answer(const Bytes& frame, Span obeyed) {
+    expire(obeyed);
     const int exception = obey(frame);
-    if (exception != 0) return {refusal(frame[1], exception), {}};
-    fed_s_ = now_s;
     Answer answer;
+    if (exception != 0) {
+      answer.reply = refusal(frame[1], exception);
+      return answer;
+    }
+    fed_ = obeyed;
     if (frame[1] == 6 || frame[1] == 0x10) {
       answer.reply = framed(Bytes(frame.begin(), frame.begin() + 6));
       return answer;
     }
     answer.reply = {1, frame[1], static_cast<std::uint8_t>(2 * word(frame, 4))};
-    for (int i = 0; i < word(frame, 4); ++i) answer.read.push_back(word(frame, 2) + i);
+    for (int i = 0; i < word(frame, 4); ++i) {
+      answer.read.push_back(word(frame, 2) + i);
+      answer.held.push_back(held(answer.read.back()));
+    }
     return answer;
   }
 
@@ -125,18 +183,18 @@ class Account {
     }
     for (std::size_t i = 0; i < list.size(); ++i) {
       const int address = first + static_cast<int>(i);
-      if (address == 16) voltage_mv_ = static_cast<std::int16_t>(list[i]);
+      if (address == 16) set_voltage(static_cast<std::int16_t>(list[i]));
       if (address == 17) enabled_ = list[i] == 1;
-      if (address == 17 && list[i] == 0) voltage_mv_ = 0;
+      if (address == 17 && list[i] == 0) set_voltage(0);
       if (address == 18) watchdog_ms_ = list[i];
-      shortest_watchdog_ms_ = std::min(shortest_watchdog_ms_, watchdog_in_use_ms());
     }
     return 0;
   }
 
-  int voltage_mv_ = 0, watchdog_ms_ = 0, shortest_watchdog_ms_ = 0;
+  int voltage_mv_ = 0, watchdog_ms_ = 0;
   bool enabled_ = false;
-  double fed_s_ = -1.0;
+  bool may_have_expired_ = false;  ///< a request came when the watchdog was about to act: perhaps it has
+  Span fed_{-1.0, -1.0};
 };
 
 class Stream {
@@ -226,7 +284,10 @@ class Stream {
 class Fuzzed {
  public:
   explicit Fuzzed(std::uint64_t seed) : stream_(seed) {
-    board_.on_byte([this](std::uint8_t byte) { replies_.push_back(byte); });
+    board_.on_byte([this](std::uint8_t byte) {
+      replies_.push_back(byte);
+      last_reply_s_ = now_s();
+    });
     board_.run_for(0.02);
   }
 
@@ -237,39 +298,24 @@ class Fuzzed {
   bool step() {
     ++bursts;
     move_shafts();
-    // Within several requests at once a short watchdog may expire, and nobody outside can tell between which.
-    const bool can_be_several = account_.watchdog_in_use_ms() >= shortest_told_ms;
-    const Bytes bytes = can_be_several && stream_.one_in(8) ? several() : stream_.burst(1);
+    const Bytes bytes = stream_.burst(stream_.one_in(8) ? 3 : 1);
     const std::pair<std::int64_t, std::int64_t> before = counts();
     replies_.clear();
-    board_.send(bytes);
     const double sent_s = now_s();
+    board_.send(bytes);
     while (board_.line_is_busy()) board_.run_until(board_.now() + Board::byte_cycles);
-    const double came_s = now_s();
     const double silence_s = 1.1e-3, replies_s = 1e-3 * (stream_.one_in(20) ? 60 : 2);
     board_.run_for(silence_s + replies_s);
-    // The watchdog may have expired between two requests of one burst: then nothing is said of this one.
-    const bool doubtful = near(account_.expires_s(), sent_s - 1e-3, came_s + 1e-3);
-    const std::vector<Account::Answer> expected = account_.take(bytes, came_s);
+    while (now_s() < last_reply_s_ + between_bytes_s) board_.run_for(between_bytes_s);
+    const std::vector<Account::Answer> expected = account_.take(bytes, sent_s);
     answers += static_cast<int>(expected.size());
-    return right_replies(bytes, expected, before, doubtful) && right_voltage(bytes);
+    return right_replies(bytes, expected, before) && right_voltage(bytes);
   }
 
  private:
-  static constexpr int shortest_told_ms = 20;
+  /// Three requests may take longer to answer; between two bytes the board may have one of them to obey.
+  static constexpr double between_bytes_s = 1e-3;
 
-  Bytes several() {
-    Bytes bytes;
-    Account trial = account_;
-    do {
-      bytes = stream_.burst(3);
-      trial = account_;
-      trial.take(bytes, now_s());
-    } while (trial.shortest_watchdog_ms() < shortest_told_ms);
-    return bytes;
-  }
-
-  static bool near(double time_s, double from_s, double to_s) { return time_s > from_s && time_s < to_s; }
   std::pair<std::int64_t, std::int64_t> counts() const {
     return {board_.counts(Encoder::cart), board_.counts(Encoder::pendulum)};
   }
@@ -289,10 +335,10 @@ class Fuzzed {
   }
 
   bool right_replies(const Bytes& bytes, const std::vector<Account::Answer>& expected,
-                     const std::pair<std::int64_t, std::int64_t>& before, bool doubtful) {
+                     const std::pair<std::int64_t, std::int64_t>& before) {
     std::size_t place = 0;
     for (const Account::Answer& answer : expected) {
-      const std::size_t size = answer.read.empty() ? answer.reply.size() : 5 + 2 * answer.read.size();
+      const std::size_t size = Account::size_of(answer);
       if (replies_.size() < place + size) return fail(bytes, "a reply is missing");
       const Bytes reply(replies_.begin() + static_cast<std::ptrdiff_t>(place),
                         replies_.begin() + static_cast<std::ptrdiff_t>(place + size));
@@ -304,8 +350,7 @@ class Fuzzed {
       const auto words = words_in(reply);
       if (!words || !std::equal(answer.reply.begin(), answer.reply.end(), reply.begin()))
         return fail(bytes, "another reply to a reading");
-      if (!right_words(*words, answer.read, before, doubtful || expected.size() > 1))
-        return fail(bytes, "wrong registers");
+      if (!right_words(*words, answer, before)) return fail(bytes, "wrong registers");
     }
     return place == replies_.size() || fail(bytes, "a reply that nobody asked for");
   }
@@ -314,8 +359,9 @@ class Fuzzed {
     return count >= std::min(one, other) - 2 && count <= std::max(one, other) + 2;
   }
 
-  bool right_words(const Words& words, const std::vector<int>& read,
-                   const std::pair<std::int64_t, std::int64_t>& before, bool doubtful) const {
+  bool right_words(const Words& words, const Account::Answer& answer,
+                   const std::pair<std::int64_t, std::int64_t>& before) const {
+    const std::vector<int>& read = answer.read;
     constexpr std::uint16_t watchdog_expired = 16;
     for (std::size_t i = 0; i < words.size(); ++i) {
       const bool pair = i + 1 < words.size();
@@ -326,7 +372,8 @@ class Fuzzed {
       if (read[i] == 4 && words[i] != 1) return false;
       if (read[i] == 5 && (words[i] & ~watchdog_expired) != 0) return false;
       if (read[i] == 7 && words[i] != 12'000) return false;
-      if (read[i] >= 16 && !doubtful && words[i] != account_.value(read[i])) return false;
+      const std::vector<int>& held = answer.held[i];
+      if (!held.empty() && std::find(held.begin(), held.end(), words[i]) == held.end()) return false;
     }
     return true;
   }
@@ -334,14 +381,15 @@ class Fuzzed {
   /// On the pins, over whole periods.
   bool right_voltage(const Bytes& bytes) {
     // The emulator moves a pin between two instructions: a pulse is known to some twelve cycles of 800.
-    constexpr double margin_s = 2e-3, accuracy_v = 0.18;
+    constexpr double accuracy_v = 0.18;
     board_.mean_v();
     const double from_s = now_s();
     board_.run_until(board_.now() + 4 * Board::pwm_cycles);
     const double seen_v = board_.mean_v();
-    if (near(account_.expires_s(), from_s - margin_s, now_s() + margin_s)) return true;
-    account_.expire(now_s());
-    if (std::abs(seen_v - account_.voltage_v()) < accuracy_v) return true;
+    const Span looked{from_s, now_s()};
+    const bool changes = account_.may_expire_in(looked);
+    account_.expire(looked);
+    if (changes || account_.agrees(seen_v, accuracy_v)) return true;
     return fail(bytes, std::to_string(seen_v) + " V instead of " + std::to_string(account_.voltage_v()));
   }
 
@@ -349,6 +397,7 @@ class Fuzzed {
   Board board_{uno_pins()};
   Account account_;
   Bytes replies_;
+  double last_reply_s_ = 0.0;
 };
 
 TEST(BoardFuzz, NeverAWrongCountNorAnUnintendedVoltage) {

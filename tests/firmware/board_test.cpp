@@ -163,6 +163,22 @@ TEST_P(Firmware, NeitherNoiseNorRefusedRequestsFeedTheWatchdog) {
   EXPECT_LT(static_cast<double>(board.last_on()) / Board::hz, asked_s + 0.101);
 }
 
+TEST_P(Firmware, ARequestFeedsTheWatchdogWhenItIsWholeWhateverFollowsIt) {
+  constexpr double watchdog_s = 0.02, before_s = 0.0012;
+  drive(6.0);
+  write(watchdog, 20);
+  board.run_for(watchdog_s - before_s);
+  Bytes burst = reading(3, 0, 1);
+  const double whole_s = board.now_s() + static_cast<double>(burst.size() * Board::byte_cycles) / Board::hz;
+  burst.resize(burst.size() + 100);  // 2 ms more, of bytes that are no request
+  board.send(burst);
+  while (board.line_is_busy()) board.run_for(1e-4);
+  EXPECT_GT(board.now_s(), whole_s + before_s);
+  EXPECT_NEAR(voltage_now(), 6.0, 2 * pwm_step_v);
+  board.run_for(watchdog_s);
+  EXPECT_NEAR(static_cast<double>(board.last_on()) / Board::hz, whole_s + watchdog_s, 0.0003);
+}
+
 TEST_P(Firmware, StopInputsTakeTheVoltageAwayAtOnceAndForGood) {
   const std::array<std::pair<StopInput, std::uint16_t>, 3> inputs = {
       {{StopInput::emergency, emergency_bit}, {StopInput::plus, plus_bit}, {StopInput::minus, minus_bit}}};
