@@ -22,6 +22,7 @@ constexpr int last_address = 65535;
 constexpr int most_registers_per_read = 125;
 constexpr int finer_without_quantisation = 1024;
 constexpr double longest_watchdog_s = 10.0;
+constexpr double longest_spin_us = 1e4;  // the loop also keeps it below half a period
 
 constexpr Words<6> backends = {"simulated", "modbus-tcp", "modbus-rtu", "gpio", "comedi", "quanser-hil"};
 constexpr Words<3> parities = {"none", "even", "odd"};
@@ -434,6 +435,7 @@ RigFile read_rig(const YamlMap& document) {
   track.finish();
   rig.fall_angle_rad = document.number("fall_angle_rad", Range{0, std::numbers::pi, true});
   rig.watchdog_s = document.number("watchdog_s", Range{0, longest_watchdog_s, true});
+  rig.spin_us = document.number_or("spin_us", 0.0, Range::within(0, longest_spin_us));
   const bool serial = uses(rig, Backend::modbus_rtu);
   if (serial && uses(rig, Backend::modbus_tcp))
     document.fail("backend", "names both Modbus links", "use one of modbus-tcp and modbus-rtu");
@@ -462,6 +464,7 @@ std::string rig_text(const RigFile& rig) {
           "}\ntrack: {limit_m: " + exact_text(rig.track_limit_m) + ", coast_s: " + exact_text(rig.coast_s) +
           "}\nfall_angle_rad: " + exact_text(rig.fall_angle_rad) +
           "\nwatchdog_s: " + exact_text(rig.watchdog_s) + "\n";
+  if (rig.spin_us > 0.0) text += "spin_us: " + exact_text(rig.spin_us) + "\n";
   if (rig.simulated) text += simulated_text(*rig.simulated);
   if (rig.modbus)
     text += modbus_text(

@@ -59,13 +59,15 @@ void append(std::vector<Finding>& to, const std::vector<Finding>& more) {
   to.insert(to.end(), more.begin(), more.end());
 }
 
-void examine_timing(const Arguments& arguments, Page& page) {
+void examine_timing(const Arguments& arguments, double spin_us, Page& page) {
+  RealtimeRequest request;
+  request.spin_us = spin_us;
   std::fprintf(stderr, "upright: measuring wake-ups, %.0f s idle and %.0f s under load\n", arguments.seconds,
                arguments.seconds);
   Progress progress("wake-ups, idle", arguments.seconds);
-  const WakeProbe idle = probe_wake_ups(page.rate_hz, arguments.seconds, false, {});
+  const WakeProbe idle = probe_wake_ups(page.rate_hz, arguments.seconds, false, request);
   progress.begin("wake-ups, loaded", arguments.seconds);
-  const WakeProbe loaded = probe_wake_ups(page.rate_hz, arguments.seconds, true, {});
+  const WakeProbe loaded = probe_wake_ups(page.rate_hz, arguments.seconds, true, request);
   page.idle = idle.late;
   page.loaded = loaded.late;
   append(page.findings, examine_grant(loaded.grant));
@@ -208,7 +210,7 @@ ExitCode run(const Arguments& arguments) {
   Page page;
   page.rate_hz = rate_of(arguments, rig);
   page.findings = examine_machine();
-  examine_timing(arguments, page);
+  examine_timing(arguments, rig ? rig->spin_us : 0.0, page);
   if (rig) examine_rig(arguments, *rig, page);
   const Health verdict = verdict_of(page.findings);
   if (arguments.as_json)

@@ -29,6 +29,11 @@ std::string fault_of_processor(const std::string& text) {
 void add_realtime(const Command& command, RealtimeRequest& realtime) {
   command.option("--priority", realtime.priority, "Real-time priority to ask for (80)").from_to(1, 99);
   command.option("--cpu", realtime.cpu, "Processor to stay on (the last one)").without(fault_of_processor);
+  constexpr double longest_spin_us = 1e4;
+  command
+      .option("--spin", realtime.spin_us,
+              "End of each period's wait to spend awake [us], in place of the rig file's spin_us")
+      .in(Range::within(0.0, longest_spin_us));
 }
 
 void add_simulated(const Command& command, std::optional<std::uint64_t>& seed, bool& fast) {

@@ -5,7 +5,11 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
 #include <fstream>
+#include <sstream>
 #include <string>
 
 namespace upright {
@@ -98,10 +102,136 @@ Finding memory_limit() {
           "memlock unlimited' into /etc/security/limits.d/upright.conf and log in again"};
 }
 
+/// Whether a list of processors as the kernel writes it, "0,2-5", has this one.
+bool lists(const std::string& list, int cpu) {
+  std::istringstream parts(list);
+  for (std::string part; std::getline(parts, part, ',');) {
+    int first = 0, last = 0;
+    const int numbers = std::sscanf(part.c_str(), "%d-%d", &first, &last);
+    if (numbers >= 1 && cpu >= first && cpu <= (numbers == 2 ? last : first)) return true;
+  }
+  return false;
+}
+
+/// What follows `key=` on the kernel's command line.
+std::string boot_option(const fs::path& root, const std::string& key) {
+  std::istringstream words(first_line(root / "proc/cmdline"));
+  for (std::string word; words >> word;)
+    if (word.rfind(key + "=", 0) == 0) return word.substr(key.size() + 1);
+  return "";
+}
+
+Finding tick(const fs::path& root, int cpu) {
+  const std::string number = std::to_string(cpu);
+  if (lists(first_line(root / "sys/devices/system/cpu/nohz_full"), cpu))
+    return {"timer tick", Health::good, "off on processor " + number + " while the loop has it alone", ""};
+  return {"timer tick", Health::poor,
+          "processor " + number + " keeps it: some hundred interrupts per second beside the loop's own",
+          "boot with nohz_full=" + number};
+}
+
+Finding rcu_callbacks(const fs::path& root, int cpu) {
+  const std::string number = std::to_string(cpu);
+  // The kernel takes the processors of nohz_full into it by itself.
+  if (lists(boot_option(root, "rcu_nocbs"), cpu) ||
+      lists(first_line(root / "sys/devices/system/cpu/nohz_full"), cpu))
+    return {"RCU callbacks", Health::good, "done elsewhere than on processor " + number, ""};
+  return {"RCU callbacks", Health::poor,
+          "processor " + number + " does the kernel's deferred freeing, at moments that nobody chooses",
+          "boot with rcu_nocbs=" + number};
+}
+
+Finding interrupts(const fs::path& root, int cpu) {
+  std::vector<std::string> here;
+  std::size_t all = 0;
+  std::error_code none;
+  for (const fs::directory_entry& entry : fs::directory_iterator(root / "proc/irq", none)) {
+    std::string served = first_line(entry.path() / "effective_affinity_list");
+    if (served.empty()) served = first_line(entry.path() / "smp_affinity_list");
+    if (served.empty()) continue;
+    ++all;
+    if (lists(served, cpu)) here.push_back(entry.path().filename().string());
+  }
+  const std::string number = std::to_string(cpu);
+  if (all == 0) return {"interrupts", Health::not_examined, "the kernel does not say who serves them", ""};
+  if (here.empty()) return {"interrupts", Health::good, "none is served by processor " + number, ""};
+  std::sort(here.begin(), here.end());
+  return {"interrupts", Health::poor,
+          std::to_string(here.size()) + " of " + std::to_string(all) + " may be served by processor " +
+              number + ", each before the loop",
+          "boot with isolcpus=managed_irq,domain," + number +
+              ", stop irqbalance, and write another processor's number into /proc/irq/" + here.front() +
+              "/smp_affinity_list and the others'"};
+}
+
+/// The kernel takes real-time threads off their processor once they have used this share of a second.
+Finding throttling(const fs::path& root) {
+  // A loop that spins for half of each period, the most it may, works for a part of the other half.
+  constexpr double enough_share = 0.9;
+  const std::string runtime = first_line(root / "proc/sys/kernel/sched_rt_runtime_us");
+  const std::string period = first_line(root / "proc/sys/kernel/sched_rt_period_us");
+  if (runtime.empty() || period.empty())
+    return {"throttling", Health::not_examined, "the kernel does not say how it limits real-time threads",
+            ""};
+  const double runtime_us = std::strtod(runtime.c_str(), nullptr),
+               period_us = std::strtod(period.c_str(), nullptr);
+  if (runtime_us < 0.0)
+    return {"throttling", Health::good, "off: a real-time thread that goes astray keeps its processor", ""};
+  const double share = period_us > 0.0 ? runtime_us / period_us : 0.0;
+  const std::string what =
+      "real-time threads get at most " + std::to_string(std::lround(100 * share)) + " % of each second";
+  if (share >= enough_share) return {"throttling", Health::good, what + ", more than the loop takes", ""};
+  return {"throttling", Health::poor, what + ": the loop may be stopped for the rest",
+          "sysctl kernel.sched_rt_runtime_us=950000 (of kernel.sched_rt_period_us=1000000)"};
+}
+
+Finding siblings(const fs::path& root, int cpu) {
+  const std::string number = std::to_string(cpu);
+  const std::string core =
+      first_line(root / ("sys/devices/system/cpu/cpu" + number + "/topology/thread_siblings_list"));
+  if (core.empty()) return {"core", Health::not_examined, "the kernel does not say who shares it", ""};
+  if (core.find_first_of(",-") == std::string::npos)
+    return {"core", Health::good, "processor " + number + " has one of its own", ""};
+  return {"core", Health::poor,
+          "shared by the processors " + core + " (SMT): what runs on the other slows the loop on " + number,
+          "boot with nosmt, or write 0 into /sys/devices/system/cpu/cpuN/online for the other one"};
+}
+
+/// USB converters that wait for more bytes before they pass on what came: FTDI's for 16 ms as delivered.
+Finding usb_latency(const fs::path& root) {
+  constexpr int shortest_ms = 1;
+  std::string slow;
+  std::size_t timers = 0;
+  std::error_code none;
+  for (const fs::directory_entry& entry : fs::directory_iterator(root / "sys/bus/usb-serial/devices", none)) {
+    const std::string timer = first_line(entry.path() / "latency_timer");
+    if (timer.empty()) continue;
+    ++timers;
+    if (std::atoi(timer.c_str()) <= shortest_ms) continue;
+    slow += (slow.empty() ? "" : ", ") + entry.path().filename().string() + " " + timer + " ms";
+  }
+  if (timers == 0) return {"USB converters", Health::good, "none with a latency timer", ""};
+  if (slow.empty()) return {"USB converters", Health::good, "latency timers of 1 ms", ""};
+  return {"USB converters", Health::poor, "replies may wait in the converter: " + slow,
+          "echo 1 | sudo tee /sys/bus/usb-serial/devices/ttyUSB0/latency_timer; for good by a udev rule: "
+          "ACTION==\"add\", SUBSYSTEM==\"usb-serial\", DRIVER==\"ftdi_sio\", ATTR{latency_timer}=\"1\""};
+}
+
+/// The processor that the loop would stay on: the last one, as enter_realtime chooses.
+int examined_cpu(const fs::path& root) {
+  if (const int cpu = loop_cpu({}); root == "/" && cpu >= 0) return cpu;
+  const std::string online = first_line(root / "sys/devices/system/cpu/online");
+  const std::size_t last = online.find_last_of(",-");
+  return std::atoi(last == std::string::npos ? online.c_str() : online.c_str() + last + 1);
+}
+
 }  // namespace
 
 std::vector<Finding> examine_machine(const fs::path& root) {
-  return {kernel(root), isolation(root), speed(root), sleep_states(root), priority_limit(), memory_limit()};
+  const int cpu = examined_cpu(root);
+  return {kernel(root),     isolation(root),          speed(root),           sleep_states(root),
+          tick(root, cpu),  rcu_callbacks(root, cpu), interrupts(root, cpu), siblings(root, cpu),
+          throttling(root), usb_latency(root),        priority_limit(),      memory_limit()};
 }
 
 std::vector<Finding> examine_grant(const RealtimeGrant& grant) {

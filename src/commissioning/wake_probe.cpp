@@ -47,15 +47,15 @@ class Load {
   std::vector<std::thread> threads_;
 };
 
-void sleep_and_note(double rate_hz, double duration_s, DurationHistogram& late) {
+void sleep_and_note(double rate_hz, double duration_s, std::int64_t spin_ns, DurationHistogram& late) {
   MonotonicClock clock;
   constexpr int untimed_periods = 10;  // the first ones bring code and stack in
   const auto period_ns = static_cast<std::int64_t>(std::llround(1e9 / rate_hz));
   LoopPhase phase{clock.now_ns() + untimed_periods * period_ns, period_ns, 0};
   const auto periods = static_cast<std::uint64_t>(std::max(1.0, duration_s * rate_hz));
   while (phase.next_tick < periods) {
-    clock.sleep_until(phase.due_ns(phase.next_tick));
-    const std::int64_t woke_ns = clock.now_ns();
+    const std::int64_t woke_ns =
+        wait_until_due(clock, phase.due_ns(phase.next_tick), spin_ns, [] { return false; });
     if (woke_ns >= phase.due_ns(phase.next_tick)) late.add(wake_at(phase, woke_ns).late_ns);
   }
 }
@@ -68,7 +68,7 @@ WakeProbe probe_wake_ups(double rate_hz, double duration_s, bool loaded, const R
   const Load load(loaded ? std::max(1u, std::thread::hardware_concurrency()) : 0);
   std::thread thread([&] {
     probe.grant = enter_realtime(request);
-    sleep_and_note(rate_hz, duration_s, probe.late);
+    sleep_and_note(rate_hz, duration_s, std::llround(1e3 * request.spin_us.value_or(0.0)), probe.late);
   });
   thread.join();
   return probe;

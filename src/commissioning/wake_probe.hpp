@@ -14,8 +14,8 @@ struct WakeProbe {
   RealtimeGrant grant;
 };
 
-/// Sleeps for `duration_s` at `rate_hz` in a thread of its own. `loaded`: meanwhile a thread per processor,
-/// without priority, keeps the machine busy with memory and system calls.
+/// Sleeps for `duration_s` at `rate_hz` in a thread of its own, and spins as `request` says. `loaded`:
+/// meanwhile a thread per processor, without priority, keeps the machine busy with memory and system calls.
 WakeProbe probe_wake_ups(double rate_hz, double duration_s, bool loaded, const RealtimeRequest& request);
 
 /// Good while 99.9 % of the wake-ups are within a tenth of the period; bad when they are not within half of

@@ -86,6 +86,7 @@ std::string loop_text(const RunSetup& setup) {
          "\n  fall_angle_rad: " + exact_text(limits.fall_angle_rad) +
          "\n  watchdog_s: " + exact_text(limits.watchdog_s) +
          "\n  most_periods_late: " + std::to_string(limits.most_periods_late) +
+         "\n  spin_us: " + exact_text(static_cast<double>(limits.spin_ns) / 1e3) +
          "\n  encoder_watch: " + encoder_assumptions_text(limits.encoders) +
          "\n  delay_is_exact: " + yes(delay.exact()) + "  # false: linear between samples\n" +
          "  delay_periods: " + exact_text(static_cast<double>(delay.whole_periods()) + delay.fraction()) +

@@ -328,8 +328,9 @@ void ControlLoop::run(LoopOutcome& outcome) noexcept {
   live_.running.store(true, std::memory_order_relaxed);
   scripted_ = controller_.is_scripted();
   while (!stopped_ && !over_) {
-    clock_.sleep_until(phase_.due_ns(phase_.next_tick));
-    const std::int64_t woke_ns = clock_.now_ns();
+    const std::int64_t woke_ns =
+        wait_until_due(clock_, phase_.due_ns(phase_.next_tick), clock_.is_virtual() ? 0 : limits_.spin_ns,
+                       [&] { return signal_.load(std::memory_order_relaxed) != 0; });
     if (asked_to_end(outcome)) {
       log_stop(woke_ns, outcome);
       break;

@@ -11,6 +11,7 @@
 #include "record/sign_record.hpp"
 #include "record/stop_report.hpp"
 #include "upright/base/error.hpp"
+#include "upright/base/yaml_reader.hpp"
 #include "upright/model/plant_file.hpp"
 
 namespace upright {
@@ -106,9 +107,23 @@ void find_zero(Rig& rig, Clock& clock, RigFile& file, double patience_s) {
 
 namespace {
 
+/// The spin asked for, or the rig file's, into the rig and the limits that the run is logged with.
+void set_spin(RunSetup& setup, const RealtimeRequest& request) {
+  // A loop of real-time priority leaves the other half of its processor to the kernel and to everybody else.
+  constexpr double largest_share = 0.5;
+  setup.rig.spin_us = request.spin_us.value_or(setup.rig.spin_us);
+  const double most_us = largest_share * 1e6 * setup.control.period_s();
+  if (setup.rig.spin_us > most_us)
+    throw ConfigError("the loop would spin for " + exact_text(setup.rig.spin_us) + " us of a period of " +
+                      exact_text(1e6 * setup.control.period_s()) +
+                      " us: give --spin, or spin_us in the rig file, at most half a period");
+  setup.limits.spin_ns = std::llround(1e3 * setup.rig.spin_us);
+}
+
 /// Everything but the rig's stop where it throws.
 SessionResult run_to_its_stop(RunSetup setup, Rig& rig, Clock& clock, const SignalFlag& signal,
                               SessionOptions options) {
+  set_spin(setup, options.realtime);
   std::optional<CpuLatencyHold> awake;
   if (!clock.is_virtual()) awake.emplace();
   Controller controller(setup.control, setup.rig.amplifier.limit_v, std::move(options.parts));
@@ -137,6 +152,8 @@ SessionResult run_to_its_stop(RunSetup setup, Rig& rig, Clock& clock, const Sign
       if (!clock.is_virtual()) setup.scheduling = enter_realtime(options.realtime);
       result.outcome.realtime = setup.scheduling.policy == "SCHED_FIFO";
       if (awake && awake->held()) setup.scheduling.note += ", processors kept out of deep sleep";
+      if (!clock.is_virtual() && setup.limits.spin_ns > 0)
+        setup.scheduling.note += ", awake for the last " + exact_text(setup.rig.spin_us) + " us of each wait";
       directory.write_start(setup);
       const std::uint64_t faults_before = page_faults();
       loop.run(result.outcome);

@@ -79,6 +79,59 @@ TEST(MachineCheck, HasARemedyForEachThingThatIsPoor) {
   EXPECT_EQ(verdict_of(findings), Health::poor);
 }
 
+/// A machine of four processors, two to a core, whose last one the loop would take.
+void put_four_processors(const FakeRoot& root) {
+  root.put("sys/devices/system/cpu/online", "0-3\n");
+  root.put("sys/devices/system/cpu/cpu3/topology/thread_siblings_list", "1,3\n");
+  root.put("proc/sys/kernel/sched_rt_runtime_us", "950000\n");
+  root.put("proc/sys/kernel/sched_rt_period_us", "1000000\n");
+}
+
+TEST(MachineCheck, KnowsWhatElseTheLoopsProcessorDoes) {
+  const FakeRoot root;
+  put_four_processors(root);
+  root.put("proc/cmdline", "quiet rcu_nocbs=0-1\n");
+  root.put("sys/devices/system/cpu/nohz_full", "(null)\n");
+  root.put("proc/irq/24/smp_affinity_list", "0-3\n");
+  root.put("proc/irq/25/smp_affinity_list", "0-2\n");
+  root.put("proc/irq/26/effective_affinity_list", "0\n");
+  root.put("proc/irq/26/smp_affinity_list", "0-3\n");
+  root.put("sys/bus/usb-serial/devices/ttyUSB0/latency_timer", "16\n");
+  root.put("sys/bus/usb-serial/devices/ttyUSB1/latency_timer", "1\n");
+  const std::vector<Finding> findings = examine_machine(root.path());
+  for (const char* subject : {"timer tick", "RCU callbacks", "interrupts", "core", "USB converters"}) {
+    EXPECT_EQ(about(findings, subject).health, Health::poor) << subject;
+    EXPECT_FALSE(about(findings, subject).remedy.empty()) << subject;
+  }
+  EXPECT_NE(about(findings, "timer tick").remedy.find("nohz_full=3"), std::string::npos);
+  EXPECT_EQ(about(findings, "interrupts").what.find("1 of 3"), 0u) << about(findings, "interrupts").what;
+  EXPECT_NE(about(findings, "USB converters").what.find("ttyUSB0 16 ms"), std::string::npos);
+  EXPECT_EQ(about(findings, "USB converters").what.find("ttyUSB1"), std::string::npos);
+  EXPECT_EQ(about(findings, "throttling").health, Health::good);
+}
+
+TEST(MachineCheck, KnowsAProcessorOfTheLoopsOwn) {
+  const FakeRoot root;
+  put_four_processors(root);
+  root.put("sys/devices/system/cpu/cpu3/topology/thread_siblings_list", "3\n");
+  root.put("sys/devices/system/cpu/nohz_full", "2-3\n");
+  root.put("proc/irq/24/smp_affinity_list", "0-1\n");
+  root.put("sys/bus/usb-serial/devices/ttyUSB0/latency_timer", "1\n");
+  const std::vector<Finding> findings = examine_machine(root.path());
+  for (const char* subject :
+       {"timer tick", "RCU callbacks", "interrupts", "core", "throttling", "USB converters"})
+    EXPECT_EQ(about(findings, subject).health, Health::good) << subject;
+}
+
+TEST(MachineCheck, SaysWhereRealTimeThreadsGetTooLittle) {
+  const FakeRoot root;
+  put_four_processors(root);
+  root.put("proc/sys/kernel/sched_rt_runtime_us", "500000\n");
+  EXPECT_EQ(about(examine_machine(root.path()), "throttling").health, Health::poor);
+  root.put("proc/sys/kernel/sched_rt_runtime_us", "-1\n");
+  EXPECT_EQ(about(examine_machine(root.path()), "throttling").health, Health::good);
+}
+
 TEST(MachineCheck, JudgesWhatWasGranted) {
   RealtimeGrant grant;
   EXPECT_EQ(verdict_of(examine_grant(grant)), Health::poor);

@@ -5,16 +5,15 @@
 #include <filesystem>
 #include <functional>
 #include <numbers>
-#include <random>
 #include <set>
 
 #include "temporary_folder.hpp"
 #include "upright/base/error.hpp"
+#include "upright/base/yaml_reader.hpp"
 #include "upright/hal/simulated_rig.hpp"
 #include "upright/model/plant_file.hpp"
 #include "upright/record/replay.hpp"
 #include "upright/runtime/session.hpp"
-#include "upright/runtime/sleep_policy.hpp"
 
 namespace upright {
 namespace {
@@ -23,44 +22,6 @@ namespace fs = std::filesystem;
 
 using test::TemporaryFolder;
 using test::text_of;
-
-TEST(SleepPolicy, KeepsThePhaseAndRunsALateCycleOnce) {
-  LoopPhase phase{1000, 100, 0};
-  Wake wake = wake_at(phase, 1000);
-  EXPECT_EQ(wake.tick, 0u);
-  EXPECT_EQ(wake.late_ns, 0);
-  wake = wake_at(phase, 1130);  // late within its own period
-  EXPECT_EQ(wake.tick, 1u);
-  EXPECT_EQ(wake.missed, 0u);
-  EXPECT_EQ(wake.late_ns, 30);
-  wake = wake_at(phase, 1555);  // cycles 2, 3 and 4 are overtaken
-  EXPECT_EQ(wake.tick, 5u);
-  EXPECT_EQ(wake.missed, 3u);
-  EXPECT_EQ(wake.late_ns, 355);
-  EXPECT_EQ(phase.due_ns(phase.next_tick), 1600);
-}
-
-TEST(SleepPolicy, NeverRunsATickTwiceNorMovesThePhase) {
-  std::mt19937_64 random(3);
-  std::uniform_int_distribution<std::int64_t> pause(0, 450);
-  LoopPhase phase{500, 100, 0};
-  std::int64_t now = 500;
-  std::uint64_t cycles = 0, missed = 0, last = 0;
-  for (int i = 0; i < 10000; ++i) {
-    now = std::max(now, phase.due_ns(phase.next_tick));
-    const Wake wake = wake_at(phase, now);
-    if (i > 0) {
-      ASSERT_GT(wake.tick, last);
-    }
-    last = wake.tick;
-    ++cycles;
-    missed += wake.missed;
-    ASSERT_EQ(cycles + missed, wake.tick + 1);
-    ASSERT_LE(phase.due_ns(wake.tick), now);
-    ASSERT_GT(phase.due_ns(phase.next_tick), now);
-    now += pause(random);
-  }
-}
 
 RigFile simulated_file(const std::string& plant = "exponential") {
   RigFile rig = read_rig_file(UPRIGHT_SOURCE_DIR "/config/rigs/simulated.yaml");
@@ -553,6 +514,27 @@ TEST(Session, AFullDiskStopsTheMotorAndKeepsTheRows) {
   EXPECT_GT(run.record.samples.rows.size(), 1000u);
   EXPECT_TRUE(run.record.outcome.has_value());
   EXPECT_FALSE(replay(run.record).first_mismatch.has_value());
+}
+
+TEST(Session, LogsTheSpinAndRefusesOneOfMostOfThePeriod) {
+  TemporaryFolder folder;
+  RunSetup setup = setup_for(simulated_file(), 0.2);
+  setup.rig.spin_us = 200.0;
+  MonotonicClock clock;
+  const auto run_with = [&](std::optional<double> spin_us) {
+    const auto rig = make_simulated_rig(setup.rig, clock, {setup.seed, setup.theta0_rad});
+    rig->open();
+    const SignalFlag signal{0};
+    SessionOptions options;
+    options.out = folder.path();
+    options.realtime.spin_us = spin_us;
+    const SessionResult result = run_session(setup, *rig, clock, signal, std::move(options));
+    return YamlMap::from_file(result.directory / "run.yaml").map("loop").number("spin_us");
+  };
+  EXPECT_EQ(run_with({}), 200.0);
+  EXPECT_EQ(run_with(60.0), 60.0);
+  EXPECT_EQ(run_with(0.0), 0.0);
+  EXPECT_THROW(run_with(600.0), ConfigError);
 }
 
 TEST(Session, ALogThatLosesRowsStopsTheMotorAndSaysSo) {

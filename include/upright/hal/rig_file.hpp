@@ -108,6 +108,7 @@ struct RigFile {
   double coast_s = 0.0;
   double fall_angle_rad = 0.0;  ///< the loop stops where |theta| reaches it
   double watchdog_s = 0.0;      ///< the motor is at zero volts this long after the last good exchange
+  double spin_us = 0.0;         ///< the end of each wait that the loop spends awake, looking at the clock
   std::optional<SimulatedRig> simulated;
   std::optional<ModbusRig> modbus;
   std::optional<ComediRig> comedi;

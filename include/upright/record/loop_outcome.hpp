@@ -42,6 +42,7 @@ struct LoopLimits {
   std::uint64_t most_periods_late = 0;
   /// A cart without voltage rolls on for so many seconds times its velocity.
   double coast_s = 0.0;
+  std::int64_t spin_ns = 0;          ///< of each wait, at its end, spent awake
   EncoderAssumptions encoders = {};  ///< of the watch on the encoders
   // What is known beforehand and may be why it ends: for sentence_of.
   bool delay_exceeded = false;  ///< the plant does not bear the loop's delay, or its gains

@@ -2,14 +2,16 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 
 #include "upright/record/realtime_grant.hpp"
 
 namespace upright {
 
 struct RealtimeRequest {
-  int priority = 80;  ///< of SCHED_FIFO
-  int cpu = -1;       ///< processor to stay on; -1: the last one allowed, when there are several
+  int priority = 80;              ///< of SCHED_FIFO
+  int cpu = -1;                   ///< processor to stay on; -1: the last one allowed, when there are several
+  std::optional<double> spin_us;  ///< in place of the rig file's spin_us
 };
 
 /// Asks for SCHED_FIFO, a processor and locked memory for the calling thread, touches its stack, and says

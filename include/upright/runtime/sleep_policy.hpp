@@ -1,7 +1,10 @@
-// When the next cycle is due: a free function over a small state, so that it can be tested without a clock.
+// When the next cycle is due, and how to wait for it: free functions over a small state, so that they can be
+// tested without the machine's clock.
 #pragma once
 
 #include <cstdint>
+
+#include "upright/hal/clock.hpp"
 
 namespace upright {
 
@@ -32,6 +35,19 @@ inline Wake wake_at(LoopPhase& phase, std::int64_t now_ns) noexcept {
   wake.tick = phase.next_tick + wake.missed;
   phase.next_tick = wake.tick + 1;
   return wake;
+}
+
+/// Sleeps until `spin_ns` before `due_ns` and then looks at the clock until it is due: who is awake already
+/// is not late by the time that the kernel takes to wake a thread. Returns the time. It is before `due_ns`
+/// only when a signal ended the sleep, or `given_up()` the spinning.
+template <class GivenUp>
+std::int64_t wait_until_due(Clock& clock, std::int64_t due_ns, std::int64_t spin_ns,
+                            const GivenUp& given_up) noexcept {
+  const std::int64_t spin_from_ns = due_ns - spin_ns;
+  clock.sleep_until(spin_from_ns);
+  std::int64_t now_ns = clock.now_ns();
+  while (now_ns >= spin_from_ns && now_ns < due_ns && !given_up()) now_ns = clock.now_ns();
+  return now_ns;
 }
 
 }  // namespace upright
