@@ -3,18 +3,21 @@
 #include <algorithm>
 #include <sstream>
 
+#include "residual_test_table.hpp"
+
 namespace upright {
 
-ResidualTests examine_fit(const FitData& data, const FitPoint& fitted) {
-  ResidualTests structure = examine_residuals(data, fitted);
+ResidualTests examine_fit(const FitData& data, const FitPoint& fitted, const SelectionPolicy& policy,
+                          const SearchBudget& budget) {
+  ResidualTests structure = examine_residuals(data, fitted, policy);
   FitPoint point = fitted;
   point.noise = sensors_only(fitted.noise);
   const FitResult plain = fit_initial_states(data, point);
   structure.noise_ratio = whitened_rms(plain);
   point = plain.point;
   point.noise = as_slow_as_left(fitted.noise, structure);
-  structure.excess = structure.noise_ratio / simulation_floor(data, point).highest;
-  conclude_tests(structure);
+  structure.excess = structure.noise_ratio / simulation_floor(data, point, budget.floor_draws).highest;
+  conclude_tests(structure, policy.residual);
   return structure;
 }
 
@@ -23,7 +26,7 @@ SimulationFloor held_out_floor(const Search& search, const Hypothesis& judged,
   if (search.held_data().segments.empty()) return {};
   FitPoint point = judged.held.point;
   point.noise = as_slow_as_left(judged.train.point.noise, structure);
-  return simulation_floor(search.held_data(), point);
+  return simulation_floor(search.held_data(), point, search.budget().floor_draws);
 }
 
 void compare_held_out(const Search& search, const Hypothesis& judged, ResidualTests& structure) {
@@ -32,7 +35,7 @@ void compare_held_out(const Search& search, const Hypothesis& judged, ResidualTe
   // What is left need not be such noise: all runs together may be further off than such noise makes them, and
   // held-out ones by as much again.
   const double excess = search.simulate(told).gap / held_out_floor(search, told, structure).highest;
-  if (!(excess > most_excess * std::max(1.0, structure.excess))) return;
+  if (!(excess > search.policy().residual.most_excess * std::max(1.0, structure.excess))) return;
   structure.structured = true;
   std::ostringstream text;
   text.precision(3);

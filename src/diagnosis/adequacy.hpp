@@ -9,7 +9,8 @@
 namespace upright {
 
 /// What a fit leaves at `fitted`, judged: its structure, and how far off a plain simulation is.
-ResidualTests examine_fit(const FitData& data, const FitPoint& fitted);
+ResidualTests examine_fit(const FitData& data, const FitPoint& fitted, const SelectionPolicy& policy,
+                          const SearchBudget& budget);
 
 /// What noise as slow as what is left makes of a plain simulation of the held-out data. 1 where none is held
 /// out.

@@ -9,49 +9,42 @@ namespace upright {
 
 namespace {
 
-/// Standard deviation of what is believed of a number in a plant file, relative to its value: data sheets and
-/// scales are a few percent off; friction measured on another day is more.
-constexpr double base_belief = 0.05;
-constexpr double friction_belief = 0.10;
-/// A scale may be wrong, but not by any amount.
-constexpr double scale_belief = 0.25;
-/// How well a pendulum at rest shows where down is.
-constexpr double rest_belief_rad = 1e-3;
-
 bool is_named(std::size_t effect, std::string_view kind) {
   return effect_registry()[effect].kind == kind;
 }
 
 /// Of the forces at work in these runs, whatever the size of the rig: a few percent of the motor's.
-double order_of_magnitude(const ParameterInfo& info, const DataRange& range) {
-  const double force = 0.03 * range.largest_force_n;
+double order_of_magnitude(const ParameterInfo& info, const DataRange& range, const PriorPolicy& prior) {
+  const double force = prior.share_of_motor_force * range.largest_force_n;
   if (info.unit == "N") return std::max(info.typical, force);
   if (info.unit == "N/(m/s)" && range.largest_speed_mps > 0.0)
     return std::max(info.typical, force / range.largest_speed_mps);
   return info.typical;
 }
 
-FreeParameter free_parameter(std::size_t effect, std::size_t index, const DataRange& range) {
+FreeParameter free_parameter(std::size_t effect, std::size_t index, const DataRange& range,
+                             const PriorPolicy& prior) {
   const ParameterInfo& info = effect_registry()[effect].parameters[index];
   FreeParameter p;
   p.effect = effect;
   p.index = index;
   p.low = info.range.low;
   p.high = info.range.high;
-  p.scale = order_of_magnitude(info, range);
+  p.scale = order_of_magnitude(info, range, prior);
   if (p.scale == 0.0) p.scale = 0.1;
   if (info.range.low_open && info.range.low == 0.0) p.low = 1e-3 * p.scale;
   return p;
 }
 
-/// A force along the track counts as one that repeats when the run passes three of its crests.
-double longest_pitch_m(const DataRange& range) {
-  return std::max(0.002, (range.cart_high_m - range.cart_low_m) / 3.0);
+/// A force along the track counts as one that repeats when the run passes some of its crests.
+double longest_pitch_m(const DataRange& range, const PriorPolicy& prior) {
+  return std::max(prior.least_longest_pitch_m,
+                  (range.cart_high_m - range.cart_low_m) / prior.crests_of_pitch);
 }
 
 }  // namespace
 
-DataRange range_of(const std::vector<Measurement>& runs, const Plant& plant) {
+DataRange range_of(const std::vector<Measurement>& runs, const Plant& plant, const ExcitationPolicy& policy) {
   DataRange range;
   bool first = true;
   double sum = 0.0, count = 0.0;
@@ -72,7 +65,7 @@ DataRange range_of(const std::vector<Measurement>& runs, const Plant& plant) {
       count += 1.0;
     }
     const std::size_t stride =
-        std::max<std::size_t>(1, static_cast<std::size_t>(0.02 / run.median_period_s()));
+        std::max<std::size_t>(1, static_cast<std::size_t>(policy.speed_window_s / run.median_period_s()));
     for (std::size_t k = stride; k < run.size(); k += stride)
       range.largest_speed_mps =
           std::max(range.largest_speed_mps, std::abs(run.cart_m[k] - run.cart_m[k - stride]) /
@@ -83,58 +76,57 @@ DataRange range_of(const std::vector<Measurement>& runs, const Plant& plant) {
   return range;
 }
 
-bool moves_enough(const std::vector<Measurement>& runs) {
-  constexpr double least_steps = 30.0;
+bool moves_enough(const std::vector<Measurement>& runs, const ExcitationPolicy& policy) {
   const auto range = [](const std::vector<double>& values) {
     const auto [low, high] = std::minmax_element(values.begin(), values.end());
     return values.empty() ? 0.0 : *high - *low;
   };
   return std::any_of(runs.begin(), runs.end(), [&](const Measurement& run) {
-    return range(run.cart_m) > least_steps * std::sqrt(12.0) * run.cart_noise_m() ||
-           range(run.theta_rad) > least_steps * std::sqrt(12.0) * run.theta_noise_rad();
+    return range(run.cart_m) > policy.least_steps * std::sqrt(12.0) * run.cart_noise_m() ||
+           range(run.theta_rad) > policy.least_steps * std::sqrt(12.0) * run.theta_noise_rad();
   });
 }
 
-std::vector<FreeParameter> free_parameters(std::size_t effect, const DataRange& range) {
+std::vector<FreeParameter> free_parameters(std::size_t effect, const DataRange& range,
+                                           const PriorPolicy& prior) {
   const EffectInfo& info = effect_registry()[effect];
   std::vector<FreeParameter> free;
   for (std::size_t i = 0; i < info.parameters.size(); ++i) {
-    FreeParameter p = free_parameter(effect, i, range);
+    FreeParameter p = free_parameter(effect, i, range, prior);
     const std::string_view name = info.parameters[i].name;
     if (info.enters == Enters::cart && info.dry && info.parameters[i].unit == "N" &&
         range.largest_force_n > 0.0) {
       // Dry friction that the motor cannot overcome would hold the cart for good.
-      constexpr double beyond_motor = 2.0;
-      p.high = std::min(p.high, beyond_motor * range.largest_force_n);
+      p.high = std::min(p.high, prior.most_share_of_motor_force * range.largest_force_n);
     }
     if (name == "shape") {
-      p.prior_mean = 2.0;
-      p.prior_sigma = 0.5;
-      p.low = 0.5;
-      p.high = 4.0;
+      p.prior_mean = prior.shape_mean;
+      p.prior_sigma = prior.shape_sigma;
+      p.low = prior.least_shape;
+      p.high = prior.most_shape;
     } else if (is_named(effect, "stribeck_friction") && name == "velocity_mps") {
-      p.low = 1e-3;
-      p.high = std::max(0.02, 0.5 * range.largest_speed_mps);
+      p.low = prior.least_stribeck_mps;
+      p.high = std::max(prior.fastest_stribeck_mps, prior.most_stribeck_share * range.largest_speed_mps);
     } else if (name == "pitch_m") {
-      p.low = 5e-4;
-      p.high = longest_pitch_m(range);
+      p.low = prior.least_pitch_m;
+      p.high = longest_pitch_m(range, prior);
     } else if (name == "center_m") {
       p.prior_mean = range.cart_mean_m;
-      p.prior_sigma = 0.5;
+      p.prior_sigma = prior.spring_center_m;
     } else if (name == "stiffness_n_per_m" && is_named(effect, "bristle_friction")) {
-      p.low = 5.0;
-      p.high = 3e4;
+      p.low = prior.least_bristle_stiffness_n_per_m;
+      p.high = prior.most_bristle_stiffness_n_per_m;
     } else if (is_named(effect, "input_delay")) {
-      p.high = 0.2;
+      p.high = prior.most_delay_s;
     } else if (is_named(effect, "motor_lag")) {
-      p.low = 0.2 * range.shortest_period_s;  // a lag well below the sample period does not show
-      p.high = 0.5;
+      p.low = prior.least_lag_periods * range.shortest_period_s;
+      p.high = prior.most_lag_s;
     } else if (name == "scale") {
-      p.low = 0.3;
-      p.high = 3.0;
+      p.low = prior.least_scale;
+      p.high = prior.most_scale;
       p.scale = 0.1;
       p.prior_mean = 1.0;
-      p.prior_sigma = scale_belief;
+      p.prior_sigma = prior.scale;
     }
     free.push_back(p);
   }
@@ -153,25 +145,27 @@ bool is_plainer(std::size_t a, std::size_t b) {
   return a < b;
 }
 
-std::vector<FreeParameter> believed_parameters(const Plant& plant, std::size_t effect,
-                                               const DataRange& range) {
+std::vector<FreeParameter> believed_parameters(const Plant& plant, std::size_t effect, const DataRange& range,
+                                               const PriorPolicy& prior) {
   const EffectInfo& info = effect_registry()[effect];
   const PlantEffect* have = plant.find(effect);
   std::vector<FreeParameter> free;
   for (std::size_t i = 0; i < info.parameters.size(); ++i) {
-    FreeParameter p = free_parameter(effect, i, range);
+    FreeParameter p = free_parameter(effect, i, range, prior);
     p.prior_mean = have != nullptr ? have->values[i] : info.parameters[i].neutral;
-    const double belief = info.enters == Enters::parameter ? base_belief : friction_belief;
-    p.prior_sigma = belief * std::max(std::abs(p.prior_mean), 0.2 * info.parameters[i].typical);
-    p.scale = std::max(std::abs(p.prior_mean), 0.2 * info.parameters[i].typical);
+    const double belief = info.enters == Enters::parameter ? prior.base_parameter : prior.friction;
+    const double size =
+        std::max(std::abs(p.prior_mean), prior.least_share_of_typical * info.parameters[i].typical);
+    p.prior_sigma = belief * size;
+    p.scale = size;
     if (is_named(effect, "angle_offset") && have == nullptr) {
       // An incremental encoder knows its zero to a count, and friction lets a pendulum rest a little off.
-      p.prior_sigma = std::max(range.theta_resolution_rad, rest_belief_rad);
+      p.prior_sigma = std::max(range.theta_resolution_rad, prior.rest_rad);
       p.scale = p.prior_sigma;
     }
     if (info.enters == Enters::parameter) {
-      p.low = 0.3;
-      p.high = 3.0;
+      p.low = prior.least_scale;
+      p.high = prior.most_scale;
       p.scale = 0.1;
     }
     free.push_back(p);
@@ -220,20 +214,17 @@ std::vector<std::size_t> candidate_effects(const Plant& plant, const DataRange& 
 
 namespace {
 
-/// As many as 5 m of track need down to a pitch of 1 mm. Over a longer one (or in another unit) the shortest
-/// pitches are not looked for: the time that would take grows with the travel without end.
-constexpr double most_frequencies = 20000.0;
-
 /// Pitches at which a sine over the track explains most of the residual force: a periodogram over x.
 std::vector<std::vector<double>> cogging_starts(const std::vector<std::pair<double, double>>& force_residual,
-                                                const DataRange& range) {
+                                                const DataRange& range, const PriorPolicy& prior,
+                                                const SearchBudget& budget) {
   std::vector<std::pair<double, std::vector<double>>> found;
   const double travel = range.cart_high_m - range.cart_low_m;
-  if (force_residual.size() < 50 || travel <= 0.0) return {{0.3, 0.02, 0.0}};
-  const double largest = longest_pitch_m(range);
+  if (force_residual.size() < budget.least_residual_samples || travel <= 0.0) return {{0.3, 0.02, 0.0}};
+  const double largest = longest_pitch_m(range, prior);
   // Frequencies over the track one half-cycle apart, so that no crest is missed.
   const double spacing = 0.25 / travel;
-  const double smallest = std::max(0.001, 1.0 / (1.0 / largest + most_frequencies * spacing));
+  const double smallest = std::max(0.001, 1.0 / (1.0 / largest + budget.most_frequencies * spacing));
   for (double f = 1.0 / largest; f <= 1.0 / smallest; f += spacing) {
     double ss = 0.0, sc = 0.0, cc = 0.0, sy = 0.0, cy = 0.0, s1 = 0.0, c1 = 0.0, y1 = 0.0;
     for (const auto& [x, y] : force_residual) {
@@ -266,7 +257,7 @@ std::vector<std::vector<double>> cogging_starts(const std::vector<std::pair<doub
       return std::abs(1.0 / s[1] - 1.0 / start[1]) < 4.0 * spacing;
     });
     if (!near) starts.push_back(start);
-    if (starts.size() == 2) break;
+    if (starts.size() == budget.most_pitches) break;
   }
   return starts.empty() ? std::vector<std::vector<double>>{{0.3, 0.02, 0.0}} : starts;
 }
@@ -274,10 +265,11 @@ std::vector<std::vector<double>> cogging_starts(const std::vector<std::pair<doub
 }  // namespace
 
 std::vector<std::vector<double>> search_starts(std::size_t effect, const DataRange& range,
-                                               const std::vector<std::pair<double, double>>& force_residual) {
+                                               const std::vector<std::pair<double, double>>& force_residual,
+                                               const PriorPolicy& prior, const SearchBudget& budget) {
   const EffectInfo& info = effect_registry()[effect];
   const double speed = range.largest_speed_mps, volts = range.largest_voltage_v;
-  if (is_named(effect, "cogging_force")) return cogging_starts(force_residual, range);
+  if (is_named(effect, "cogging_force")) return cogging_starts(force_residual, range, prior, budget);
   if (is_named(effect, "voltage_saturation"))
     return {{0.9 * volts}, {0.7 * volts}, {0.5 * volts}, {0.3 * volts}};
   if (is_named(effect, "voltage_dead_zone")) return {{0.1}, {0.4}};
@@ -292,7 +284,7 @@ std::vector<std::vector<double>> search_starts(std::size_t effect, const DataRan
   std::vector<double> start;
   for (const ParameterInfo& parameter : info.parameters)
     start.push_back(std::isfinite(parameter.neutral)
-                        ? (parameter.neutral == 1.0 ? 1.0 : 0.1 * order_of_magnitude(parameter, range))
+                        ? (parameter.neutral == 1.0 ? 1.0 : 0.1 * order_of_magnitude(parameter, range, prior))
                         : parameter.typical);
   if (info.parameters.size() > 1 || !(info.parameters[0].range.low < 0.0)) return {start};
   // A dry level is not below zero: where no other friction is known, nothing grows from nothing.

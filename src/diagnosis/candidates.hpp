@@ -4,6 +4,8 @@
 
 #include <vector>
 
+#include "search_budget.hpp"
+#include "selection_policy.hpp"
 #include "upright/estimation/fit.hpp"
 
 namespace upright {
@@ -21,18 +23,19 @@ struct DataRange {
   double theta_resolution_rad = 0.0;
 };
 
-DataRange range_of(const std::vector<Measurement>& runs, const Plant& plant);
+DataRange range_of(const std::vector<Measurement>& runs, const Plant& plant, const ExcitationPolicy& policy);
 
 /// Whether anything moved far enough to show an effect: well beyond the sensors' steps.
-bool moves_enough(const std::vector<Measurement>& runs);
+bool moves_enough(const std::vector<Measurement>& runs, const ExcitationPolicy& policy);
 
 /// The parameters of an effect as free ones.
-std::vector<FreeParameter> free_parameters(std::size_t effect, const DataRange& range);
+std::vector<FreeParameter> free_parameters(std::size_t effect, const DataRange& range,
+                                           const PriorPolicy& prior);
 
 /// A correction of something the plant file already says, with the belief that it is a few percent off at
 /// most.
-std::vector<FreeParameter> believed_parameters(const Plant& plant, std::size_t effect,
-                                               const DataRange& range);
+std::vector<FreeParameter> believed_parameters(const Plant& plant, std::size_t effect, const DataRange& range,
+                                               const PriorPolicy& prior);
 
 /// Corrections that every fit leaves room for: the base parameters (cart_mass, ...) that these data can show,
 /// and the zero of the angle within a count.
@@ -48,6 +51,7 @@ bool is_plainer(std::size_t a, std::size_t b);
 /// Parameter values from which to search for an effect; several where the misfit has several valleys.
 /// `force_residual` pairs of (x, residual force) point at the pitch of periodic forces.
 std::vector<std::vector<double>> search_starts(std::size_t effect, const DataRange& range,
-                                               const std::vector<std::pair<double, double>>& force_residual);
+                                               const std::vector<std::pair<double, double>>& force_residual,
+                                               const PriorPolicy& prior, const SearchBudget& budget);
 
 }  // namespace upright

@@ -22,11 +22,6 @@ namespace {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
-/// However much it scatters, by this at most.
-constexpr double most_scattered = 10.0 * indistinguishable_evidence;
-/// A correction of the plant file is there when it is this many standard errors from nothing.
-constexpr double least_correction_z = 4.0;
-
 class Diagnostician {
  public:
   Diagnostician(const Plant& plant, const std::vector<Measurement>& runs, const DiagnosisOptions& options,
@@ -34,10 +29,10 @@ class Diagnostician {
       : plant_(plant),
         runs_(runs),
         options_(options),
-        data_(checked(split(runs, which))),
+        data_(checked(split(runs, which, policy_.excitation.arm_m, policy_.excitation.speed_window_s))),
         work_samples_(options.search_bound * samples_of(data_)),
         bound_(work_samples_),
-        search_(plant_, runs_, bounded(data_.train), bounded(data_.held)),
+        search_(plant_, runs_, bounded(data_.train), bounded(data_.held), policy_, budget_),
         selection_(search_, options, result_) {}
 
   Diagnosis run() {
@@ -65,7 +60,8 @@ class Diagnostician {
   /// Of what is unexplained: whether held-out runs excite what is missing still, and the others do not. They
   /// alone show it, or spoke to the end against what the others show beyond doubt.
   bool lacks_what_was_held_out() const {
-    return selection_.contradicted() || !examine_fit(data_.train, final_.train.point).structured;
+    return selection_.contradicted() ||
+           !examine_fit(data_.train, final_.train.point, policy_, budget_).structured;
   }
 
  private:
@@ -92,8 +88,7 @@ class Diagnostician {
   void examine_what_was_found() {
     result_.bound_reached = true;
     if (decided_) return;
-    constexpr double share = 0.25;  // of the search's bound: examining takes about a tenth of a usual search
-    bound_.grant(share * work_samples_);
+    bound_.grant(budget_.examination_share * work_samples_);
     try {
       conclude(settle());
     } catch (const Interrupted&) {
@@ -124,7 +119,7 @@ class Diagnostician {
     result_.noise = h.train.point.noise;
     result_.model = selection_.found().empty() ? plant_ : model_with(selection_.found(), h.train.point.plant);
     result_.residual = "not examined: the search was not finished";
-    result_.verdict = moves_enough(runs_) ? Verdict::unexplained : Verdict::not_excited;
+    result_.verdict = moves_enough(runs_, policy_.excitation) ? Verdict::unexplained : Verdict::not_excited;
   }
 
   /// Begins the account of what was found.
@@ -144,7 +139,7 @@ class Diagnostician {
     FitData all = data_.train;
     all.segments.insert(all.segments.end(), data_.held.segments.begin(), data_.held.segments.end());
     // At what all runs say, so that what few training runs left uncertain is not taken for something missing.
-    ResidualTests left = examine_fit(all, known_.train.point);
+    ResidualTests left = examine_fit(all, known_.train.point, policy_, budget_);
     if (!left.structured) compare_held_out(search_, final_, left);
     if (!left.structured) doubt_what_cannot_be(left);
     return left;
@@ -179,7 +174,7 @@ class Diagnostician {
           place = a;
         }
       }
-      if (!(least < least_correction_z)) break;
+      if (!(least < policy_.correction.least_z)) break;
       const auto at = static_cast<Eigen::Index>(place);
       const double step = h.free[open[place]].prior_mean - value[at];
       const Eigen::VectorXd column = covariance.col(at) / std::max(covariance(at, at), 1e-300);
@@ -221,7 +216,7 @@ class Diagnostician {
       options_.tell(0.9, "fitting all runs");
       known_ = search_.on_all(final_);
       const auto includes_nothing = [&](std::size_t effect) {
-        return search_.certainty(known_, effect) < 2.0;
+        return search_.certainty(known_, effect) < policy_.correction.least_certainty_of_all_runs;
       };
       const auto gone = std::remove_if(corrections.begin(), corrections.end(), includes_nothing);
       if (gone == corrections.end()) return;
@@ -235,8 +230,8 @@ class Diagnostician {
     const FreeParameter& p = h.free[j];
     if (effect_registry()[p.effect].enters == Enters::parameter || plant_.find(p.effect) == nullptr)
       return false;
-    constexpr double far = 3.0;
-    return std::abs(h.train.point.plant.find(p.effect)->values[p.index] - p.prior_mean) < far * p.prior_sigma;
+    return std::abs(h.train.point.plant.find(p.effect)->values[p.index] - p.prior_mean) <
+           policy_.correction.within_belief * p.prior_sigma;
   }
 
   /// Corrections in the order of how much each closes: of sensors first, then of the plant's numbers, which
@@ -306,20 +301,19 @@ class Diagnostician {
   void trace_residuals() {
     if (data_.held.segments.empty()) return;
     const Noise noise = final_.train.point.noise;
-    result_.residual_after = smooth_residuals(data_.held, final_.held.point);
+    result_.residual_after = smooth_residuals(data_.held, final_.held.point, policy_.location);
     Hypothesis as_given = search_.only({}, final_, &noise);
     search_.judge(as_given, noise);
-    result_.residual_before = smooth_residuals(data_.held, as_given.held.point);
+    result_.residual_before = smooth_residuals(data_.held, as_given.held.point, policy_.location);
   }
 
   /// A scale at the end of what it may be stands for something else.
   void doubt_what_cannot_be(ResidualTests& structure) const {
-    constexpr double nearly = 1e-3;
     for (const std::size_t effect : all_found()) {
       const auto [scale, parameter] = scale_of(effect);
       if (parameter == nullptr) continue;
-      const bool low = scale < parameter->low * (1.0 + nearly);
-      if (!low && scale < parameter->high * (1.0 - nearly)) continue;
+      const bool low = scale < parameter->low * (1.0 + policy_.correction.end_of_range);
+      if (!low && scale < parameter->high * (1.0 - policy_.correction.end_of_range)) continue;
       structure.structured = true;
       std::ostringstream text;
       text.precision(3);
@@ -339,10 +333,11 @@ class Diagnostician {
 
   /// Numbers of the plant file that are off by more than a data sheet is.
   void note_doubtful_numbers() {
-    constexpr double far = 0.2;
     for (const std::size_t effect : all_found()) {
       const double scale = scale_of(effect).first;
-      if (effect_registry()[effect].enters != Enters::parameter || std::abs(std::log(scale)) < far) continue;
+      if (effect_registry()[effect].enters != Enters::parameter ||
+          std::abs(std::log(scale)) < policy_.correction.doubtful_scale)
+        continue;
       std::ostringstream text;
       text.precision(3);
       text << "check " << kind_of(effect) << " another way: " << scale
@@ -398,7 +393,8 @@ class Diagnostician {
     } else if (!result_.effects.empty()) {
       result_.verdict = Verdict::explained;
     } else {
-      result_.verdict = moves_enough(runs_) ? Verdict::no_discrepancy : Verdict::not_excited;
+      result_.verdict =
+          moves_enough(runs_, policy_.excitation) ? Verdict::no_discrepancy : Verdict::not_excited;
     }
     decided_ = true;
   }
@@ -425,14 +421,14 @@ class Diagnostician {
         if (!on_screening_subset)
           on_screening_subset = search_.on_screening_subset(selection_.current()).train.objective;
         // So much worse on a part, it is no better on the whole.
-        if (!(alternative.train.objective - *on_screening_subset < most_scattered)) continue;
+        if (!(alternative.train.objective - *on_screening_subset <
+              policy_.distinction.most_scattered_evidence))
+          continue;
         alternative.train.point.noise = selection_.current().train.point.noise;
         search_.refit(*without, alternative);
         const Improvement worse = compare(alternative, selection_.current());
         if (!search_.is_plausible(alternative, other)) continue;
-        const bool same =
-            worse.train < indistinguishable_evidence || (worse.train < most_scattered && worse.t_value < 2.0);
-        if (!same) continue;
+        if (!is_indistinguishable(worse.train, worse.t_value, policy_.distinction)) continue;
         declare(effect, other);
         alternatives.emplace_back(other, alternative.train.point.plant);
       }
@@ -457,6 +453,8 @@ class Diagnostician {
     listed(effect).indistinguishable_from.push_back(other);
   }
 
+  const SelectionPolicy policy_{};
+  const SearchBudget budget_{};
   const Plant plant_;
   const std::vector<Measurement>& runs_;
   const DiagnosisOptions& options_;
@@ -493,8 +491,8 @@ std::string_view name_of(Verdict verdict) {
 }
 
 NextBest next_best(const Diagnosis& diagnosis, const FoundEffect& effect) {
-  constexpr double near = 1.0 / 3.0;
-  constexpr std::size_t most = 3;
+  const double near = SelectionPolicy{}.distinction.next_best_share;
+  const std::size_t most = SearchBudget{}.most_next_best;
   NextBest best;
   for (const Trial& trial : diagnosis.trials)
     if (trial.taken && trial.effect == effect.effect) best.taken = &trial;

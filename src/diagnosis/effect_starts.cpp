@@ -9,12 +9,13 @@ namespace upright {
 namespace {
 
 /// Positions of the moving cart and the force that the model lacks there, m and N.
-std::vector<std::pair<double, double>> force_residual(const FitData& data, const FitPoint& point) {
+std::vector<std::pair<double, double>> force_residual(const FitData& data, const FitPoint& point,
+                                                      const SelectionPolicy& policy, std::size_t most) {
   std::vector<std::pair<double, double>> pairs;
-  for (const ResidualTrace& trace : smooth_residuals(data, point))
+  for (const ResidualTrace& trace : smooth_residuals(data, point, policy.location))
     for (std::size_t k = 0; k < trace.time_s.size(); ++k)
-      if (std::abs(trace.cart_mps[k]) > 1e-3) pairs.emplace_back(trace.cart_m[k], trace.force_n[k]);
-  constexpr std::size_t most = 4000;
+      if (std::abs(trace.cart_mps[k]) > policy.location.moving_cart_mps)
+        pairs.emplace_back(trace.cart_m[k], trace.force_n[k]);
   if (pairs.size() > most) {
     std::vector<std::pair<double, double>> thinned;
     for (std::size_t i = 0; i < most; ++i) thinned.push_back(pairs[i * pairs.size() / most]);
@@ -26,10 +27,13 @@ std::vector<std::pair<double, double>> force_residual(const FitData& data, const
 }  // namespace
 
 std::vector<std::vector<double>> effect_starts(std::size_t effect, const DataRange& range,
-                                               const FitData& data, const FitPoint& point) {
+                                               const FitData& data, const FitPoint& point,
+                                               const SelectionPolicy& policy, const SearchBudget& budget) {
   const bool periodic = effect_registry()[effect].kind == "cogging_force";
   return search_starts(effect, range,
-                       periodic ? force_residual(data, point) : std::vector<std::pair<double, double>>{});
+                       periodic ? force_residual(data, point, policy, budget.most_residual_samples)
+                                : std::vector<std::pair<double, double>>{},
+                       policy.prior, budget);
 }
 
 }  // namespace upright

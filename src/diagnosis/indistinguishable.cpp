@@ -8,12 +8,6 @@ namespace upright {
 
 namespace {
 
-/// An effect that is fewer standard errors than this from nothing, once another is left open, may be that
-/// other: as much as evidence of 16.
-constexpr double least_distance = 4.0;
-/// And the other must be what takes the certainty away.
-constexpr double least_loss = 0.5;
-
 /// Place of the size of an effect among the free parameters; -1 where it has none.
 Eigen::Index size_place(const Hypothesis& h, std::size_t effect) {
   for (std::size_t j = 0; j < h.free.size(); ++j)
@@ -63,6 +57,17 @@ bool is_proportional(std::size_t effect) {
 
 }  // namespace
 
+bool takes_certainty_away(double distance_with_other, double distance_alone,
+                          const DistinctionPolicy& policy) {
+  return distance_with_other < policy.least_distance &&
+         distance_with_other < policy.least_loss * distance_alone;
+}
+
+bool is_indistinguishable(double evidence_lost, double t_value, const DistinctionPolicy& policy) {
+  return evidence_lost < policy.indistinguishable_evidence ||
+         (evidence_lost < policy.most_scattered_evidence && t_value < policy.scattered_t);
+}
+
 std::vector<Alternative> linear_alternatives(const Search& search, const Hypothesis& h,
                                              const std::vector<std::size_t>& listed) {
   std::vector<Alternative> alternatives;
@@ -77,7 +82,7 @@ std::vector<Alternative> linear_alternatives(const Search& search, const Hypothe
       const Eigen::Index before = size_place(h, effect), after = size_place(open, effect);
       if (before < 0 || after < 0 || !std::isfinite(nothing_of(h, before))) continue;
       const double doubt = distance(open, after);
-      if (doubt < least_distance && doubt < least_loss * distance(h, before))
+      if (takes_certainty_away(doubt, distance(h, before), search.policy().distinction))
         alternatives.push_back({effect, other, without(open, after)});
     }
   }

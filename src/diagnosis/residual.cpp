@@ -1,6 +1,6 @@
 #include "residual.hpp"
 
-#include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "base/parallel.hpp"
@@ -34,76 +34,99 @@ Matrix transition_of(const LinearStep& step) {
   return a;
 }
 
+/// What is measured of a segment, and how well.
+struct Channels {
+  std::array<bool, 2> present;
+  std::array<double, 2> variance;
+};
+
+/// The filter forwards along the steps of a segment.
+std::vector<Filtered> filter(const std::vector<LinearStep>& steps, const Channels& channels,
+                             const LocationPolicy& policy) {
+  const double wander_force = policy.wander_force_n_per_sqrt_s;
+  const double wander_torque = policy.wander_torque_nm_per_sqrt_s;
+  std::vector<Filtered> passes(steps.size());
+  Vector mean = Vector::Zero(), corrected = Vector::Zero();
+  Matrix p = Matrix::Zero();
+  p.diagonal() = Eigen::Map<const Vector>(policy.start_variances.data());
+  for (std::size_t k = 0; k < steps.size(); ++k) {
+    Filtered& f = passes[k];
+    f.transition = k == 0 ? Matrix::Identity() : transition_of(steps[k]);
+    if (k > 0) {
+      mean = f.transition * (mean - corrected);
+      p = f.transition * p * f.transition.transpose();
+      p(states, states) += wander_force * wander_force * steps[k].period_s;
+      p(states + 1, states + 1) += wander_torque * wander_torque * steps[k].period_s;
+    }
+    // The trajectory that the steps are linearised along was itself corrected by a filter: errors are
+    // counted from there.
+    corrected.setZero();
+    for (std::size_t channel = 0; channel < 2; ++channel) {
+      if (!channels.present[channel]) continue;
+      const double e =
+          steps[k].residual[channel] - steps[k].gain[channel] * corrected[static_cast<Eigen::Index>(channel)];
+      for (int i = 0; i < states; ++i) corrected[i] += steps[k].update[channel][i] * e;
+    }
+    f.corrected = corrected;
+    f.predicted_mean = mean;
+    f.predicted_covariance = p;
+    for (std::size_t channel = 0; channel < 2; ++channel) {
+      if (!channels.present[channel]) continue;
+      const auto at = static_cast<Eigen::Index>(channel);
+      const double c = steps[k].gain[channel];
+      const double innovation_variance = c * c * p(at, at) + channels.variance[channel];
+      const Vector gain = c * p.col(at) / innovation_variance;
+      mean += gain * (steps[k].residual[channel] - c * mean[at]);
+      p -= gain * (c * p.row(at));
+    }
+    f.mean = mean;
+    f.covariance = p;
+  }
+  return passes;
+}
+
+/// The smoother backwards: the errors of each sample, for the whole segment.
+std::vector<Vector> smooth(const std::vector<Filtered>& passes) {
+  const std::size_t n = passes.size();
+  std::vector<Vector> smoothed(n);
+  Vector value = passes.back().mean;
+  for (std::size_t k = n; k-- > 0;) {
+    if (k + 1 < n) {
+      const Filtered& next = passes[k + 1];
+      Matrix ahead = next.predicted_covariance;
+      ahead.diagonal().array() += 1e-14;
+      const Matrix gain = ahead.ldlt().solve(next.transition * passes[k].covariance).transpose();
+      value = passes[k].mean + gain * (value - next.predicted_mean);
+    }
+    smoothed[k] = value;
+  }
+  return smoothed;
+}
+
 }  // namespace
 
-std::vector<ResidualTrace> smooth_residuals(const FitData& data, const FitPoint& point) {
+std::vector<ResidualTrace> smooth_residuals(const FitData& data, const FitPoint& point,
+                                            const LocationPolicy& policy) {
   const std::vector<std::vector<LinearStep>> all = linearise(data, point);
   std::vector<ResidualTrace> traces(all.size());
   parallel_for(all.size(), [&](std::size_t s) {
     const std::vector<LinearStep>& steps = all[s];
     const Segment& segment = data.segments[s];
     const Measurement& run = (*data.runs)[segment.run];
-    // How fast the residual may wander: across its whole size within a few hundredths of a second.
-    constexpr double wander_force = 3.0, wander_torque = 0.3;  // per root second
-    const bool channels[2] = {run.has_cart(), run.has_theta() && point.plant.pendulum.has_value()};
-    const double variance[2] = {channels[0] ? std::pow(run.cart_noise_m(), 2) : 1.0,
-                                channels[1] ? std::pow(run.theta_noise_rad(), 2) : 1.0};
-    std::vector<Filtered> passes(steps.size());
-    Vector mean = Vector::Zero(), corrected = Vector::Zero();
-    Matrix p = Matrix::Zero();
-    p.diagonal() << 1e-6, 1e-4, 1e-2, 1e-1, 1e-6, 4.0, 0.04;
-    for (std::size_t k = 0; k < steps.size(); ++k) {
-      Filtered& f = passes[k];
-      f.transition = k == 0 ? Matrix::Identity() : transition_of(steps[k]);
-      if (k > 0) {
-        mean = f.transition * (mean - corrected);
-        p = f.transition * p * f.transition.transpose();
-        p(states, states) += wander_force * wander_force * steps[k].period_s;
-        p(states + 1, states + 1) += wander_torque * wander_torque * steps[k].period_s;
-      }
-      // The trajectory that the steps are linearised along was itself corrected by a filter: errors are
-      // counted from there.
-      corrected.setZero();
-      for (int channel = 0; channel < 2; ++channel) {
-        if (!channels[channel]) continue;
-        const double e = steps[k].residual[channel] - steps[k].gain[channel] * corrected[channel];
-        for (int i = 0; i < states; ++i) corrected[i] += steps[k].update[channel][i] * e;
-      }
-      f.corrected = corrected;
-      f.predicted_mean = mean;
-      f.predicted_covariance = p;
-      for (int channel = 0; channel < 2; ++channel) {
-        if (!channels[channel]) continue;
-        const double c = steps[k].gain[channel];
-        const double innovation_variance = c * c * p(channel, channel) + variance[channel];
-        const Vector gain = c * p.col(channel) / innovation_variance;
-        mean += gain * (steps[k].residual[channel] - c * mean[channel]);
-        p -= gain * (c * p.row(channel));
-      }
-      f.mean = mean;
-      f.covariance = p;
-    }
+    const std::array<bool, 2> present = {run.has_cart(), run.has_theta() && point.plant.pendulum.has_value()};
+    const Channels channels{present,
+                            {present[0] ? std::pow(run.cart_noise_m(), 2) : 1.0,
+                             present[1] ? std::pow(run.theta_noise_rad(), 2) : 1.0}};
+    const std::vector<Vector> smoothed = smooth(filter(steps, channels, policy));
     ResidualTrace& trace = traces[s];
     trace.run = segment.run;
-    const auto n = steps.size();
-    for (auto* values :
-         {&trace.time_s, &trace.force_n, &trace.torque_nm, &trace.cart_m, &trace.cart_mps, &trace.voltage_v})
-      values->resize(n);
-    Vector smooth = passes.back().mean;
-    for (std::size_t k = n; k-- > 0;) {
-      if (k + 1 < n) {
-        const Filtered& next = passes[k + 1];
-        Matrix ahead = next.predicted_covariance;
-        ahead.diagonal().array() += 1e-14;
-        const Matrix gain = ahead.ldlt().solve(next.transition * passes[k].covariance).transpose();
-        smooth = passes[k].mean + gain * (smooth - next.predicted_mean);
-      }
-      trace.time_s[k] = run.time_s[segment.first + k];
-      trace.force_n[k] = smooth[states];
-      trace.torque_nm[k] = smooth[states + 1];
-      trace.cart_m[k] = channels[0] ? run.cart_m[segment.first + k] : 0.0;
-      trace.cart_mps[k] = steps[k].rate[0] + smooth[2];
-      trace.voltage_v[k] = run.voltage_v[segment.first + k];
+    for (std::size_t k = 0; k < steps.size(); ++k) {
+      trace.time_s.push_back(run.time_s[segment.first + k]);
+      trace.force_n.push_back(smoothed[k][states]);
+      trace.torque_nm.push_back(smoothed[k][states + 1]);
+      trace.cart_m.push_back(present[0] ? run.cart_m[segment.first + k] : 0.0);
+      trace.cart_mps.push_back(steps[k].rate[0] + smoothed[k][2]);
+      trace.voltage_v.push_back(run.voltage_v[segment.first + k]);
     }
   });
   return traces;

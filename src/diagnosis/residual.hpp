@@ -4,11 +4,13 @@
 
 #include <vector>
 
+#include "selection_policy.hpp"
 #include "upright/diagnosis/diagnosis.hpp"
 
 namespace upright {
 
 /// One trace per segment, in the order of the segments.
-std::vector<ResidualTrace> smooth_residuals(const FitData& data, const FitPoint& point);
+std::vector<ResidualTrace> smooth_residuals(const FitData& data, const FitPoint& point,
+                                            const LocationPolicy& policy);
 
 }  // namespace upright

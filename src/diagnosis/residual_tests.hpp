@@ -14,6 +14,7 @@
 #include <string>
 #include <vector>
 
+#include "selection_policy.hpp"
 #include "tails.hpp"
 #include "upright/diagnosis/diagnosis.hpp"
 #include "upright/estimation/fit.hpp"
@@ -41,21 +42,6 @@ struct ResidualTests {
 Noise as_slow_as_left(Noise noise, const ResidualTests& structure);
 
 /// Examines what a fit leaves at `point`.
-ResidualTests examine_residuals(const FitData& data, const FitPoint& point);
-
-/// Whether what is left is more than noise, in a sentence, once its excess is known too.
-void conclude_tests(ResidualTests& structure);
-
-/// A plain simulation may be this many times as far off as noise like what is left makes it at most.
-inline constexpr double most_excess = 2.0;
-
-/// In which equation the residual is and what it goes with most: a ridge regression of the smoothed residual
-/// force and torque on velocity, direction, position, voltage, time, ..., judged on segments it has not seen.
-struct ResidualPlace {
-  bool in_pendulum = false;
-  double share = 0.0;  ///< of its variance that can be predicted
-  std::string goes_with;
-};
-ResidualPlace locate_residual(const FitData& data, const FitPoint& point);
+ResidualTests examine_residuals(const FitData& data, const FitPoint& point, const SelectionPolicy& policy);
 
 }  // namespace upright

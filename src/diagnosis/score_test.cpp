@@ -30,9 +30,10 @@ std::vector<FreeParameter> within_range(std::vector<FreeParameter> free, const P
 }  // namespace
 
 PromisedEffect most_promising_effect(const FitData& data, const FitResult& fitted,
-                                     const std::vector<FreeParameter>& fitted_free, const DataRange& range,
+                                     const std::vector<FreeParameter>& fitted_free, const Search& search,
                                      const std::vector<std::string_view>& tried_already) {
   PromisedEffect best;
+  const DataRange& range = search.range();
   const std::vector<FreeParameter> free = within_range(fitted_free, fitted.point.plant);
   const double without = promised_objective(data, fitted.point, free);
   for (const std::size_t effect : candidate_effects(fitted.point.plant, range)) {
@@ -40,8 +41,9 @@ PromisedEffect most_promising_effect(const FitData& data, const FitResult& fitte
         tried_already.end())
       continue;
     std::vector<FreeParameter> with = free;
-    for (const FreeParameter& p : free_parameters(effect, range)) with.push_back(p);
-    for (const std::vector<double>& values : effect_starts(effect, range, data, fitted.point)) {
+    for (const FreeParameter& p : free_parameters(effect, range, search.policy().prior)) with.push_back(p);
+    for (const std::vector<double>& values :
+         effect_starts(effect, range, data, fitted.point, search.policy(), search.budget())) {
       FitPoint point = fitted.point;
       point.plant.set(effect, values);
       follow_sensors(point.starts, fitted.point.plant, point.plant);

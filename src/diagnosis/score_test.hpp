@@ -4,7 +4,7 @@
 #include <string_view>
 #include <vector>
 
-#include "candidates.hpp"
+#include "search.hpp"
 
 namespace upright {
 
@@ -15,10 +15,11 @@ struct PromisedEffect {
   double fall = 0.0;
 };
 
-/// `fitted` is the fit of `data` in which `free` moved. Effects in its plant are not tried, nor those
-/// `tried_already`. Where a step must be cut short, what it promises is what the shorter step promises.
+/// `fitted` is the fit of `data` in which `free` moved; of `search` the range of the runs is used, its policy
+/// and its budget. Effects in its plant are not tried, nor those `tried_already`. Where a step must be cut
+/// short, what it promises is what the shorter step promises.
 PromisedEffect most_promising_effect(const FitData& data, const FitResult& fitted,
-                                     const std::vector<FreeParameter>& free, const DataRange& range,
+                                     const std::vector<FreeParameter>& free, const Search& search,
                                      const std::vector<std::string_view>& tried_already);
 
 }  // namespace upright

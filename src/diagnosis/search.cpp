@@ -28,15 +28,6 @@ std::set<std::size_t> effects_of_both(const Hypothesis& first, const Hypothesis&
   return effects;
 }
 
-/// A few steps with the noise as it is.
-FitOptions screening() {
-  FitOptions options;
-  options.noise_rounds = 0;
-  options.noise_last = true;
-  options.most_iterations = 4;
-  return options;
-}
-
 /// What a fit says of its parameters, as a belief. What it says nothing of is believed to be where it is.
 Belief belief_of(const Hypothesis& h) {
   const auto n = static_cast<Eigen::Index>(h.free.size());
@@ -114,19 +105,33 @@ std::vector<ParameterEstimate> estimates_of(std::size_t effect, const Hypothesis
 }
 
 Search::Search(const Plant& plant, const std::vector<Measurement>& runs, const FitData& train,
-               const FitData& held)
-    : given_(plant), plant_(plant), train_(train), held_(held), range_(range_of(runs, plant)) {
+               const FitData& held, const SelectionPolicy& policy, const SearchBudget& budget)
+    : policy_(policy),
+      budget_(budget),
+      given_(plant),
+      plant_(plant),
+      train_(train),
+      held_(held),
+      range_(range_of(runs, plant, policy.excitation)) {
   for (const PlantEffect& effect : plant.effects) nuisances_.push_back(effect.number);
   for (const std::size_t effect : base_corrections(plant, range_)) {
     nuisances_.push_back(effect);
     plant_.set(effect, std::vector<double>{effect_registry()[effect].parameters[0].neutral});
   }
   // Runs differ, segments of a run are alike: take them in turn.
-  constexpr std::size_t least_segments = 6, most_stride = 3;
-  const std::size_t stride = std::clamp<std::size_t>(train_.segments.size() / least_segments, 1, most_stride);
+  const std::size_t stride = std::clamp<std::size_t>(
+      train_.segments.size() / budget_.least_screening_segments, 1, budget_.most_screening_stride);
   choose_screening_subset(stride);
   train_starts_ = guess_starts(runs, train.segments, plant_);
   held_starts_ = guess_starts(runs, held.segments, plant_);
+}
+
+FitOptions Search::screening() const {
+  FitOptions options;
+  options.noise_rounds = 0;
+  options.noise_last = true;
+  options.most_iterations = budget_.screening_steps;
+  return options;
 }
 
 bool Search::is_nuisance(std::size_t effect) const {
@@ -149,13 +154,14 @@ void Search::screen_on_all() {
 std::vector<FreeParameter> Search::free_of(const std::set<std::size_t>& added) const {
   std::vector<FreeParameter> free;
   for (const std::size_t effect : nuisances_) {
-    const auto parameters = added.contains(effect) ? free_parameters(effect, range_)
-                                                   : believed_parameters(given_, effect, range_);
+    const auto parameters = added.contains(effect)
+                                ? free_parameters(effect, range_, policy_.prior)
+                                : believed_parameters(given_, effect, range_, policy_.prior);
     free.insert(free.end(), parameters.begin(), parameters.end());
   }
   for (const std::size_t effect : added) {
     if (std::find(nuisances_.begin(), nuisances_.end(), effect) != nuisances_.end()) continue;
-    const auto parameters = free_parameters(effect, range_);
+    const auto parameters = free_parameters(effect, range_, policy_.prior);
     free.insert(free.end(), parameters.begin(), parameters.end());
   }
   return free;
@@ -181,22 +187,19 @@ void Search::calm(Hypothesis& h, const FitOptions& options) {
 
 bool Search::may_calm(const Hypothesis& base, const Hypothesis& h) const {
   // Where every bit of evidence counts, the whole data are asked.
-  constexpr double clear_evidence = 1000.0;
   if (screening_subset_.segments.size() == train_.segments.size()) return true;
-  if (!(base.train.objective - h.train.objective > clear_evidence)) return true;
+  if (!(base.train.objective - h.train.objective > budget_.clear_evidence)) return true;
   FitPoint point = screening_point(h);
   const double as_it_is = fit(screening_subset_, point, h.free, screening()).objective;
   point.noise = reduced_process_noise(point.noise);
-  // What another way to the same place makes of an objective.
-  constexpr double of_the_way = 10.0;
-  return fit(screening_subset_, point, h.free, {}).objective < as_it_is - of_the_way;
+  return fit(screening_subset_, point, h.free, {}).objective < as_it_is - budget_.same_place;
 }
 
 void Search::judge(Hypothesis& h, const Noise& noise) const {
   if (!std::isfinite(h.train.objective)) return;
   const FitPoint plain{plant_, held_starts_, noise};
   const FitPoint point = moved_to(plain, h.train.point.plant);
-  h.held = fit_initial_states(held_, point, 6);
+  h.held = fit_initial_states(held_, point, budget_.held_out_steps);
 }
 
 const PlainSimulation& Search::simulate(Hypothesis& h) const {
@@ -220,7 +223,8 @@ bool Search::is_plausible(const Hypothesis& h, std::size_t effect) const {
     if (p.effect != effect) continue;
     const double value = h.train.point.plant.find(effect)->values[p.index];
     if (p.index == 0 && value == effect_registry()[effect].parameters[0].neutral) return false;
-    if (kind_of(effect).starts_with("angle_offset") && std::abs(value) < 1.5 * range_.theta_resolution_rad)
+    if (kind_of(effect).starts_with("angle_offset") &&
+        std::abs(value) < policy_.correction.least_angle_offset_steps * range_.theta_resolution_rad)
       return false;
   }
   return can_be(h, effect);
@@ -238,8 +242,8 @@ bool Search::bristles_are_short(const Hypothesis& h) const {
   const Dynamics<double> dynamics(make_model<double>(plant));
   const double breakaway_n = dynamics.cart_dry_level(range_.cart_mean_m, 0.0, 1.0);
   const double stiffness_n_per_m = plant.find(effect_number("bristle_friction"))->values[0];
-  constexpr double share_of_travel = 0.1;
-  return breakaway_n < stiffness_n_per_m * share_of_travel * (range_.cart_high_m - range_.cart_low_m);
+  return breakaway_n < stiffness_n_per_m * policy_.correction.bristle_share_of_travel *
+                           (range_.cart_high_m - range_.cart_low_m);
 }
 
 double Search::certainty(const Hypothesis& h, std::size_t effect) const {
@@ -282,8 +286,8 @@ FitPoint Search::screening_point(const Hypothesis& base) const {
 double Search::negative_log_predictive_density_of(const Hypothesis& h) const {
   if (!std::isfinite(h.held.objective) || held_.segments.empty()) return h.held.objective;
   FitOptions options;
-  options.noise_rounds = 1;
-  options.most_iterations = 4;
+  options.noise_rounds = budget_.predictive_noise_rounds;
+  options.most_iterations = budget_.predictive_steps;
   options.belief = belief_of(h);
   const FitResult told = fit(held_, h.held.point, h.free, options);
   // Laplace's approximation of the likelihood, averaged over what the training runs left open.
@@ -310,7 +314,7 @@ Hypothesis Search::baseline() {
       with_fitted_initial_states(train_, {plant_, train_starts_, {.force = 0.1, .torque = 0.01}});
   FitOptions options;
   Hypothesis h = fitted({}, start, options, free_of({}));
-  options.most_iterations = 24;
+  options.most_iterations = budget_.baseline_restart_steps;
   calm(h, options);
   weigh(h);
   return h;
@@ -386,7 +390,7 @@ void Search::settle_on_subset(Hypothesis& h) const {
 
 Hypothesis Search::on_screening_subset(const Hypothesis& base) const {
   FitOptions options = screening();
-  options.most_iterations = 2;
+  options.most_iterations = budget_.screening_reference_steps;
   Hypothesis h;
   h.added = base.added;
   h.free = base.free;
@@ -467,17 +471,17 @@ Hypothesis Search::only(const std::vector<std::size_t>& effects, const Hypothesi
   for (const std::size_t effect : effects) {
     // What stands in the plant file is believed, if less firmly, even where the data correct it.
     const bool correction = is_nuisance(effect);
-    constexpr double less_firmly = 4.0;
-    std::vector<FreeParameter> parameters =
-        correction ? believed_parameters(given_, effect, range_) : free_parameters(effect, range_);
-    for (FreeParameter& p : parameters) p.prior_sigma *= correction ? less_firmly : 1.0;
+    std::vector<FreeParameter> parameters = correction
+                                                ? believed_parameters(given_, effect, range_, policy_.prior)
+                                                : free_parameters(effect, range_, policy_.prior);
+    for (FreeParameter& p : parameters) p.prior_sigma *= correction ? policy_.correction.less_firmly : 1.0;
     include(effect, parameters);
   }
   for (const std::size_t effect : nuisances_) {
     if (std::find(effects.begin(), effects.end(), effect) != effects.end()) continue;
     // The zero of the angle is known to a count only, whatever else is.
     const bool zero = effect == effect_number("angle_offset") && given_.find(effect) == nullptr;
-    if (settled || zero) include(effect, believed_parameters(given_, effect, range_));
+    if (settled || zero) include(effect, believed_parameters(given_, effect, range_, policy_.prior));
   }
   FitPoint point = moved_to(from.train.point, plant);
   FitOptions options;
@@ -512,14 +516,14 @@ Hypothesis Search::opened(const Hypothesis& h, std::size_t effect) const {
   }
   if (!there) {
     if (point.plant.find(effect) == nullptr) {
-      std::vector<double> values = search_starts(effect, range_, {}).front();
+      std::vector<double> values = search_starts(effect, range_, {}, policy_.prior, budget_).front();
       for (std::size_t i = 0; i < values.size(); ++i)
         if (!std::isnan(info.parameters[i].neutral)) values[i] = info.parameters[i].neutral;
       Plant plant = point.plant;
       plant.set(effect, values);
       point = moved_to(point, plant);
     }
-    for (FreeParameter p : free_parameters(effect, range_)) {
+    for (FreeParameter p : free_parameters(effect, range_, policy_.prior)) {
       // Where it does nothing may be the end of its range.
       p.low = -infinity;
       p.high = infinity;
@@ -555,7 +559,7 @@ Hypothesis Search::with_pair(const Hypothesis& base, const Hypothesis& first, co
 }
 
 std::vector<std::vector<double>> Search::starts_of(std::size_t effect, const Hypothesis& base) const {
-  return effect_starts(effect, range_, train_, base.train.point);
+  return effect_starts(effect, range_, train_, base.train.point, policy_, budget_);
 }
 
 }  // namespace upright

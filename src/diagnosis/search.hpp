@@ -8,6 +8,8 @@
 #include <vector>
 
 #include "candidates.hpp"
+#include "search_budget.hpp"
+#include "selection_policy.hpp"
 #include "upright/diagnosis/diagnosis.hpp"
 #include "upright/estimation/fit.hpp"
 
@@ -44,17 +46,17 @@ struct Improvement {
 
 Improvement compare(const Hypothesis& simpler, const Hypothesis& richer);
 
-/// Two explanations whose evidence differs by less than this, or by less than its own scatter, are not told
-/// apart.
-inline constexpr double indistinguishable_evidence = 16.0;
-
 /// What a hypothesis says about one effect, as numbers with intervals.
 std::vector<ParameterEstimate> estimates_of(std::size_t effect, const Hypothesis& h);
 
 class Search {
  public:
-  Search(const Plant& plant, const std::vector<Measurement>& runs, const FitData& train, const FitData& held);
+  /// `policy` and `budget` must outlive it.
+  Search(const Plant& plant, const std::vector<Measurement>& runs, const FitData& train, const FitData& held,
+         const SelectionPolicy& policy, const SearchBudget& budget);
 
+  const SelectionPolicy& policy() const { return policy_; }
+  const SearchBudget& budget() const { return budget_; }
   const DataRange& range() const { return range_; }
   /// The plant file's own effects and the corrections of its numbers: in every hypothesis, within what is
   /// believed of them.
@@ -133,6 +135,8 @@ class Search {
   double negative_log_predictive_density_of(const Hypothesis& h) const;
   /// Bristles that bend over a good part of the track before they slide are a spring by another name.
   bool bristles_are_short(const Hypothesis& h) const;
+  /// A few steps with the noise as it is.
+  FitOptions screening() const;
   /// A hypothesis's point on the screening subset alone.
   FitPoint screening_point(const Hypothesis& base) const;
   std::vector<FreeParameter> free_of(const std::set<std::size_t>& added) const;
@@ -151,6 +155,8 @@ class Search {
   Hypothesis fitted(const std::set<std::size_t>& added, const FitPoint& start, const FitOptions& options,
                     const std::vector<FreeParameter>& free);
 
+  const SelectionPolicy& policy_;
+  const SearchBudget& budget_;
   Plant given_;  ///< the plant file
   Plant plant_;  ///< the same with every correction at its neutral value
   FitData train_, held_;

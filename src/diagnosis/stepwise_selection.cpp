@@ -6,7 +6,7 @@
 #include <numeric>
 #include <sstream>
 
-#include "residual_tests.hpp"
+#include "residual_location.hpp"
 #include "upright/base/error.hpp"
 
 namespace upright {
@@ -15,32 +15,14 @@ namespace {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
-/// Minus twice the log likelihood that an effect must save on the training data before it is believed. About
-/// 30 candidates with up to three parameters are tried; 25 keeps chance below one in a thousand when noise is
-/// white.
-constexpr double least_evidence = 25.0;
-/// The same as a t value of the saving per quarter of a second, which stays honest where the noise is not
-/// white.
-constexpr double least_t = 3.0;
-/// Evidence so large that coloured noise cannot have made it, however few the segments are that hold it.
-constexpr double overwhelming_evidence = 1000.0;
-/// And its size must be this many of its robust standard errors from nothing.
-constexpr double least_certainty = 4.0;
-/// What each parameter beyond the first must save on top: a simpler effect that does nearly as well is
-/// preferred.
-constexpr double parameter_price = 10.0;
-/// Evidence by which two do equally well: the plainer one is taken.
-constexpr double equally_good = 4.0;
-constexpr int most_rounds = 4;
-constexpr std::size_t most_finalists = 4;
-/// What gains this share of what the best does may be the same thing by another name, or half of it.
-constexpr double resembles = 0.3;
-constexpr std::size_t most_resembling = 8;
-
 }  // namespace
 
 StepwiseSelection::StepwiseSelection(Search& search, const DiagnosisOptions& options, Diagnosis& record)
-    : search_(search), options_(options), record_(record) {}
+    : search_(search),
+      policy_(search.policy()),
+      budget_(search.budget()),
+      options_(options),
+      record_(record) {}
 
 void StepwiseSelection::begin() {
   options_.tell(0.02, "comparing the model as given");
@@ -51,7 +33,7 @@ void StepwiseSelection::begin() {
 }
 
 void StepwiseSelection::find() {
-  grow(0, most_rounds, false);
+  grow(0, budget_.most_rounds, false);
   try_pairs(finalists_);
   prune();
 }
@@ -59,7 +41,8 @@ void StepwiseSelection::find() {
 bool StepwiseSelection::begin_anew() {
   options_.tell(0.83, "beginning anew");
   Hypothesis h = search_.begun_anew(current_);
-  if (!(h.train.objective < current_.train.objective - equally_good)) return false;
+  if (!(h.train.objective < current_.train.objective - policy_.acceptance.equally_good_evidence))
+    return false;
   current_ = std::move(h);
   return true;
 }
@@ -73,16 +56,16 @@ bool StepwiseSelection::find_pairs_of_all() {
 bool StepwiseSelection::find_thoroughly(bool certainly_missing) {
   const std::vector<std::size_t> before = found_;
   const double objective = current_.train.objective;
-  grow(most_rounds, 2 * most_rounds, true);
+  grow(budget_.most_rounds, 2 * budget_.most_rounds, true);
   // What certainly is missing shows on a part of many data too.
-  constexpr double few = 0.5;
   const double share = search_.screening_share();
-  if (share < 1.0 && !(certainly_missing && share < few)) {
+  if (share < 1.0 && !(certainly_missing && share < budget_.certain_screening_share)) {
     search_.screen_on_all();
-    grow(2 * most_rounds, 3 * most_rounds, false);
+    grow(2 * budget_.most_rounds, 3 * budget_.most_rounds, false);
   }
   // On the way a better place may have been found for the noise alone.
-  if (found_ == before) return current_.train.objective < objective - equally_good;
+  if (found_ == before)
+    return current_.train.objective < objective - policy_.acceptance.equally_good_evidence;
   prune();
   return true;
 }
@@ -96,8 +79,6 @@ std::vector<std::size_t> StepwiseSelection::open_candidates() const {
 
 std::vector<std::size_t> StepwiseSelection::promising(const Hypothesis& from,
                                                       const std::vector<std::size_t>& candidates, int round) {
-  constexpr double share = 0.1;
-  constexpr std::size_t least_count = 8;
   const std::vector<double> promised = search_.promised_gains(from, candidates);
   std::vector<std::size_t> ranking(candidates.size());
   std::iota(ranking.begin(), ranking.end(), std::size_t{0});
@@ -110,7 +91,7 @@ std::vector<std::size_t> StepwiseSelection::promising(const Hypothesis& from,
   std::size_t kept = 0;
   for (const std::size_t i : ranking) {
     const bool unknown = !std::isfinite(promised[i]);
-    if (unknown || kept < least_count || promised[i] > share * best) {
+    if (unknown || kept < budget_.least_screened || promised[i] > budget_.promise_share * best) {
       chosen.push_back(candidates[i]);
       kept += unknown ? 0 : 1;
     } else if (round == 0) {
@@ -120,65 +101,67 @@ std::vector<std::size_t> StepwiseSelection::promising(const Hypothesis& from,
   return chosen;
 }
 
-double StepwiseSelection::price_of(std::size_t effect) {
-  return parameter_price * static_cast<double>(effect_registry()[effect].parameters.size() - 1);
+double StepwiseSelection::price_of(std::size_t effect) const {
+  return policy_.acceptance.parameter_price *
+         static_cast<double>(effect_registry()[effect].parameters.size() - 1);
 }
 
-double StepwiseSelection::price_of_change(const Hypothesis& from, const Hypothesis& to) {
-  return parameter_price * (static_cast<double>(to.free.size()) - static_cast<double>(from.free.size()));
+double StepwiseSelection::price_of_change(const Hypothesis& from, const Hypothesis& to) const {
+  return policy_.acceptance.parameter_price *
+         (static_cast<double>(to.free.size()) - static_cast<double>(from.free.size()));
 }
 
 bool StepwiseSelection::is_believed(Hypothesis& h, const Improvement& improvement, std::size_t effect) {
   const double evidence = improvement.train - price_of(effect);
   const double t = witnessed_t(improvement);
-  if (is_borne_out(improvement, effect) && t > least_t) return true;
+  if (is_borne_out(improvement, effect) && t > policy_.acceptance.least_t) return true;
   // Held-out data that do not excite the effect say nothing: odds of less than 2 to 1 against it.
-  constexpr double indifferent = 1.4;
-  if (evidence < least_evidence || !(improvement.held > -indifferent)) return false;
-  if (t > least_t || evidence > overwhelming_evidence) return true;
+  if (evidence < policy_.acceptance.least_evidence ||
+      !(improvement.held > -policy_.acceptance.held_out_indifference))
+    return false;
+  if (t > policy_.acceptance.least_t || evidence > policy_.acceptance.overwhelming_evidence) return true;
   // Numbers of the plant that need not be so far off are no matter of noise.
-  if (improvement.belief - price_of(effect) > least_evidence) return true;
+  if (improvement.belief - price_of(effect) > policy_.acceptance.least_evidence) return true;
   // Nothing but the sensors' noise is left: its evidence needs no other witness.
-  constexpr double least_t_of_sensors = 1.5, as_sensors = 1.05;
-  return improvement.t_value > least_t_of_sensors && improvement.held > equally_good &&
-         search_.simulate(h).gap < as_sensors;
+  return improvement.t_value > policy_.acceptance.least_t_of_sensors &&
+         improvement.held > policy_.acceptance.equally_good_evidence &&
+         search_.simulate(h).gap < policy_.acceptance.sensors_gap;
 }
 
-double StepwiseSelection::witnessed_t(const Improvement& improvement) {
-  constexpr double chance = 1.0;
-  if (!(improvement.t_value > chance)) return improvement.t_value;
+double StepwiseSelection::witnessed_t(const Improvement& improvement) const {
+  if (!(improvement.t_value > policy_.acceptance.chance_t)) return improvement.t_value;
   return std::sqrt(improvement.t_value * improvement.t_value + std::max(improvement.held, 0.0));
 }
 
-bool StepwiseSelection::is_borne_out(const Improvement& improvement, std::size_t effect) {
+bool StepwiseSelection::is_borne_out(const Improvement& improvement, std::size_t effect) const {
   const double evidence = improvement.train - price_of(effect);
-  constexpr double least_share = 8.0, least_together = 40.0;
-  return std::min(evidence, improvement.held) > least_share && evidence + improvement.held > least_together;
+  return std::min(evidence, improvement.held) > policy_.acceptance.least_evidence_of_each &&
+         evidence + improvement.held > policy_.acceptance.least_evidence_together;
 }
 
-bool StepwiseSelection::is_overwhelming(const Improvement& improvement, std::size_t effect) {
-  return improvement.train - price_of(effect) > overwhelming_evidence && improvement.t_value > least_t;
+bool StepwiseSelection::is_overwhelming(const Improvement& improvement, std::size_t effect) const {
+  return improvement.train - price_of(effect) > policy_.acceptance.overwhelming_evidence &&
+         improvement.t_value > policy_.acceptance.least_t;
 }
 
 bool StepwiseSelection::is_certain(Hypothesis& h, std::size_t effect) {
   const double so_far = search_.certainty(h, effect);
-  if (so_far >= least_certainty) return true;
+  if (so_far >= policy_.acceptance.least_certainty) return true;
   const Improvement improvement = compare(current_, h);
-  if (is_borne_out(improvement, effect) && search_.certainty(search_.on_all(h), effect) >= least_certainty)
+  if (is_borne_out(improvement, effect) &&
+      search_.certainty(search_.on_all(h), effect) >= policy_.acceptance.least_certainty)
     return true;
-  constexpr double of_noise_not_white = 4.0;
-  if (improvement.train < of_noise_not_white * std::max(so_far * so_far, 1.0)) return false;
+  if (improvement.train < policy_.acceptance.unconverged_evidence_ratio * std::max(so_far * so_far, 1.0))
+    return false;
   // Much noise hides what a poor fit leaves, and each gives way to the other by and by.
-  constexpr int most_turns = 6;
-  constexpr double helps = 10.0;
-  for (int turn = 0; turn < most_turns; ++turn) {
+  for (int turn = 0; turn < budget_.most_turns; ++turn) {
     Hypothesis further = h;
     search_.refine(h, further);
     const double gain = h.train.objective - further.train.objective;
     if (gain > 0.0) h = std::move(further);
-    if (!(gain > helps)) break;
+    if (!(gain > budget_.least_turn_gain)) break;
   }
-  return search_.certainty(h, effect) >= least_certainty;
+  return search_.certainty(h, effect) >= policy_.acceptance.least_certainty;
 }
 
 bool StepwiseSelection::simulates_as_well(Hypothesis& h) {
@@ -193,9 +176,9 @@ bool StepwiseSelection::simulates_as_well(Hypothesis& h) {
     mean += worse / n;
     square += worse * worse / n;
   }
-  constexpr double by_chance = 0.1, least_scatter = 0.5;
-  const double scatter = std::max(least_scatter, std::sqrt(std::max(square - mean * mean, 0.0)));
-  return mean < by_chance + scatter / std::sqrt(n);
+  const double scatter =
+      std::max(policy_.acceptance.least_simulation_scatter, std::sqrt(std::max(square - mean * mean, 0.0)));
+  return mean < policy_.acceptance.worse_simulation_by_chance + scatter / std::sqrt(n);
 }
 
 void StepwiseSelection::end_doubt() {
@@ -223,7 +206,7 @@ void StepwiseSelection::level_noise(const Hypothesis& richer) {
 
 std::string StepwiseSelection::locate(const Hypothesis& h) const {
   const FitData& train = search_.train_data();
-  const ResidualPlace place = locate_residual(train, h.train.point);
+  const ResidualPlace place = locate_residual(train, h.train.point, policy_);
   std::size_t worst = 0;
   double largest = 0.0;
   for (std::size_t s = 0; s < h.train.segment_chi_square.size(); ++s) {
@@ -308,16 +291,18 @@ std::vector<StepwiseSelection::Believed> StepwiseSelection::believe(int round,
                    [](const Screened* a, const Screened* b) { return a->gain > b->gain; });
   if (round == 0)
     for (const Screened* s : ranking)
-      if (resembling_.size() < most_resembling && s->gain > resembles * ranking[0]->gain)
+      if (resembling_.size() < budget_.most_resembling &&
+          s->gain > policy_.acceptance.resembling_share * ranking[0]->gain)
         resembling_.emplace_back(s->effect, s->hypothesis);
   std::vector<Believed> believed, doubtful;
-  constexpr double of_best = 0.05;  // what a whole fit does not make up for
-  const double least_gain = 0.4 * least_evidence * search_.screening_share();
-  for (std::size_t place = 0; place < std::min(most_finalists, ranking.size()); ++place) {
+  const double least_gain =
+      budget_.least_screening_evidence_share * policy_.acceptance.least_evidence * search_.screening_share();
+  for (std::size_t place = 0; place < std::min(budget_.most_finalists, ranking.size()); ++place) {
     const auto& [effect, start, gain] = *ranking[place];
-    if (gain < std::max(least_gain, of_best * ranking[0]->gain)) break;
-    options_.tell(done + 0.12 + 0.08 * static_cast<double>(place) / most_finalists,
-                  "fitting " + kind_of(effect));
+    if (gain < std::max(least_gain, budget_.least_gain_share * ranking[0]->gain)) break;
+    options_.tell(
+        done + 0.12 + 0.08 * static_cast<double>(place) / static_cast<double>(budget_.most_finalists),
+        "fitting " + kind_of(effect));
     Hypothesis h = start;
     search_.refine(current_, h);
     if (round == 0) search_.simulate(h);
@@ -331,7 +316,7 @@ std::vector<StepwiseSelection::Believed> StepwiseSelection::believe(int round,
         doubtful.push_back({effect, h, improvement.train - price_of(effect)});
       continue;
     }
-    if (calmly || improvement.train < overwhelming_evidence) {
+    if (calmly || improvement.train < policy_.acceptance.overwhelming_evidence) {
       level_noise(h);
       improvement = compare(current_, h);
       if (!is_believed(h, improvement, effect)) continue;
@@ -351,13 +336,12 @@ std::vector<StepwiseSelection::Believed> StepwiseSelection::believe(int round,
 }
 
 std::size_t StepwiseSelection::choose(std::vector<Believed>& believed) {
-  constexpr double close = 0.05;
   const auto largest = [&] {
     double score = -infinity;
     for (const Believed& b : believed) score = std::max(score, b.score);
     return score;
   };
-  const double to_reach = (1.0 - close) * largest();
+  const double to_reach = (1.0 - policy_.acceptance.close_score_share) * largest();
   if (std::count_if(believed.begin(), believed.end(), [&](const Believed& b) { return b.score > to_reach; }) >
       1)
     for (Believed& b : believed) {
@@ -374,10 +358,12 @@ std::size_t StepwiseSelection::choose(std::vector<Believed>& believed) {
   const auto on_all = [&](const Believed& b) { return b.score + compare(current_, b.hypothesis).held; };
   double best_on_all = -infinity;
   for (const Believed& b : believed)
-    if (b.score > best - equally_good) best_on_all = std::max(best_on_all, on_all(b));
+    if (b.score > best - policy_.acceptance.equally_good_evidence)
+      best_on_all = std::max(best_on_all, on_all(b));
   std::size_t chosen = believed.size();
   for (std::size_t i = 0; i < believed.size(); ++i)
-    if (believed[i].score > best - equally_good && !(on_all(believed[i]) < best_on_all - equally_good) &&
+    if (believed[i].score > best - policy_.acceptance.equally_good_evidence &&
+        !(on_all(believed[i]) < best_on_all - policy_.acceptance.equally_good_evidence) &&
         (chosen == believed.size() || is_plainer(believed[i].effect, believed[chosen].effect)))
       chosen = i;
   return chosen;
@@ -393,7 +379,8 @@ void StepwiseSelection::take(int round, Believed& best, const std::vector<Screen
   const auto winner =
       std::find_if(screened.begin(), screened.end(), [&](const Screened& s) { return s.effect == effect; });
   for (const Screened& s : screened)
-    if (s.effect != effect && (s.gain > resembles * winner->gain || is_half_of(s.effect, effect)))
+    if (s.effect != effect &&
+        (s.gain > policy_.acceptance.resembling_share * winner->gain || is_half_of(s.effect, effect)))
       near_[effect].push_back(s.effect);
   record_step();
 }
@@ -419,18 +406,19 @@ bool StepwiseSelection::exchange() {
       if (!is_half_of(other, effect)) exchanged_.insert({effect, other});
       Hypothesis h = search_.screened(without, other);
       // What was found beside the one is of the wrong size for the other: the way is longer than a few steps.
-      constexpr double may_do = 0.5;
-      if (h.train.objective + price_of(other) < to_beat + may_do * worth) search_.settle_on_subset(h);
-      if (!(h.train.objective + price_of(other) < to_beat + indistinguishable_evidence)) continue;
+      if (h.train.objective + price_of(other) < to_beat + budget_.exchange_share * worth)
+        search_.settle_on_subset(h);
+      if (!(h.train.objective + price_of(other) < to_beat + policy_.distinction.indistinguishable_evidence))
+        continue;
       search_.refine(without, h);
       const Improvement improvement = compare(current_, h);
       const double evidence = improvement.train + price_of(effect) - price_of(other);
-      const bool as_good =
-          std::min({evidence, improvement.held, evidence + improvement.held}) > -equally_good;
-      const bool better = evidence > indistinguishable_evidence && improvement.held > 0.0;
+      const bool as_good = std::min({evidence, improvement.held, evidence + improvement.held}) >
+                           -policy_.acceptance.equally_good_evidence;
+      const bool better = evidence > policy_.distinction.indistinguishable_evidence && improvement.held > 0.0;
       if (!better && !(as_good && is_plainer(other, effect))) continue;
-      if (!search_.is_plausible(h, other) || search_.certainty(h, other) < least_certainty ||
-          !simulates_as_well(h))
+      if (!search_.is_plausible(h, other) ||
+          search_.certainty(h, other) < policy_.acceptance.least_certainty || !simulates_as_well(h))
         continue;
       where_[other] = where_.at(effect);
       near_[other] = near_[effect];
@@ -471,10 +459,12 @@ bool StepwiseSelection::simplify() {
     options_.tell(0.8, "is it simpler than " + kind_of(form.effect));
     Hypothesis h = search_.exchanged(current_, form.effect, form.others);
     const Improvement improvement = compare(current_, h);
-    if (!(improvement.train > price_of_change(current_, h)) || !(improvement.held > -equally_good)) continue;
+    if (!(improvement.train > price_of_change(current_, h)) ||
+        !(improvement.held > -policy_.acceptance.equally_good_evidence))
+      continue;
     if (std::any_of(form.others.begin(), form.others.end(), [&](const PlantEffect& other) {
           return !search_.is_plausible(h, other.number) ||
-                 search_.certainty(h, other.number) < least_certainty;
+                 search_.certainty(h, other.number) < policy_.acceptance.least_certainty;
         }))
       continue;
     if (!simulates_as_well(h)) continue;
@@ -507,9 +497,12 @@ bool StepwiseSelection::try_pairs(const std::vector<std::pair<std::size_t, Hypot
       if (!(quick.train.objective < *to_beat)) continue;
       Hypothesis h = search_.with_pair(given_, contenders[a].second, contenders[b].second);
       const Improvement improvement = compare(so_far, h);
-      if (improvement.train - price_of_change(so_far, h) < least_evidence || improvement.held < 0.0) continue;
+      if (improvement.train - price_of_change(so_far, h) < policy_.acceptance.least_evidence ||
+          improvement.held < 0.0)
+        continue;
       if (!search_.is_plausible(h, first) || !search_.is_plausible(h, second)) continue;
-      if (search_.certainty(h, first) < least_certainty || search_.certainty(h, second) < least_certainty)
+      if (search_.certainty(h, first) < policy_.acceptance.least_certainty ||
+          search_.certainty(h, second) < policy_.acceptance.least_certainty)
         continue;
       if (!simulates_as_well(h)) continue;
       best = std::move(h);
@@ -535,7 +528,8 @@ void StepwiseSelection::prune() {
       if (!std::isfinite(h.train.objective)) continue;
       const Improvement improvement = compare(h, current_);
       const bool still_shown =
-          improvement.train - price_of(found_[i]) > least_evidence && improvement.t_value > 0.7 * least_t;
+          improvement.train - price_of(found_[i]) > policy_.acceptance.least_evidence &&
+          improvement.t_value > policy_.acceptance.kept_t_share * policy_.acceptance.least_t;
       if (still_shown || is_believed(current_, improvement, found_[i])) continue;
       // What does without it by becoming what cannot be does not do without it.
       if (bends_another(h, found_[i], &Search::is_plausible)) continue;

@@ -76,18 +76,18 @@ class StepwiseSelection {
   std::vector<std::size_t> promising(const Hypothesis& from, const std::vector<std::size_t>& candidates,
                                      int round);
 
-  static double price_of(std::size_t effect);
+  double price_of(std::size_t effect) const;
   /// What the parameters must save that one hypothesis has beyond the other; negative where it has fewer.
-  static double price_of_change(const Hypothesis& from, const Hypothesis& to);
+  double price_of_change(const Hypothesis& from, const Hypothesis& to) const;
   /// Whether training and held-out runs both speak for it, and together beyond doubt.
-  static bool is_borne_out(const Improvement& improvement, std::size_t effect);
+  bool is_borne_out(const Improvement& improvement, std::size_t effect) const;
   bool is_believed(Hypothesis& h, const Improvement& improvement, std::size_t effect);
   /// What a few moments hold has a small t on the training runs. Held-out runs are a witness of their own,
   /// whose evidence adds to its square, unless the training runs say no more than chance does.
-  static double witnessed_t(const Improvement& improvement);
+  double witnessed_t(const Improvement& improvement) const;
   /// Evidence on the training runs that only something missing can hold against: held-out runs may excite
   /// what is missing still, and speak against a right effect until it is found too.
-  static bool is_overwhelming(const Improvement& improvement, std::size_t effect);
+  bool is_overwhelming(const Improvement& improvement, std::size_t effect) const;
   /// Whether the size of an effect is certain. A fit that is less certain than its evidence says has not
   /// arrived: it goes on first.
   bool is_certain(Hypothesis& h, std::size_t effect);
@@ -151,6 +151,8 @@ class StepwiseSelection {
   bool is_found(std::size_t effect) const;
 
   Search& search_;
+  const SelectionPolicy& policy_;
+  const SearchBudget& budget_;
   const DiagnosisOptions& options_;
   Diagnosis& record_;
   Hypothesis given_, current_;

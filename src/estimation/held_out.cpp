@@ -8,11 +8,9 @@ namespace upright {
 
 namespace {
 
-/// The excitation of a stretch: root mean square speed of the cart and of a pendulum of arm's length beside
-/// it.
-double excitation_of(const Measurement& run, const Segment& stretch) {
-  constexpr double arm_m = 0.3;
-  const auto stride = std::max<std::size_t>(1, static_cast<std::size_t>(0.02 / run.median_period_s()));
+double excitation_of(const Measurement& run, const Segment& stretch, double arm_m, double speed_window_s) {
+  const auto stride =
+      std::max<std::size_t>(1, static_cast<std::size_t>(speed_window_s / run.median_period_s()));
   double sum = 0.0, count = 0.0;
   for (std::size_t k = stretch.first + stride; k <= stretch.last; k += stride) {
     const double dt = run.time_s[k] - run.time_s[k - stride];
@@ -27,12 +25,8 @@ double excitation_of(const Measurement& run, const Segment& stretch) {
 /// Which stretches to hold out, a third of them: by default the middle one of each three in the order of
 /// their excitation, so that the fit need not answer for motions beyond those it saw, in whatever order they
 /// come.
-std::vector<std::size_t> choose_held_out(const std::vector<Measurement>& runs,
-                                         const std::vector<Segment>& stretches, HeldOut which) {
-  std::vector<double> excitation;
-  excitation.reserve(stretches.size());
-  for (const Segment& stretch : stretches) excitation.push_back(excitation_of(runs[stretch.run], stretch));
-  std::vector<std::size_t> order(stretches.size());
+std::vector<std::size_t> choose_held_out(const std::vector<double>& excitation, HeldOut which) {
+  std::vector<std::size_t> order(excitation.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
   std::stable_sort(order.begin(), order.end(),
                    [&](std::size_t a, std::size_t b) { return excitation[a] < excitation[b]; });
@@ -46,7 +40,7 @@ std::vector<std::size_t> choose_held_out(const std::vector<Measurement>& runs,
 
 }  // namespace
 
-DataSplit split(const std::vector<Measurement>& runs, HeldOut which) {
+DataSplit split(const std::vector<Measurement>& runs, HeldOut which, double arm_m, double speed_window_s) {
   const std::vector<Segment> segments = cut_segments(runs);
   DataSplit result;
   result.train.runs = result.held.runs = &runs;
@@ -58,7 +52,10 @@ DataSplit split(const std::vector<Measurement>& runs, HeldOut which) {
   if (one_run && which == HeldOut::end) {
     for (std::size_t s = segments.size() - segments.size() / 3; s < segments.size(); ++s) chosen.push_back(s);
   } else {
-    chosen = choose_held_out(runs, one_run ? segments : whole, which);
+    std::vector<double> excitation;
+    for (const Segment& stretch : one_run ? segments : whole)
+      excitation.push_back(excitation_of(runs[stretch.run], stretch, arm_m, speed_window_s));
+    chosen = choose_held_out(excitation, which);
   }
   std::vector<Segment>&train = result.train.segments, &held = result.held.segments;
   for (std::size_t s = 0; s < segments.size(); ++s) {

@@ -18,7 +18,8 @@ struct DataSplit {
 /// is `middle` of several runs, and the last third of a single one.
 enum class HeldOut { middle, other, end };
 
-/// Holds out a third.
-DataSplit split(const std::vector<Measurement>& runs, HeldOut which);
+/// Holds out a third. The excitation of a stretch is the root mean square speed of the cart and of the tip of
+/// a pendulum of length `arm_m` beside it, as differences over `speed_window_s`.
+DataSplit split(const std::vector<Measurement>& runs, HeldOut which, double arm_m, double speed_window_s);
 
 }  // namespace upright

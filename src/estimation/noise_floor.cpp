@@ -83,12 +83,11 @@ std::array<double, 2> draw(const std::vector<LinearStep>& steps, const std::arra
 
 }  // namespace
 
-SimulationFloor simulation_floor(const FitData& data, const FitPoint& point) {
+SimulationFloor simulation_floor(const FitData& data, const FitPoint& point, std::size_t draws) {
   FitPoint plain = point;
   plain.noise = sensors_only(plain.noise);
   const std::vector<std::vector<LinearStep>> steps = linearise(data, plain);
-  constexpr std::size_t draws = 32;
-  std::array<double, draws> sums{};
+  std::vector<double> sums(draws, 0.0);
   double count = 0.0;
   parallel_for(draws, [&](std::size_t i) {
     std::mt19937_64 random(i + 1);

@@ -9,11 +9,11 @@ namespace upright {
 /// in units of the sensors' noise: 1 without disturbances.
 struct SimulationFloor {
   double usual = 1.0;    ///< in the middle of all draws
-  double highest = 1.0;  ///< the largest of some dozens
+  double highest = 1.0;  ///< the largest draw
 };
 
 /// `point` holds the plant, starts for the segments and the noise; disturbances are drawn from it (always the
-/// same ones) and carried along the linearised motion.
-SimulationFloor simulation_floor(const FitData& data, const FitPoint& point);
+/// same ones), `draws` times, and carried along the linearised motion.
+SimulationFloor simulation_floor(const FitData& data, const FitPoint& point, std::size_t draws);
 
 }  // namespace upright

@@ -106,7 +106,7 @@ class Identifier {
         order_(own_order(runs)),
         runs_(arranged(runs, order_)),
         options_(options),
-        range_(range_of(runs_, base)) {}
+        range_(range_of(runs_, base, policy_.excitation)) {}
 
   Identification run() {
     try {
@@ -130,7 +130,7 @@ class Identifier {
     result_.steady_points = find_steady_points(runs_, base_);
     result_.balance = balance_forces(runs_, base_);
     const std::vector<Segment> segments = moving_segments(runs_);
-    if (segments.empty() || !moves_enough(runs_)) {
+    if (segments.empty() || !moves_enough(runs_, policy_.excitation)) {
       result_.verdict = Verdict::not_excited;
       result_.residual = "too little moves in these data to show anything";
       return;
@@ -170,10 +170,10 @@ class Identifier {
       result_.residual = "the model cannot be simulated with these runs";
       return;
     }
-    DataSplit data = split(runs_, HeldOut::end);
+    DataSplit data = split(runs_, HeldOut::end, policy_.excitation.arm_m, policy_.excitation.speed_window_s);
     for (FitData* part : {&data.train, &data.held}) part->segments = thinned(part->segments, judged_samples);
     const Model trained = fitted(model, data.train, 12, 1);
-    const Search search(base_, runs_, data.train, data.held);
+    const Search search(base_, runs_, data.train, data.held, policy_, budget_);
     Hypothesis judged;
     judged.train = trained.fit;
     judged.free = parameters_of(trained);
@@ -182,14 +182,14 @@ class Identifier {
       result_.residual = "the model cannot be simulated with these runs";
       return;
     }
-    ResidualTests left = examine_fit(whole_, model.fit.point);
+    ResidualTests left = examine_fit(whole_, model.fit.point, policy_, budget_);
     search.judge(judged, sensors_only(judged.train.point.noise));
     if (!left.structured) compare_held_out(search, judged, left);
     const SimulationFloor noise = left.structured ? SimulationFloor{} : held_out_floor(search, judged, left);
     const double floor = noise.usual;
     result_.gap_after = search.gap_of(judged) / floor;
     if (!left.structured) {
-      const PromisedEffect missing = most_promising_effect(data.train, trained.fit, judged.free, range_,
+      const PromisedEffect missing = most_promising_effect(data.train, trained.fit, judged.free, search,
                                                            {"stribeck_friction", "bristle_friction"});
       left.structured = missing.fall > most_promised;
       if (left.structured)
@@ -267,7 +267,7 @@ class Identifier {
   std::vector<FreeParameter> parameters_of(const Model& model, double mass_known_to = 0.0) const {
     std::vector<FreeParameter> free;
     for (const std::size_t effect : model.free)
-      for (FreeParameter p : free_parameters(effect, range_)) {
+      for (FreeParameter p : free_parameters(effect, range_, policy_.prior)) {
         // Nothing is believed beforehand, except that a shape without data stays near 2.
         if (p.prior_sigma > 0.0) p.prior_sigma *= 4.0;
         if (mass_known_to > 0.0 && effect == number_of("cart_mass")) {
@@ -579,6 +579,8 @@ class Identifier {
       result_.plant.remove(effect);
   }
 
+  const SelectionPolicy policy_{};
+  const SearchBudget budget_{};
   Plant base_;
   std::vector<std::size_t> order_;  ///< place among the runs as given, for each of `runs_`
   std::vector<Measurement> runs_;

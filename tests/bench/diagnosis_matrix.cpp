@@ -172,7 +172,8 @@ void unscale(const Plant& plant, PlantState<double>& state) {
 /// believed of it, these effects free.
 FitResult fit_structure(const std::vector<Measurement>& runs, const Plant& believed, const Plant& start,
                         const std::vector<std::size_t>& effects, const Noise& noise) {
-  const DataRange range = range_of(runs, believed);
+  const SelectionPolicy policy;
+  const DataRange range = range_of(runs, believed, policy.excitation);
   FitData data{&runs, cut_segments(runs)};
   FitPoint point{believed, {}, noise};
   std::vector<FreeParameter> free;
@@ -185,15 +186,15 @@ FitResult fit_structure(const std::vector<Measurement>& runs, const Plant& belie
   for (const PlantEffect& effect : believed.effects) {
     if (added(effect.number)) continue;
     if (const PlantEffect* from = start.find(effect.number)) point.plant.set(effect.number, from->values);
-    include(believed_parameters(believed, effect.number, range));
+    include(believed_parameters(believed, effect.number, range, policy.prior));
   }
   for (const std::size_t effect : base_corrections(believed, range)) {
     point.plant.set(effect, std::vector<double>{base_scale(believed, start, kind_of(effect))});
-    if (!added(effect)) include(believed_parameters(believed, effect, range));
+    if (!added(effect)) include(believed_parameters(believed, effect, range, policy.prior));
   }
   for (const std::size_t effect : effects) {
     if (const PlantEffect* from = start.find(effect)) point.plant.set(effect, from->values);
-    include(free_parameters(effect, range));
+    include(free_parameters(effect, range, policy.prior));
   }
   point.starts = guess_starts(runs, data.segments, point.plant);
   for (PlantState<double>& state : point.starts) unscale(point.plant, state);

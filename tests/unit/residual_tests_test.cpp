@@ -1,9 +1,8 @@
 // What is left of runs of a rig that the model is not, in words.
-#include "diagnosis/residual_tests.hpp"
-
 #include <gtest/gtest.h>
 
 #include "blind_case.hpp"
+#include "diagnosis/residual_test_table.hpp"
 
 namespace upright {
 namespace {
@@ -27,7 +26,7 @@ std::string what_is_left_of(const blind::Rig& rig) {
   }
   const FitData data{&runs, cut_segments(runs)};
   const FitPoint start{cart(), guess_starts(runs, data.segments, cart()), {.force = 0.1}};
-  return examine_residuals(data, fit(data, start, {}).point).goes_with;
+  return examine_residuals(data, fit(data, start, {}).point, {}).goes_with;
 }
 
 std::string with_compliance(double compliance_m_per_n) {
@@ -48,7 +47,7 @@ bool is_more_than_noise(double kurtosis, double slow_force) {
   left.noise_ratio = 10.0;
   left.tails = {kurtosis, 2.0};
   left.slow_force = slow_force;
-  conclude_tests(left);
+  conclude_tests(left, {});
   return left.structured;
 }
 

@@ -1,0 +1,20 @@
+// In which equation a residual is and what it goes with, for the sentence beside an effect.
+#pragma once
+
+#include <string>
+
+#include "selection_policy.hpp"
+#include "upright/estimation/fit.hpp"
+
+namespace upright {
+
+/// In which equation the residual is and what it goes with most: a ridge regression of the smoothed residual
+/// force and torque on velocity, direction, position, voltage, time, ..., judged on segments it has not seen.
+struct ResidualPlace {
+  bool in_pendulum = false;
+  double share = 0.0;  ///< of its variance that can be predicted
+  std::string goes_with;
+};
+ResidualPlace locate_residual(const FitData& data, const FitPoint& point, const SelectionPolicy& policy);
+
+}  // namespace upright
