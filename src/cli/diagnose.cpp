@@ -150,8 +150,8 @@ void print_trials(const Diagnosis& d) {
                 trial.taken ? "+" : " ", trial.round + 1, kind_of(trial.effect).c_str(), trial.evidence,
                 trial.held, trial.t_value, trial.certainty);
     for (const ParameterEstimate& p : trial.parameters) std::printf(" %s %.5g", p.name.c_str(), p.value);
-    std::printf("; noise %.3g N, %.3g N m, %.2g s, x%.3g\n", trial.noise.force, trial.noise.torque,
-                trial.noise.jitter_s, trial.noise.sensors);
+    std::printf("; noise %.3g N, %.3g N m, %.2g s, x%.3g; rule %s\n", trial.noise.force, trial.noise.torque,
+                trial.noise.jitter_s, trial.noise.sensors, trial.rule.c_str());
   }
 }
 

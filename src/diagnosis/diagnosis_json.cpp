@@ -36,6 +36,7 @@ json trial_json(const Trial& trial) {
           {"standard_errors", number(trial.certainty)},
           {"parameters", parameters_json(trial.parameters)},
           {"noise", noise_json(trial.noise)},
+          {"rule", trial.rule},
           {"taken", trial.taken}};
 }
 

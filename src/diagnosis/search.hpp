@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "candidates.hpp"
+#include "decision.hpp"
 #include "search_budget.hpp"
 #include "selection_policy.hpp"
 #include "upright/diagnosis/diagnosis.hpp"
@@ -35,15 +36,7 @@ struct Hypothesis {
   std::optional<PlainSimulation> simulation;  ///< once measured
 };
 
-/// How much better one hypothesis is than another, robust to residuals that are not white: sums over blocks
-/// of a quarter of a second.
-struct Improvement {
-  double train = 0.0;    ///< fall of the objective on training data
-  double belief = 0.0;   ///< of that, what is believed of the parameters: they need not go so far from it
-  double held = 0.0;     ///< of the negative log predictive density of held-out data
-  double t_value = 0.0;  ///< of the mean fall per quarter of a second of training data
-};
-
+/// How much better the richer one is.
 Improvement compare(const Hypothesis& simpler, const Hypothesis& richer);
 
 /// What a hypothesis says about one effect, as numbers with intervals.

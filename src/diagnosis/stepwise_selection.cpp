@@ -41,8 +41,7 @@ void StepwiseSelection::find() {
 bool StepwiseSelection::begin_anew() {
   options_.tell(0.83, "beginning anew");
   Hypothesis h = search_.begun_anew(current_);
-  if (!(h.train.objective < current_.train.objective - policy_.acceptance.equally_good_evidence))
-    return false;
+  if (!is_better_place(current_.train.objective - h.train.objective, policy_.acceptance)) return false;
   current_ = std::move(h);
   return true;
 }
@@ -64,8 +63,7 @@ bool StepwiseSelection::find_thoroughly(bool certainly_missing) {
     grow(2 * budget_.most_rounds, 3 * budget_.most_rounds, false);
   }
   // On the way a better place may have been found for the noise alone.
-  if (found_ == before)
-    return current_.train.objective < objective - policy_.acceptance.equally_good_evidence;
+  if (found_ == before) return is_better_place(objective - current_.train.objective, policy_.acceptance);
   prune();
   return true;
 }
@@ -111,49 +109,48 @@ double StepwiseSelection::price_of_change(const Hypothesis& from, const Hypothes
          (static_cast<double>(to.free.size()) - static_cast<double>(from.free.size()));
 }
 
-bool StepwiseSelection::is_believed(Hypothesis& h, const Improvement& improvement, std::size_t effect) {
-  const double evidence = improvement.train - price_of(effect);
-  const double t = witnessed_t(improvement);
-  if (is_borne_out(improvement, effect) && t > policy_.acceptance.least_t) return true;
-  // Held-out data that do not excite the effect say nothing: odds of less than 2 to 1 against it.
-  if (evidence < policy_.acceptance.least_evidence ||
-      !(improvement.held > -policy_.acceptance.held_out_indifference))
-    return false;
-  if (t > policy_.acceptance.least_t || evidence > policy_.acceptance.overwhelming_evidence) return true;
-  // Numbers of the plant that need not be so far off are no matter of noise.
-  if (improvement.belief - price_of(effect) > policy_.acceptance.least_evidence) return true;
-  // Nothing but the sensors' noise is left: its evidence needs no other witness.
-  return improvement.t_value > policy_.acceptance.least_t_of_sensors &&
-         improvement.held > policy_.acceptance.equally_good_evidence &&
-         search_.simulate(h).gap < policy_.acceptance.sensors_gap;
+Evidence StepwiseSelection::evidence_of(Change change, const Hypothesis& from, const Hypothesis& to,
+                                        const std::vector<std::size_t>& brought) const {
+  Evidence e;
+  e.change = change;
+  e.improvement = compare(from, to);
+  if (!std::isfinite(to.train.objective)) return e;
+  e.certainty = infinity;
+  for (const std::size_t effect : brought) {
+    e.certainty = std::min(e.certainty, search_.certainty(to, effect));
+    e.plausible = e.plausible && search_.is_plausible(to, effect);
+  }
+  return e;
 }
 
-double StepwiseSelection::witnessed_t(const Improvement& improvement) const {
-  if (!(improvement.t_value > policy_.acceptance.chance_t)) return improvement.t_value;
-  return std::sqrt(improvement.t_value * improvement.t_value + std::max(improvement.held, 0.0));
+Decision StepwiseSelection::decided(Evidence& e, Hypothesis& h, std::size_t effect) {
+  for (;;) {
+    const Decision decision = decide(e, policy_);
+    switch (decision.waits_for) {
+      case MissingFit::none:
+        return decision;
+      case MissingFit::levelled_noise:
+        level_noise(h);
+        e.levelled = compare(current_, h);
+        break;
+      case MissingFit::simulation:
+        e.simulated_gap = search_.simulate(h).gap;
+        break;
+      case MissingFit::simulated_segments:
+        e.simulated_segments = simulation_change(h);
+        break;
+      case MissingFit::all_runs:
+        e.certainty_of_all_runs = search_.certainty(search_.on_all(h), effect);
+        break;
+      case MissingFit::converged:
+        converge(h);
+        e.certainty_converged = search_.certainty(h, effect);
+        break;
+    }
+  }
 }
 
-bool StepwiseSelection::is_borne_out(const Improvement& improvement, std::size_t effect) const {
-  const double evidence = improvement.train - price_of(effect);
-  return std::min(evidence, improvement.held) > policy_.acceptance.least_evidence_of_each &&
-         evidence + improvement.held > policy_.acceptance.least_evidence_together;
-}
-
-bool StepwiseSelection::is_overwhelming(const Improvement& improvement, std::size_t effect) const {
-  return improvement.train - price_of(effect) > policy_.acceptance.overwhelming_evidence &&
-         improvement.t_value > policy_.acceptance.least_t;
-}
-
-bool StepwiseSelection::is_certain(Hypothesis& h, std::size_t effect) {
-  const double so_far = search_.certainty(h, effect);
-  if (so_far >= policy_.acceptance.least_certainty) return true;
-  const Improvement improvement = compare(current_, h);
-  if (is_borne_out(improvement, effect) &&
-      search_.certainty(search_.on_all(h), effect) >= policy_.acceptance.least_certainty)
-    return true;
-  if (improvement.train < policy_.acceptance.unconverged_evidence_ratio * std::max(so_far * so_far, 1.0))
-    return false;
-  // Much noise hides what a poor fit leaves, and each gives way to the other by and by.
+void StepwiseSelection::converge(Hypothesis& h) {
   for (int turn = 0; turn < budget_.most_turns; ++turn) {
     Hypothesis further = h;
     search_.refine(h, further);
@@ -161,11 +158,10 @@ bool StepwiseSelection::is_certain(Hypothesis& h, std::size_t effect) {
     if (gain > 0.0) h = std::move(further);
     if (!(gain > budget_.least_turn_gain)) break;
   }
-  return search_.certainty(h, effect) >= policy_.acceptance.least_certainty;
 }
 
-bool StepwiseSelection::simulates_as_well(Hypothesis& h) {
-  if (search_.held_data().segments.empty()) return true;
+SimulationChange StepwiseSelection::simulation_change(Hypothesis& h) {
+  if (search_.held_data().segments.empty()) return {};
   const std::vector<double>& now = search_.simulate(h).segment_gap;
   const std::vector<double>& before = search_.simulate(current_).segment_gap;
   if (found_.empty()) given_.simulation = current_.simulation;
@@ -176,9 +172,7 @@ bool StepwiseSelection::simulates_as_well(Hypothesis& h) {
     mean += worse / n;
     square += worse * worse / n;
   }
-  const double scatter =
-      std::max(policy_.acceptance.least_simulation_scatter, std::sqrt(std::max(square - mean * mean, 0.0)));
-  return mean < policy_.acceptance.worse_simulation_by_chance + scatter / std::sqrt(n);
+  return {now.size(), mean, std::sqrt(std::max(square - mean * mean, 0.0))};
 }
 
 void StepwiseSelection::end_doubt() {
@@ -188,7 +182,8 @@ void StepwiseSelection::end_doubt() {
   standing_.reset();
   std::swap(current_, grown.hypothesis);
   std::swap(found_, grown.found);
-  if (compare(current_, grown.hypothesis).held > 0.0 && simulates_as_well(grown.hypothesis)) {
+  Evidence e = evidence_of(Change::trust_grown, current_, grown.hypothesis, {});
+  if (decided(e, grown.hypothesis, 0).accepted) {
     current_ = std::move(grown.hypothesis);
     found_ = std::move(grown.found);
   } else {
@@ -298,41 +293,37 @@ std::vector<StepwiseSelection::Believed> StepwiseSelection::believe(int round,
   const double least_gain =
       budget_.least_screening_evidence_share * policy_.acceptance.least_evidence * search_.screening_share();
   for (std::size_t place = 0; place < std::min(budget_.most_finalists, ranking.size()); ++place) {
-    const auto& [effect, start, gain] = *ranking[place];
-    if (gain < std::max(least_gain, budget_.least_gain_share * ranking[0]->gain)) break;
+    const Screened& finalist = *ranking[place];
+    if (finalist.gain < std::max(least_gain, budget_.least_gain_share * ranking[0]->gain)) break;
     options_.tell(
         done + 0.12 + 0.08 * static_cast<double>(place) / static_cast<double>(budget_.most_finalists),
-        "fitting " + kind_of(effect));
-    Hypothesis h = start;
-    search_.refine(current_, h);
-    if (round == 0) search_.simulate(h);
-    if (round == 0) finalists_.emplace_back(effect, h);
-    Improvement improvement = compare(current_, h);
-    record_trial(round, effect, h, improvement);
-    if (!search_.is_plausible(h, effect) || bends_another(h, effect, &Search::can_be)) continue;
-    const bool overwhelming = is_overwhelming(improvement, effect);
-    if (!is_believed(h, improvement, effect)) {
-      if (overwhelming && is_certain(h, effect))
-        doubtful.push_back({effect, h, improvement.train - price_of(effect)});
-      continue;
-    }
-    if (calmly || improvement.train < policy_.acceptance.overwhelming_evidence) {
-      level_noise(h);
-      improvement = compare(current_, h);
-      if (!is_believed(h, improvement, effect)) continue;
-    }
-    const bool correction = current_.train.point.plant.find(effect) != nullptr;
-    if (!correction && !is_certain(h, effect)) continue;
-    const double score = compare(current_, h).train - price_of(effect);
-    if (simulates_as_well(h)) {
-      believed.push_back({effect, std::move(h), score});
-    } else if (overwhelming) {
-      doubtful.push_back({effect, std::move(h), score});
-    }
+        "fitting " + kind_of(finalist.effect));
+    Believed fitted{finalist.effect, finalist.hypothesis, 0.0};
+    const Decision decision = try_finalist(round, calmly, fitted);
+    if (decision.accepted) believed.push_back(std::move(fitted));
+    if (decision.in_doubt()) doubtful.push_back(std::move(fitted));
   }
   if (!believed.empty() || doubtful.empty()) return believed;
   if (!standing_) standing_.emplace(Standing{current_, found_});
   return doubtful;
+}
+
+Decision StepwiseSelection::try_finalist(int round, bool calmly, Believed& finalist) {
+  auto& [effect, h, score] = finalist;
+  search_.refine(current_, h);
+  if (round == 0) search_.simulate(h);
+  if (round == 0) finalists_.emplace_back(effect, h);
+  Evidence e = evidence_of(Change::add, current_, h, {effect});
+  e.price = price_of(effect);
+  e.bends_another = bends_another(h, effect, &Search::can_be);
+  e.is_correction = current_.train.point.plant.find(effect) != nullptr;
+  e.with_little_noise = calmly;
+  record_trial(round, effect, h, e.improvement);
+  const Decision decision = decided(e, h, effect);
+  record_.trials.back().rule = name_of(decision.rule);
+  const bool as_first_seen = decision.rule == Rule::held_out_in_doubt;
+  score = (as_first_seen ? e.improvement : compare(current_, h)).train - price_of(effect);
+  return decision;
 }
 
 std::size_t StepwiseSelection::choose(std::vector<Believed>& believed) {
@@ -354,19 +345,10 @@ std::size_t StepwiseSelection::choose(std::vector<Believed>& believed) {
       b.hypothesis = std::move(further);
       b.score += gain;
     }
-  const double best = largest();
-  const auto on_all = [&](const Believed& b) { return b.score + compare(current_, b.hypothesis).held; };
-  double best_on_all = -infinity;
+  std::vector<Contender> contenders;
   for (const Believed& b : believed)
-    if (b.score > best - policy_.acceptance.equally_good_evidence)
-      best_on_all = std::max(best_on_all, on_all(b));
-  std::size_t chosen = believed.size();
-  for (std::size_t i = 0; i < believed.size(); ++i)
-    if (believed[i].score > best - policy_.acceptance.equally_good_evidence &&
-        !(on_all(believed[i]) < best_on_all - policy_.acceptance.equally_good_evidence) &&
-        (chosen == believed.size() || is_plainer(believed[i].effect, believed[chosen].effect)))
-      chosen = i;
-  return chosen;
+    contenders.push_back({b.effect, b.score, compare(current_, b.hypothesis).held});
+  return best_of(contenders, policy_.acceptance);
 }
 
 void StepwiseSelection::take(int round, Believed& best, const std::vector<Screened>& screened) {
@@ -411,15 +393,11 @@ bool StepwiseSelection::exchange() {
       if (!(h.train.objective + price_of(other) < to_beat + policy_.distinction.indistinguishable_evidence))
         continue;
       search_.refine(without, h);
-      const Improvement improvement = compare(current_, h);
-      const double evidence = improvement.train + price_of(effect) - price_of(other);
-      const bool as_good = std::min({evidence, improvement.held, evidence + improvement.held}) >
-                           -policy_.acceptance.equally_good_evidence;
-      const bool better = evidence > policy_.distinction.indistinguishable_evidence && improvement.held > 0.0;
-      if (!better && !(as_good && is_plainer(other, effect))) continue;
-      if (!search_.is_plausible(h, other) ||
-          search_.certainty(h, other) < policy_.acceptance.least_certainty || !simulates_as_well(h))
-        continue;
+      Evidence e = evidence_of(Change::exchange, current_, h, {other});
+      e.price = price_of(other);
+      e.price_saved = price_of(effect);
+      e.is_plainer = is_plainer(other, effect);
+      if (!decided(e, h, other).accepted) continue;
       where_[other] = where_.at(effect);
       near_[other] = near_[effect];
       near_[other].push_back(effect);
@@ -458,16 +436,11 @@ bool StepwiseSelection::simplify() {
     if (!simplified_.insert({form.effect, found_.size()}).second) continue;
     options_.tell(0.8, "is it simpler than " + kind_of(form.effect));
     Hypothesis h = search_.exchanged(current_, form.effect, form.others);
-    const Improvement improvement = compare(current_, h);
-    if (!(improvement.train > price_of_change(current_, h)) ||
-        !(improvement.held > -policy_.acceptance.equally_good_evidence))
-      continue;
-    if (std::any_of(form.others.begin(), form.others.end(), [&](const PlantEffect& other) {
-          return !search_.is_plausible(h, other.number) ||
-                 search_.certainty(h, other.number) < policy_.acceptance.least_certainty;
-        }))
-      continue;
-    if (!simulates_as_well(h)) continue;
+    std::vector<std::size_t> brought;
+    for (const PlantEffect& other : form.others) brought.push_back(other.number);
+    Evidence e = evidence_of(Change::simplify, current_, h, brought);
+    e.price = price_of_change(current_, h);
+    if (!decided(e, h, brought.front()).accepted) continue;
     current_ = std::move(h);
     auto place = found_.erase(std::find(found_.begin(), found_.end(), form.effect));
     for (const PlantEffect& other : form.others) {
@@ -496,15 +469,9 @@ bool StepwiseSelection::try_pairs(const std::vector<std::pair<std::size_t, Hypot
       if (!to_beat) to_beat = search_.on_screening_subset(so_far).train.objective;
       if (!(quick.train.objective < *to_beat)) continue;
       Hypothesis h = search_.with_pair(given_, contenders[a].second, contenders[b].second);
-      const Improvement improvement = compare(so_far, h);
-      if (improvement.train - price_of_change(so_far, h) < policy_.acceptance.least_evidence ||
-          improvement.held < 0.0)
-        continue;
-      if (!search_.is_plausible(h, first) || !search_.is_plausible(h, second)) continue;
-      if (search_.certainty(h, first) < policy_.acceptance.least_certainty ||
-          search_.certainty(h, second) < policy_.acceptance.least_certainty)
-        continue;
-      if (!simulates_as_well(h)) continue;
+      Evidence e = evidence_of(Change::pair, so_far, h, {first, second});
+      e.price = price_of_change(so_far, h);
+      if (!decided(e, h, first).accepted) continue;
       best = std::move(h);
       best_found = {first, second};
       to_beat.reset();
@@ -526,13 +493,10 @@ void StepwiseSelection::prune() {
       options_.tell(0.85, "is " + kind_of(found_[i]) + " still needed");
       Hypothesis h = search_.without(current_, found_[i]);
       if (!std::isfinite(h.train.objective)) continue;
-      const Improvement improvement = compare(h, current_);
-      const bool still_shown =
-          improvement.train - price_of(found_[i]) > policy_.acceptance.least_evidence &&
-          improvement.t_value > policy_.acceptance.kept_t_share * policy_.acceptance.least_t;
-      if (still_shown || is_believed(current_, improvement, found_[i])) continue;
-      // What does without it by becoming what cannot be does not do without it.
-      if (bends_another(h, found_[i], &Search::is_plausible)) continue;
+      Evidence e = evidence_of(Change::keep, h, current_, {});
+      e.price = price_of(found_[i]);
+      e.bends_another = bends_another(h, found_[i], &Search::is_plausible);
+      if (decided(e, current_, found_[i]).accepted) continue;
       current_ = std::move(h);
       found_.erase(found_.begin() + static_cast<std::ptrdiff_t>(i));
       record_step();

@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "decision.hpp"
 #include "search.hpp"
 #include "upright/diagnosis/diagnosis.hpp"
 
@@ -79,22 +80,19 @@ class StepwiseSelection {
   double price_of(std::size_t effect) const;
   /// What the parameters must save that one hypothesis has beyond the other; negative where it has fewer.
   double price_of_change(const Hypothesis& from, const Hypothesis& to) const;
-  /// Whether training and held-out runs both speak for it, and together beyond doubt.
-  bool is_borne_out(const Improvement& improvement, std::size_t effect) const;
-  bool is_believed(Hypothesis& h, const Improvement& improvement, std::size_t effect);
-  /// What a few moments hold has a small t on the training runs. Held-out runs are a witness of their own,
-  /// whose evidence adds to its square, unless the training runs say no more than chance does.
-  double witnessed_t(const Improvement& improvement) const;
-  /// Evidence on the training runs that only something missing can hold against: held-out runs may excite
-  /// what is missing still, and speak against a right effect until it is found too.
-  bool is_overwhelming(const Improvement& improvement, std::size_t effect) const;
-  /// Whether the size of an effect is certain. A fit that is less certain than its evidence says has not
-  /// arrived: it goes on first.
-  bool is_certain(Hypothesis& h, std::size_t effect);
-  /// Forces that look right a sample ahead can simulate badly: then the name is wrong. By how much segments
-  /// are further off, as far as their number can show it: while more is missing, one and the other come out
-  /// better or worse by half.
-  bool simulates_as_well(Hypothesis& h);
+  /// What the fits made so far say of a change to a model with what it brings. Prices, and what else the
+  /// change asks for, are the caller's.
+  Evidence evidence_of(Change change, const Hypothesis& from, const Hypothesis& to,
+                       const std::vector<std::size_t>& brought) const;
+  /// The decision on a change to `h`, with the fits that it waits for made on the way: they may bring `h`
+  /// further, and give `current_` less noise.
+  Decision decided(Evidence& evidence, Hypothesis& h, std::size_t effect);
+  /// Fits until that gains nothing more. Much noise hides what a poor fit leaves, and each gives way to the
+  /// other by and by.
+  void converge(Hypothesis& h);
+  /// By how much `h` simulates held-out segments worse than `current_` does: while more is missing, one and
+  /// the other come out better or worse by half.
+  SimulationChange simulation_change(Hypothesis& h);
   /// What held-out runs spoke against while more was missing must have them on its side in the end, or all
   /// that was added since goes.
   void end_doubt();
@@ -116,6 +114,8 @@ class StepwiseSelection {
   /// The best of them fitted in full: those that the data believe, or, where there are none, those that only
   /// held-out runs speak against.
   std::vector<Believed> believe(int round, const std::vector<Screened>& screened, bool calmly, double done);
+  /// Fits one of these in full, and decides on it.
+  Decision try_finalist(int round, bool calmly, Believed& finalist);
   /// The one with the largest score. Close ones are fitted to the end first, for a fit that stopped a little
   /// early is no reason. Scores that are equal then leave it to the held-out runs, and where those say the
   /// same, to the plainer effect.

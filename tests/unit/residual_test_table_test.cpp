@@ -10,7 +10,7 @@
 namespace upright {
 namespace {
 
-const ResidualPolicy policy;
+constexpr ResidualPolicy policy;
 
 /// Beyond the sensors' noise, and like white noise in every other way.
 ResidualTests disturbed() {

@@ -1,0 +1,115 @@
+// Whether the data bear out a change of the model: a pure function of what fits have shown. It makes no fit;
+// where a rule asks for one that was not made yet, the decision says which, and waits for it.
+#pragma once
+
+#include <optional>
+#include <string_view>
+#include <vector>
+
+#include "selection_policy.hpp"
+
+namespace upright {
+
+/// How much better one hypothesis is than another, robust to residuals that are not white: sums over blocks
+/// of a quarter of a second.
+struct Improvement {
+  double train = 0.0;    ///< fall of the objective on training data
+  double belief = 0.0;   ///< of that, what is believed of the parameters: they need not go so far from it
+  double held = 0.0;     ///< of the negative log predictive density of held-out data
+  double t_value = 0.0;  ///< of the mean fall per quarter of a second of training data
+};
+
+/// How much further off plain simulations of held-out segments are: logarithms of ratios, over the segments.
+struct SimulationChange {
+  std::size_t segments = 0;  ///< 0 where no data are held out
+  double mean = 0.0, scatter = 0.0;
+};
+
+/// What is to be decided.
+enum class Change {
+  add,         ///< an effect to the model
+  exchange,    ///< what was found for what resembled it
+  simplify,    ///< what was found into plainer words
+  pair,        ///< two effects for what was found of them
+  keep,        ///< what was found earlier, beside the others
+  trust_grown  ///< what was added while held-out runs spoke against it
+};
+
+/// What the data say of a change. Improvements are over the model without it.
+struct Evidence {
+  Change change = Change::add;
+  Improvement improvement;
+  double price = 0.0;              ///< of the parameters beyond the first that it brings [evidence]
+  double price_saved = 0.0;        ///< of those that go [evidence]
+  double certainty = 0.0;          ///< of the size of what it brings, the least [standard errors]
+  bool plausible = true;           ///< no size at the end of its range, none that does nothing
+  bool bends_another = false;      ///< another effect that was found becomes what cannot be
+  bool is_correction = false;      ///< of a number of the plant file
+  bool with_little_noise = false;  ///< found from less noise than the model without it has
+  bool is_plainer = false;         ///< than what goes
+
+  // From fits that only some rules ask for.
+  std::optional<Improvement> levelled;  ///< over the model from the same noise
+  std::optional<double> simulated_gap;  ///< of held-out data [sensor noise]
+  std::optional<SimulationChange> simulated_segments;
+  std::optional<double> certainty_of_all_runs;
+  std::optional<double> certainty_converged;  ///< once more fits gain nothing
+};
+
+/// A fit that a decision waits for.
+enum class MissingFit { none, levelled_noise, simulation, simulated_segments, all_runs, converged };
+
+/// Why a change was accepted, or why not.
+enum class Rule {
+  undecided,
+  // Accepted.
+  shown_throughout,    ///< evidence on the training runs, all along them
+  borne_out,           ///< training and held-out runs both say so
+  overwhelming,        ///< evidence that no coloured noise makes
+  plant_numbers,       ///< numbers of the plant need not be so far off
+  sensors_noise_left,  ///< nothing else is left that could have made it
+  better,              ///< than what it stands for
+  plainer,             ///< as good, and fewer words
+  still_shown,         ///< beside the others
+  needed_by_another,   ///< without it another becomes what cannot be
+  held_out_agree,      ///< in the end
+  // Not accepted.
+  cannot_be,
+  bends_another,
+  too_little_evidence,
+  held_out_against,
+  chance,
+  uncertain_size,
+  simulates_worse,
+  no_better,
+  // Not accepted, but followed where nothing is: held-out runs may speak against a right effect until what
+  // else is missing is found.
+  held_out_in_doubt,
+  simulation_in_doubt
+};
+std::string_view name_of(Rule rule);
+
+struct Decision {
+  bool accepted = false;
+  Rule rule = Rule::undecided;
+  MissingFit waits_for = MissingFit::none;
+  bool in_doubt() const { return rule == Rule::held_out_in_doubt || rule == Rule::simulation_in_doubt; }
+};
+
+Decision decide(const Evidence& evidence, const SelectionPolicy& policy);
+
+/// Whether a fit from elsewhere, whose objective is lower by `fall`, is in a better place.
+bool is_better_place(double fall, const AcceptancePolicy& policy);
+
+/// An effect that may be taken.
+struct Contender {
+  std::size_t effect = 0;
+  double score = 0.0;     ///< what it saves on training data beyond its price [evidence]
+  double held_out = 0.0;  ///< what it saves there [evidence]
+};
+
+/// The place of the one with the largest score. Scores that are equal leave it to the held-out runs, and
+/// where those say the same, to the plainer effect. There must be one.
+std::size_t best_of(const std::vector<Contender>& contenders, const AcceptancePolicy& policy);
+
+}  // namespace upright

@@ -1,0 +1,350 @@
+// Both sides of every rule that decides whether the data bear out a change of the model.
+#include "diagnosis/decision.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <set>
+
+#include "diagnosis/indistinguishable.hpp"
+
+namespace upright {
+namespace {
+
+constexpr SelectionPolicy policy;
+constexpr AcceptancePolicy p = policy.acceptance;
+constexpr double infinity = std::numeric_limits<double>::infinity();
+
+double above(double value) {
+  return std::nextafter(value, infinity);
+}
+double below(double value) {
+  return std::nextafter(value, -infinity);
+}
+
+/// A change that is borne out by no rule but those that the test sets: no fit is missing.
+Evidence evidence(Change change, double train, double held, double t_value) {
+  Evidence e;
+  e.change = change;
+  e.improvement = {train, 0.0, held, t_value};
+  e.certainty = 10.0;
+  e.simulated_segments = SimulationChange{};
+  return e;
+}
+
+/// An effect that is as well off when the noise is levelled.
+Evidence addition(double train, double held, double t_value) {
+  Evidence e = evidence(Change::add, train, held, t_value);
+  e.levelled = e.improvement;
+  return e;
+}
+
+Rule rule_of(const Evidence& e) {
+  const Decision decision = decide(e, policy);
+  EXPECT_EQ(decision.waits_for, MissingFit::none);
+  return decision.rule;
+}
+
+MissingFit missing_of(const Evidence& e) {
+  const Decision decision = decide(e, policy);
+  EXPECT_FALSE(decision.accepted);
+  return decision.waits_for;
+}
+
+TEST(Addition, MustBePossibleAndLeaveOthersSo) {
+  Evidence e = addition(500.0, 0.0, 5.0);
+  EXPECT_TRUE(decide(e, policy).accepted);
+  e.bends_another = true;
+  EXPECT_EQ(rule_of(e), Rule::bends_another);
+  e.plausible = false;
+  EXPECT_EQ(rule_of(e), Rule::cannot_be);
+}
+
+TEST(Addition, NeedsEvidenceBeyondItsPrice) {
+  EXPECT_EQ(rule_of(addition(p.least_evidence, 0.0, 5.0)), Rule::shown_throughout);
+  EXPECT_EQ(rule_of(addition(below(p.least_evidence), 0.0, 5.0)), Rule::too_little_evidence);
+  Evidence priced = addition(p.least_evidence + 20.0, 0.0, 5.0);
+  priced.price = 20.0;
+  EXPECT_EQ(rule_of(priced), Rule::shown_throughout);
+  priced.price = 21.0;
+  EXPECT_EQ(rule_of(priced), Rule::too_little_evidence);
+}
+
+TEST(Addition, IsRefusedWhereHeldOutRunsSpeakAgainstIt) {
+  EXPECT_EQ(rule_of(addition(500.0, -p.held_out_indifference, 5.0)), Rule::held_out_against);
+  EXPECT_EQ(rule_of(addition(500.0, above(-p.held_out_indifference), 5.0)), Rule::shown_throughout);
+}
+
+TEST(Addition, MustShowAllAlongTheTrainingRuns) {
+  EXPECT_EQ(rule_of(addition(500.0, 0.0, p.least_t)), Rule::chance);
+  EXPECT_EQ(rule_of(addition(500.0, 0.0, above(p.least_t))), Rule::shown_throughout);
+}
+
+TEST(Addition, HasHeldOutRunsAsAWitnessOfItsT) {
+  Evidence e = addition(500.0, 5.0, 2.0);  // 2^2 + 5 = 3^2
+  e.simulated_gap = 2.0;
+  EXPECT_EQ(rule_of(e), Rule::chance);
+  e.improvement.held = 5.01;
+  e.levelled = e.improvement;
+  EXPECT_EQ(rule_of(e), Rule::shown_throughout);
+}
+
+TEST(Addition, HasNoWitnessWhereTrainingRunsSayNoMoreThanChance) {
+  EXPECT_EQ(rule_of(addition(500.0, 1000.0, p.chance_t)), Rule::chance);
+  EXPECT_EQ(rule_of(addition(500.0, 1000.0, above(p.chance_t))), Rule::borne_out);
+}
+
+TEST(Addition, IsBorneOutByTrainingAndHeldOutRuns) {
+  EXPECT_EQ(rule_of(addition(p.least_evidence_of_each, 1000.0, 5.0)), Rule::too_little_evidence);
+  EXPECT_EQ(rule_of(addition(above(p.least_evidence_of_each), 1000.0, 5.0)), Rule::borne_out);
+  EXPECT_EQ(rule_of(addition(1000.0, p.least_evidence_of_each, 5.0)), Rule::shown_throughout);
+  EXPECT_EQ(rule_of(addition(1000.0, above(p.least_evidence_of_each), 5.0)), Rule::borne_out);
+  const double half = 0.5 * p.least_evidence_together;
+  EXPECT_EQ(rule_of(addition(half, half, 5.0)), Rule::too_little_evidence);
+  EXPECT_EQ(rule_of(addition(half, half + 0.1, 5.0)), Rule::borne_out);
+}
+
+TEST(Addition, NeedsNoTWithOverwhelmingEvidence) {
+  EXPECT_EQ(rule_of(addition(p.overwhelming_evidence, 0.0, 0.5)), Rule::chance);
+  EXPECT_EQ(rule_of(addition(above(p.overwhelming_evidence), 0.0, 0.5)), Rule::overwhelming);
+}
+
+TEST(Addition, NeedsNoTWhereNumbersOfThePlantNeedNotBeSoFarOff) {
+  Evidence e = addition(500.0, 0.0, 0.5);
+  e.improvement.belief = p.least_evidence;
+  e.levelled = e.improvement;
+  EXPECT_EQ(rule_of(e), Rule::chance);
+  e.improvement.belief = above(p.least_evidence);
+  e.levelled = e.improvement;
+  EXPECT_EQ(rule_of(e), Rule::plant_numbers);
+}
+
+TEST(Addition, NeedsALittleTWhereTheSensorsNoiseIsLeft) {
+  const auto rule = [](double held, double t_value, double gap) {
+    Evidence e = addition(500.0, held, t_value);
+    e.simulated_gap = gap;
+    return rule_of(e);
+  };
+  EXPECT_EQ(rule(4.5, p.least_t_of_sensors, 1.0), Rule::chance);
+  EXPECT_EQ(rule(4.5, above(p.least_t_of_sensors), 1.0), Rule::sensors_noise_left);
+  EXPECT_EQ(rule(p.equally_good_evidence, 1.6, 1.0), Rule::chance);
+  EXPECT_EQ(rule(above(p.equally_good_evidence), 1.6, 1.0), Rule::sensors_noise_left);
+  EXPECT_EQ(rule(4.5, 1.6, p.sensors_gap), Rule::chance);
+  EXPECT_EQ(rule(4.5, 1.6, below(p.sensors_gap)), Rule::sensors_noise_left);
+}
+
+TEST(Addition, MustBeOfACertainSize) {
+  Evidence e = addition(60.0, 0.0, 5.0);  // less than four times the square of the certainty
+  e.certainty = p.least_certainty;
+  EXPECT_EQ(rule_of(e), Rule::shown_throughout);
+  e.certainty = below(p.least_certainty);
+  EXPECT_EQ(rule_of(e), Rule::uncertain_size);
+  e.is_correction = true;
+  EXPECT_EQ(rule_of(e), Rule::shown_throughout);
+}
+
+TEST(Addition, GoesOnWhereItsFitIsLessCertainThanItsEvidence) {
+  Evidence e = addition(9.0 * p.unconverged_evidence_ratio, 0.0, 5.0);
+  e.certainty = 3.0;
+  EXPECT_EQ(missing_of(e), MissingFit::converged);
+  e.certainty_converged = below(p.least_certainty);
+  EXPECT_EQ(rule_of(e), Rule::uncertain_size);
+  e.certainty_converged = p.least_certainty;
+  EXPECT_EQ(rule_of(e), Rule::shown_throughout);
+  e.certainty = above(3.0);
+  e.certainty_converged.reset();
+  EXPECT_EQ(rule_of(e), Rule::uncertain_size);
+}
+
+TEST(Addition, MayBeMadeCertainByAllRuns) {
+  Evidence e = addition(21.0, 20.0, 5.0);
+  e.certainty = 3.0;
+  EXPECT_EQ(missing_of(e), MissingFit::all_runs);
+  e.certainty_of_all_runs = p.least_certainty;
+  EXPECT_EQ(rule_of(e), Rule::borne_out);
+  e.certainty_of_all_runs = below(p.least_certainty);
+  EXPECT_EQ(rule_of(e), Rule::uncertain_size);
+}
+
+TEST(Addition, MustSimulateAsWellAsSegmentsCanShow) {
+  const auto rule = [](std::size_t segments, double scatter, double mean) {
+    Evidence e = addition(500.0, 0.0, 5.0);
+    e.simulated_segments = SimulationChange{segments, mean, scatter};
+    return rule_of(e);
+  };
+  EXPECT_EQ(rule(0, 0.0, 100.0), Rule::shown_throughout) << "no data are held out";
+  const double by_four = p.worse_simulation_by_chance + 0.5 * p.least_simulation_scatter;
+  EXPECT_EQ(rule(4, 0.1, by_four), Rule::simulates_worse);
+  EXPECT_EQ(rule(4, 0.1, below(by_four)), Rule::shown_throughout);
+  EXPECT_EQ(rule(4, 2.0, by_four), Rule::shown_throughout) << "four segments that scatter show less";
+  EXPECT_EQ(rule(4, 2.0, p.worse_simulation_by_chance + 1.0), Rule::simulates_worse);
+}
+
+TEST(Addition, IsFollowedInDoubtWithOverwhelmingEvidenceOnly) {
+  const auto against = [](double train, double t_value) { return rule_of(addition(train, -5.0, t_value)); };
+  EXPECT_EQ(against(p.overwhelming_evidence, 5.0), Rule::held_out_against);
+  EXPECT_EQ(against(above(p.overwhelming_evidence), 5.0), Rule::held_out_in_doubt);
+  EXPECT_EQ(against(2000.0, p.least_t), Rule::held_out_against);
+  EXPECT_EQ(against(2000.0, above(p.least_t)), Rule::held_out_in_doubt);
+  Evidence uncertain = addition(2000.0, -5.0, 5.0);
+  uncertain.certainty = 1.0;
+  uncertain.certainty_converged = 1.0;
+  EXPECT_EQ(rule_of(uncertain), Rule::uncertain_size);
+
+  const auto worse = [](double train) {
+    Evidence e = addition(train, 0.0, 5.0);
+    e.simulated_segments = SimulationChange{4, 10.0, 0.0};
+    return decide(e, policy);
+  };
+  EXPECT_EQ(worse(p.overwhelming_evidence).rule, Rule::simulates_worse);
+  EXPECT_FALSE(worse(p.overwhelming_evidence).in_doubt());
+  EXPECT_EQ(worse(above(p.overwhelming_evidence)).rule, Rule::simulation_in_doubt);
+  EXPECT_TRUE(worse(above(p.overwhelming_evidence)).in_doubt());
+  EXPECT_FALSE(worse(above(p.overwhelming_evidence)).accepted);
+}
+
+TEST(Addition, CountsOverTheModelWithTheSameNoise) {
+  Evidence e = evidence(Change::add, below(p.overwhelming_evidence), 0.0, 5.0);
+  EXPECT_EQ(missing_of(e), MissingFit::levelled_noise);
+  e.levelled = Improvement{10.0, 0.0, 0.0, 5.0};
+  EXPECT_EQ(rule_of(e), Rule::too_little_evidence);
+  e = evidence(Change::add, p.overwhelming_evidence, 0.0, 5.0);
+  EXPECT_EQ(rule_of(e), Rule::shown_throughout);
+  e.with_little_noise = true;
+  EXPECT_EQ(missing_of(e), MissingFit::levelled_noise);
+}
+
+TEST(Addition, WaitsForTheSimulationsThatARuleAsksFor) {
+  EXPECT_EQ(missing_of(addition(500.0, 4.5, 1.6)), MissingFit::simulation);
+  Evidence e = addition(500.0, 0.0, 5.0);
+  e.simulated_segments.reset();
+  EXPECT_EQ(missing_of(e), MissingFit::simulated_segments);
+}
+
+TEST(Exchange, IsForWhatIsBetter) {
+  const double least = policy.distinction.indistinguishable_evidence;
+  EXPECT_EQ(rule_of(evidence(Change::exchange, least, 1.0, 0.0)), Rule::no_better);
+  EXPECT_EQ(rule_of(evidence(Change::exchange, above(least), 1.0, 0.0)), Rule::better);
+  EXPECT_EQ(rule_of(evidence(Change::exchange, 100.0, 0.0, 0.0)), Rule::no_better);
+  EXPECT_EQ(rule_of(evidence(Change::exchange, 100.0, above(0.0), 0.0)), Rule::better);
+  Evidence cheaper = evidence(Change::exchange, 0.0, 1.0, 0.0);
+  cheaper.price_saved = 20.0;
+  EXPECT_EQ(rule_of(cheaper), Rule::better);
+}
+
+TEST(Exchange, IsForWhatIsAsGoodAndPlainer) {
+  const auto rule = [](double train, double held) {
+    Evidence e = evidence(Change::exchange, train, held, 0.0);
+    e.is_plainer = true;
+    return rule_of(e);
+  };
+  EXPECT_EQ(rule(-p.equally_good_evidence, 1.0), Rule::no_better);
+  EXPECT_EQ(rule(above(-p.equally_good_evidence), 1.0), Rule::plainer);
+  EXPECT_EQ(rule(1.0, -p.equally_good_evidence), Rule::no_better);
+  EXPECT_EQ(rule(1.0, above(-p.equally_good_evidence)), Rule::plainer);
+  EXPECT_EQ(rule(-0.5 * p.equally_good_evidence, -0.5 * p.equally_good_evidence), Rule::no_better);
+  EXPECT_EQ(rule(-0.5 * p.equally_good_evidence, 0.1 - 0.5 * p.equally_good_evidence), Rule::plainer);
+}
+
+TEST(Exchange, AsksOfWhatStandsInThatItIsPossibleCertainAndSimulates) {
+  Evidence e = evidence(Change::exchange, 100.0, 1.0, 0.0);
+  e.certainty = p.least_certainty;
+  EXPECT_EQ(rule_of(e), Rule::better);
+  e.certainty = below(p.least_certainty);
+  EXPECT_EQ(rule_of(e), Rule::uncertain_size);
+  e.plausible = false;
+  EXPECT_EQ(rule_of(e), Rule::cannot_be);
+  e = evidence(Change::exchange, 100.0, 1.0, 0.0);
+  e.simulated_segments = SimulationChange{4, 10.0, 0.0};
+  EXPECT_EQ(rule_of(e), Rule::simulates_worse);
+}
+
+TEST(Simplification, MustSaveWhatItsParametersCost) {
+  Evidence e = evidence(Change::simplify, 10.0, 0.0, 0.0);
+  e.price = 10.0;
+  EXPECT_EQ(rule_of(e), Rule::no_better);
+  e.improvement.train = above(10.0);
+  EXPECT_EQ(rule_of(e), Rule::plainer);
+  e.improvement.held = -p.equally_good_evidence;
+  EXPECT_EQ(rule_of(e), Rule::held_out_against);
+  e.improvement.held = above(-p.equally_good_evidence);
+  EXPECT_EQ(rule_of(e), Rule::plainer);
+}
+
+TEST(Pair, NeedsEvidenceAndNoHeldOutRunsAgainstIt) {
+  EXPECT_EQ(rule_of(evidence(Change::pair, below(p.least_evidence), 0.0, 0.0)), Rule::too_little_evidence);
+  EXPECT_EQ(rule_of(evidence(Change::pair, p.least_evidence, 0.0, 0.0)), Rule::better);
+  EXPECT_EQ(rule_of(evidence(Change::pair, p.least_evidence, below(0.0), 0.0)), Rule::held_out_against);
+}
+
+TEST(Keeping, NeedsALittleLessTThanAdding) {
+  const double least_t = p.kept_t_share * p.least_t;
+  EXPECT_EQ(rule_of(evidence(Change::keep, 100.0, 0.0, least_t)), Rule::chance);
+  EXPECT_EQ(rule_of(evidence(Change::keep, 100.0, 0.0, above(least_t))), Rule::still_shown);
+  EXPECT_EQ(rule_of(evidence(Change::keep, p.least_evidence, 0.0, 2.5)), Rule::chance);
+  EXPECT_EQ(rule_of(evidence(Change::keep, above(p.least_evidence), 0.0, 2.5)), Rule::still_shown);
+  EXPECT_EQ(rule_of(evidence(Change::keep, 20.0, 21.0, 5.0)), Rule::borne_out);
+}
+
+TEST(Keeping, IsForWhatAnotherNeeds) {
+  Evidence e = evidence(Change::keep, 1.0, 0.0, 0.0);
+  EXPECT_EQ(rule_of(e), Rule::too_little_evidence);
+  e.bends_another = true;
+  EXPECT_EQ(rule_of(e), Rule::needed_by_another);
+}
+
+TEST(WhatWasAddedInDoubt, MustHaveHeldOutRunsOnItsSideInTheEnd) {
+  EXPECT_EQ(rule_of(evidence(Change::trust_grown, 5000.0, 0.0, 5.0)), Rule::held_out_against);
+  Evidence e = evidence(Change::trust_grown, 5000.0, above(0.0), 5.0);
+  EXPECT_EQ(rule_of(e), Rule::held_out_agree);
+  e.simulated_segments = SimulationChange{4, 10.0, 0.0};
+  EXPECT_EQ(rule_of(e), Rule::simulates_worse);
+}
+
+TEST(Rules, HaveNamesOfTheirOwn) {
+  std::set<std::string_view> names;
+  const int count = static_cast<int>(Rule::simulation_in_doubt) + 1;
+  for (int i = 0; i < count; ++i) names.insert(name_of(static_cast<Rule>(i)));
+  EXPECT_EQ(names.size(), static_cast<std::size_t>(count));
+  EXPECT_FALSE(names.contains(""));
+}
+
+TEST(Place, IsBetterByMoreThanIsEquallyGood) {
+  EXPECT_FALSE(is_better_place(p.equally_good_evidence, p));
+  EXPECT_TRUE(is_better_place(above(p.equally_good_evidence), p));
+}
+
+/// A spring has two parameters, a force one: it is the plainer.
+const std::size_t force = effect_number("constant_force"), spring = effect_number("cable_spring");
+
+TEST(BestContender, HasTheLargestScoreUnlessOthersAreEqual) {
+  EXPECT_EQ(best_of({{spring, 104.0, 0.0}, {force, 100.0, 0.0}}, p), 0u);
+  EXPECT_EQ(best_of({{spring, below(104.0), 0.0}, {force, 100.0, 0.0}}, p), 1u);
+}
+
+TEST(BestContender, IsChosenByHeldOutRunsAmongEquals) {
+  EXPECT_EQ(best_of({{spring, 100.0, 4.1}, {force, 100.0, 0.0}}, p), 0u);
+  EXPECT_EQ(best_of({{spring, 100.0, 4.0}, {force, 100.0, 0.0}}, p), 1u);
+}
+
+TEST(Indistinguishable, IsWhatLosesLittleEvidenceOrLessThanItsScatter) {
+  const DistinctionPolicy& d = policy.distinction;
+  EXPECT_TRUE(is_indistinguishable(below(d.indistinguishable_evidence), 100.0, d));
+  EXPECT_FALSE(is_indistinguishable(d.indistinguishable_evidence, 100.0, d));
+  EXPECT_TRUE(is_indistinguishable(100.0, below(d.scattered_t), d));
+  EXPECT_FALSE(is_indistinguishable(100.0, d.scattered_t, d));
+  EXPECT_TRUE(is_indistinguishable(below(d.most_scattered_evidence), 0.0, d));
+  EXPECT_FALSE(is_indistinguishable(d.most_scattered_evidence, 0.0, d));
+}
+
+TEST(Alternative, TakesTheCertaintyOfAnEffectAway) {
+  const DistinctionPolicy& d = policy.distinction;
+  EXPECT_TRUE(takes_certainty_away(below(d.least_distance), 100.0, d));
+  EXPECT_FALSE(takes_certainty_away(d.least_distance, 100.0, d));
+  EXPECT_TRUE(takes_certainty_away(below(3.0), 3.0 / d.least_loss, d));
+  EXPECT_FALSE(takes_certainty_away(3.0, 3.0 / d.least_loss, d));
+}
+
+}  // namespace
+}  // namespace upright
