@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <sstream>
 
+#include "plausibility.hpp"
 #include "residual_test_table.hpp"
 
 namespace upright {
@@ -35,7 +36,7 @@ void compare_held_out(const Search& search, const Hypothesis& judged, ResidualTe
   // What is left need not be such noise: all runs together may be further off than such noise makes them, and
   // held-out ones by as much again.
   const double excess = search.simulate(told).gap / held_out_floor(search, told, structure).highest;
-  if (!(excess > search.policy().residual.most_excess * std::max(1.0, structure.excess))) return;
+  if (!is_held_out_too_far_off(excess, structure.excess, search.policy().residual)) return;
   structure.structured = true;
   std::ostringstream text;
   text.precision(3);

@@ -11,6 +11,7 @@
 #include "estimation/held_out.hpp"
 #include "indistinguishable.hpp"
 #include "next_experiment.hpp"
+#include "plausibility.hpp"
 #include "residual.hpp"
 #include "search.hpp"
 #include "stepwise_selection.hpp"
@@ -19,8 +20,6 @@
 namespace upright {
 
 namespace {
-
-constexpr double infinity = std::numeric_limits<double>::infinity();
 
 class Diagnostician {
  public:
@@ -145,58 +144,22 @@ class Diagnostician {
     return left;
   }
 
-  /// Which of the corrections that every fit was left room for are really there: the least certain is set
-  /// back to what the plant file says, the others follow (a Gaussian approximation of the likelihood), until
-  /// all that are left are certain.
+  /// Which of the corrections that every fit was left room for are really there.
   void settle_corrections() {
     const Hypothesis& h = selection_.current();
-    std::vector<std::size_t> open;
-    for (std::size_t j = 0; j < h.free.size(); ++j) open.push_back(j);
-    Eigen::VectorXd value(static_cast<Eigen::Index>(h.free.size()));
-    for (std::size_t j = 0; j < h.free.size(); ++j)
-      value[static_cast<Eigen::Index>(j)] =
-          h.train.point.plant.find(h.free[j].effect)->values[h.free[j].index];
-    Eigen::MatrixXd covariance = h.train.covariance;
-    const auto is_correction = [&](std::size_t j) {
-      return std::find(selection_.found().begin(), selection_.found().end(), h.free[j].effect) ==
-             selection_.found().end();
-    };
-    for (;;) {
-      double least = infinity;
-      std::size_t place = 0;
-      for (std::size_t a = 0; a < open.size(); ++a) {
-        if (!is_correction(open[a])) continue;
-        const auto at = static_cast<Eigen::Index>(a);
-        const double z = std::abs(value[at] - h.free[open[a]].prior_mean) /
-                         std::sqrt(std::max(covariance(at, at), 1e-300));
-        if (z < least) {
-          least = z;
-          place = a;
-        }
-      }
-      if (!(least < policy_.correction.least_z)) break;
-      const auto at = static_cast<Eigen::Index>(place);
-      const double step = h.free[open[place]].prior_mean - value[at];
-      const Eigen::VectorXd column = covariance.col(at) / std::max(covariance(at, at), 1e-300);
-      value += column * step;
-      covariance -= column * covariance.row(at).eval();
-      const Eigen::Index n = value.size();
-      Eigen::VectorXd smaller_value(n - 1);
-      Eigen::MatrixXd smaller(n - 1, n - 1);
-      for (Eigen::Index i = 0, a = 0; i < n; ++i) {
-        if (i == at) continue;
-        smaller_value[a] = value[i];
-        for (Eigen::Index j = 0, b = 0; j < n; ++j)
-          if (j != at) smaller(a, b++) = covariance(i, j);
-        ++a;
-      }
-      value = smaller_value;
-      covariance = smaller;
-      open.erase(open.begin() + static_cast<std::ptrdiff_t>(place));
+    const auto n = static_cast<Eigen::Index>(h.free.size());
+    ParameterBeliefs beliefs{Eigen::VectorXd(n), Eigen::VectorXd(n), h.train.covariance};
+    std::vector<bool> is_correction;
+    for (const FreeParameter& p : h.free) {
+      const auto at = static_cast<Eigen::Index>(is_correction.size());
+      beliefs.value[at] = h.train.point.plant.find(p.effect)->values[p.index];
+      beliefs.prior_mean[at] = p.prior_mean;
+      is_correction.push_back(std::find(selection_.found().begin(), selection_.found().end(), p.effect) ==
+                              selection_.found().end());
     }
     std::vector<std::size_t> corrections;
-    for (const std::size_t j : open)
-      if (is_correction(j) && !is_within_belief(h, j) && search_.is_plausible(h, h.free[j].effect) &&
+    for (const std::size_t j : certain_parameters(beliefs, is_correction, policy_.correction))
+      if (is_correction[j] && !is_believed(h, j) && search_.is_plausible(h, h.free[j].effect) &&
           std::find(corrections.begin(), corrections.end(), h.free[j].effect) == corrections.end())
         corrections.push_back(h.free[j].effect);
     fit_last(corrections);
@@ -216,7 +179,7 @@ class Diagnostician {
       options_.tell(0.9, "fitting all runs");
       known_ = search_.on_all(final_);
       const auto includes_nothing = [&](std::size_t effect) {
-        return search_.certainty(known_, effect) < policy_.correction.least_certainty_of_all_runs;
+        return !is_certain_of_all_runs(search_.certainty(known_, effect), policy_.correction);
       };
       const auto gone = std::remove_if(corrections.begin(), corrections.end(), includes_nothing);
       if (gone == corrections.end()) return;
@@ -224,14 +187,13 @@ class Diagnostician {
     }
   }
 
-  /// A coefficient of the plant file that moved no further than such coefficients do from day to day: the
-  /// number is set right, but nothing was missing.
-  bool is_within_belief(const Hypothesis& h, std::size_t j) const {
+  /// A coefficient of the plant file that moved within what is believed of it.
+  bool is_believed(const Hypothesis& h, std::size_t j) const {
     const FreeParameter& p = h.free[j];
     if (effect_registry()[p.effect].enters == Enters::parameter || plant_.find(p.effect) == nullptr)
       return false;
-    return std::abs(h.train.point.plant.find(p.effect)->values[p.index] - p.prior_mean) <
-           policy_.correction.within_belief * p.prior_sigma;
+    const double value = h.train.point.plant.find(p.effect)->values[p.index];
+    return is_within_belief(value, p.prior_mean, p.prior_sigma, policy_.correction);
   }
 
   /// Corrections in the order of how much each closes: of sensors first, then of the plant's numbers, which
@@ -312,12 +274,13 @@ class Diagnostician {
     for (const std::size_t effect : all_found()) {
       const auto [scale, parameter] = scale_of(effect);
       if (parameter == nullptr) continue;
-      const bool low = scale < parameter->low * (1.0 + policy_.correction.end_of_range);
-      if (!low && scale < parameter->high * (1.0 - policy_.correction.end_of_range)) continue;
+      const EndOfRange end = end_of_range(scale, parameter->low, parameter->high, policy_.correction);
+      if (end == EndOfRange::none) continue;
       structure.structured = true;
       std::ostringstream text;
       text.precision(3);
-      text << "it takes a " << kind_of(effect) << " of " << scale << (low ? " or less" : " or more")
+      text << "it takes a " << kind_of(effect) << " of " << scale
+           << (end == EndOfRange::low ? " or less" : " or more")
            << ", which cannot be: something else is missing";
       structure.sentence = text.str();
     }
@@ -335,8 +298,7 @@ class Diagnostician {
   void note_doubtful_numbers() {
     for (const std::size_t effect : all_found()) {
       const double scale = scale_of(effect).first;
-      if (effect_registry()[effect].enters != Enters::parameter ||
-          std::abs(std::log(scale)) < policy_.correction.doubtful_scale)
+      if (effect_registry()[effect].enters != Enters::parameter || !is_doubtful(scale, policy_.correction))
         continue;
       std::ostringstream text;
       text.precision(3);

@@ -7,6 +7,7 @@
 #include <numeric>
 
 #include "effect_starts.hpp"
+#include "plausibility.hpp"
 #include "residual.hpp"
 
 namespace upright {
@@ -224,7 +225,7 @@ bool Search::is_plausible(const Hypothesis& h, std::size_t effect) const {
     const double value = h.train.point.plant.find(effect)->values[p.index];
     if (p.index == 0 && value == effect_registry()[effect].parameters[0].neutral) return false;
     if (kind_of(effect).starts_with("angle_offset") &&
-        std::abs(value) < policy_.correction.least_angle_offset_steps * range_.theta_resolution_rad)
+        !shows_on_encoder(value, range_.theta_resolution_rad, policy_.correction))
       return false;
   }
   return can_be(h, effect);
@@ -242,8 +243,8 @@ bool Search::bristles_are_short(const Hypothesis& h) const {
   const Dynamics<double> dynamics(make_model<double>(plant));
   const double breakaway_n = dynamics.cart_dry_level(range_.cart_mean_m, 0.0, 1.0);
   const double stiffness_n_per_m = plant.find(effect_number("bristle_friction"))->values[0];
-  return breakaway_n < stiffness_n_per_m * policy_.correction.bristle_share_of_travel *
-                           (range_.cart_high_m - range_.cart_low_m);
+  return are_bristles_short(breakaway_n, stiffness_n_per_m, range_.cart_high_m - range_.cart_low_m,
+                            policy_.correction);
 }
 
 double Search::certainty(const Hypothesis& h, std::size_t effect) const {

@@ -1,0 +1,82 @@
+#include "plausibility.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+namespace upright {
+
+namespace {
+
+/// Sets the parameter at `place` back to what was believed of it, and takes it out: the others follow.
+void set_back(ParameterBeliefs& beliefs, Eigen::Index place) {
+  const double step = beliefs.prior_mean[place] - beliefs.value[place];
+  const Eigen::VectorXd column =
+      beliefs.covariance.col(place) / std::max(beliefs.covariance(place, place), 1e-300);
+  beliefs.value += column * step;
+  beliefs.covariance -= column * beliefs.covariance.row(place).eval();
+  std::vector<Eigen::Index> others;
+  for (Eigen::Index i = 0; i < beliefs.value.size(); ++i)
+    if (i != place) others.push_back(i);
+  const Eigen::MatrixXd covariance = beliefs.covariance(others, others);
+  beliefs = {beliefs.value(others).eval(), beliefs.prior_mean(others).eval(), covariance};
+}
+
+}  // namespace
+
+std::vector<std::size_t> certain_parameters(ParameterBeliefs beliefs, const std::vector<bool>& is_correction,
+                                            const CorrectionPolicy& policy) {
+  std::vector<std::size_t> open(is_correction.size());
+  std::iota(open.begin(), open.end(), std::size_t{0});
+  for (;;) {
+    double least = std::numeric_limits<double>::infinity();
+    std::size_t place = 0;
+    for (std::size_t a = 0; a < open.size(); ++a) {
+      if (!is_correction[open[a]]) continue;
+      const auto at = static_cast<Eigen::Index>(a);
+      const double z = std::abs(beliefs.value[at] - beliefs.prior_mean[at]) /
+                       std::sqrt(std::max(beliefs.covariance(at, at), 1e-300));
+      if (z < least) {
+        least = z;
+        place = a;
+      }
+    }
+    if (!(least < policy.least_z)) return open;
+    set_back(beliefs, static_cast<Eigen::Index>(place));
+    open.erase(open.begin() + static_cast<std::ptrdiff_t>(place));
+  }
+}
+
+bool is_certain_of_all_runs(double certainty, const CorrectionPolicy& policy) {
+  return !(certainty < policy.least_certainty_of_all_runs);
+}
+
+bool is_within_belief(double value, double prior_mean, double prior_sigma, const CorrectionPolicy& policy) {
+  return std::abs(value - prior_mean) < policy.within_belief * prior_sigma;
+}
+
+EndOfRange end_of_range(double scale, double low, double high, const CorrectionPolicy& policy) {
+  if (scale < low * (1.0 + policy.end_of_range)) return EndOfRange::low;
+  if (scale < high * (1.0 - policy.end_of_range)) return EndOfRange::none;
+  return EndOfRange::high;
+}
+
+bool is_doubtful(double scale, const CorrectionPolicy& policy) {
+  return !(std::abs(std::log(scale)) < policy.doubtful_scale);
+}
+
+bool shows_on_encoder(double offset_rad, double resolution_rad, const CorrectionPolicy& policy) {
+  return !(std::abs(offset_rad) < policy.least_angle_offset_steps * resolution_rad);
+}
+
+bool are_bristles_short(double breakaway_n, double stiffness_n_per_m, double travel_m,
+                        const CorrectionPolicy& policy) {
+  return breakaway_n < stiffness_n_per_m * policy.bristle_share_of_travel * travel_m;
+}
+
+bool is_held_out_too_far_off(double held_out_excess, double excess, const ResidualPolicy& policy) {
+  return held_out_excess > policy.most_excess * std::max(1.0, excess);
+}
+
+}  // namespace upright

@@ -1,0 +1,107 @@
+// Both sides of what an effect or a correction can be.
+#include "diagnosis/plausibility.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "diagnosis/candidates.hpp"
+
+namespace upright {
+namespace {
+
+constexpr CorrectionPolicy policy;
+
+double above(double value) {
+  return std::nextafter(value, 1e9);
+}
+double below(double value) {
+  return std::nextafter(value, -1e9);
+}
+
+/// One number that was believed to be 0, with a standard error of 1.
+std::vector<std::size_t> certain(double value, bool is_correction) {
+  return certain_parameters(
+      {Eigen::VectorXd::Constant(1, value), Eigen::VectorXd::Zero(1), Eigen::MatrixXd::Identity(1, 1)},
+      {is_correction}, policy);
+}
+
+TEST(Correction, IsThereFromItsLeastCertaintyOn) {
+  EXPECT_TRUE(certain(below(policy.least_z), true).empty());
+  EXPECT_EQ(certain(policy.least_z, true).size(), 1u);
+  EXPECT_EQ(certain(0.0, false).size(), 1u) << "what is no correction stays";
+}
+
+TEST(Correction, FollowsWhereOneThatIsAlikeIsSetBack) {
+  // Alone each is 5 standard errors off; they go together, and the first is a little less certain.
+  ParameterBeliefs beliefs{Eigen::Vector2d(3.9, 5.0), Eigen::Vector2d::Zero(), Eigen::Matrix2d::Identity()};
+  beliefs.covariance(0, 1) = beliefs.covariance(1, 0) = -0.9;
+  EXPECT_EQ(certain_parameters(beliefs, {true, true}, policy), std::vector<std::size_t>{1});
+  // The other way round the second gives way as the first is set back.
+  beliefs.covariance(0, 1) = beliefs.covariance(1, 0) = 0.9;
+  EXPECT_EQ(certain_parameters(beliefs, {true, true}, policy), std::vector<std::size_t>{});
+}
+
+TEST(Correction, MustIncludeNothingOnAllRunsNoLonger) {
+  EXPECT_FALSE(is_certain_of_all_runs(below(policy.least_certainty_of_all_runs), policy));
+  EXPECT_TRUE(is_certain_of_all_runs(policy.least_certainty_of_all_runs, policy));
+}
+
+TEST(Correction, IsAsBelievedWithinWhatCoefficientsMove) {
+  const double sigma = 0.5, far = policy.within_belief * sigma;
+  EXPECT_TRUE(is_within_belief(below(far), 0.0, sigma, policy));
+  EXPECT_FALSE(is_within_belief(far, 0.0, sigma, policy));
+  EXPECT_FALSE(is_within_belief(-far, 0.0, sigma, policy));
+}
+
+TEST(Scale, IsAtAnEndOfItsRangeJustBeforeIt) {
+  const double low = 0.3 * (1.0 + policy.end_of_range), high = 3.0 * (1.0 - policy.end_of_range);
+  EXPECT_EQ(end_of_range(below(low), 0.3, 3.0, policy), EndOfRange::low);
+  EXPECT_EQ(end_of_range(low, 0.3, 3.0, policy), EndOfRange::none);
+  EXPECT_EQ(end_of_range(below(high), 0.3, 3.0, policy), EndOfRange::none);
+  EXPECT_EQ(end_of_range(high, 0.3, 3.0, policy), EndOfRange::high);
+}
+
+TEST(Scale, IsDoubtfulBeyondADataSheet) {
+  EXPECT_FALSE(is_doubtful(std::exp(policy.doubtful_scale - 1e-9), policy));
+  EXPECT_TRUE(is_doubtful(std::exp(policy.doubtful_scale + 1e-9), policy));
+  EXPECT_TRUE(is_doubtful(std::exp(-policy.doubtful_scale - 1e-9), policy));
+}
+
+TEST(AngleOffset, ShowsFromAStepAndAHalfOn) {
+  const double step = 0.001, least = policy.least_angle_offset_steps * step;
+  EXPECT_FALSE(shows_on_encoder(below(least), step, policy));
+  EXPECT_TRUE(shows_on_encoder(least, step, policy));
+  EXPECT_TRUE(shows_on_encoder(-least, step, policy));
+}
+
+TEST(Bristles, AreShortWithinATenthOfTheTravel) {
+  const double travel_m = 0.5, stiffness = 20.0,
+               longest = stiffness * policy.bristle_share_of_travel * travel_m;
+  EXPECT_TRUE(are_bristles_short(below(longest), stiffness, travel_m, policy));
+  EXPECT_FALSE(are_bristles_short(longest, stiffness, travel_m, policy));
+}
+
+TEST(HeldOutRuns, MayBeAsFarOffAgainAsAllRunsAre) {
+  constexpr ResidualPolicy residual;
+  EXPECT_FALSE(is_held_out_too_far_off(residual.most_excess, 0.5, residual));
+  EXPECT_TRUE(is_held_out_too_far_off(above(residual.most_excess), 0.5, residual));
+  EXPECT_FALSE(is_held_out_too_far_off(1.5 * residual.most_excess, 1.5, residual));
+  EXPECT_TRUE(is_held_out_too_far_off(above(1.5 * residual.most_excess), 1.5, residual));
+}
+
+TEST(Runs, MoveEnoughBeyondTheStepsOfASensor) {
+  constexpr ExcitationPolicy excitation;
+  const auto moves = [&](double range_m) {
+    Measurement run;
+    run.cart_m = {0.0, range_m};
+    run.known_cart_noise_m = 1.0 / std::sqrt(12.0);
+    run.known_theta_noise_rad = 1.0;
+    return moves_enough({run}, excitation);
+  };
+  EXPECT_FALSE(moves(excitation.least_steps - 1e-9));
+  EXPECT_TRUE(moves(excitation.least_steps + 1e-9));
+}
+
+}  // namespace
+}  // namespace upright
