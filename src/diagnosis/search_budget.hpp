@@ -3,7 +3,8 @@
 //
 // How far a fit goes by itself stands in FitOptions, how often a search may follow each sample at most in
 // `default_search_bound`. Each number says why it is as it is, and what its value rests on. "Chosen" means
-// chosen, not measured by itself; the whole is measured in docs/diagnosis-matrix.md (time of a diagnosis).
+// chosen, not measured by itself; the whole is measured in docs/results/diagnosis-matrix.md (time of a
+// diagnosis).
 #pragma once
 
 #include <cstddef>

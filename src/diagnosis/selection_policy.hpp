@@ -5,7 +5,7 @@
 // Evidence is the fall of minus twice the log likelihood: 2 ln of how many times more likely the data become.
 // A t value and a certainty are in standard errors. Each number says why it is as it is, and what its value
 // rests on. "Chosen" means chosen, not measured by itself; all of them together are measured in
-// docs/diagnosis-matrix.md.
+// docs/results/diagnosis-matrix.md.
 #pragma once
 
 #include <array>

@@ -50,7 +50,7 @@ struct Trial {
   double certainty = 0.0;  ///< standard errors of its size from nothing
   Noise noise;             ///< as estimated with it
   std::vector<ParameterEstimate> parameters;
-  std::string rule = "undecided";  ///< that decided: docs/diagnosis.md lists them
+  std::string rule = "undecided";  ///< that decided: docs/reference/diagnosis-rules.md lists them
   bool taken = false;
 };
 
