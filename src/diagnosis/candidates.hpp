@@ -45,7 +45,7 @@ std::vector<std::size_t> base_corrections(const Plant& plant, const DataRange& r
 std::vector<std::size_t> candidate_effects(const Plant& plant, const DataRange& range);
 
 /// Whether `a` is the plainer of two effects that explain the same: fewer parameters; of the names of one and
-/// the same force (interface.md, Semantics) the one that supposes least; else the one registered first.
+/// the same force (docs/reference/effects.md) the one that supposes least; else the one registered first.
 bool is_plainer(std::size_t a, std::size_t b);
 
 /// Parameter values from which to search for an effect; several where the misfit has several valleys.

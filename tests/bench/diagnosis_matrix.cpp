@@ -19,7 +19,7 @@
 // file with
 //   its own numbers refitted. Of what the registry lacks: the runs are at least 20 percent further off (plain
 //   simulation) than the same runs without it.
-// - told apart: the effect is not the same force as the one named (interface.md, Semantics), and the
+// - told apart: the effect is not the same force as the one named (docs/reference/effects.md), and the
 // structure that was
 //   named instead fits worse than the true one by 16 or more.
 #include <fcntl.h>
@@ -228,7 +228,7 @@ std::vector<std::size_t> all_runs(const std::vector<Measurement>& runs) {
   return which;
 }
 
-/// Effects that are exactly the same force as this one in the true plant (interface.md, Semantics).
+/// Effects that are exactly the same force as this one in the true plant (docs/reference/effects.md).
 std::vector<std::string> same_force(const std::string& kind, const Plant& truth) {
   if (kind == "viscous_friction") return {"back_emf"};
   if (kind == "back_emf") return {"viscous_friction"};

@@ -1,0 +1,80 @@
+#!/usr/bin/env python3
+"""Compares the generated parts of docs/reference with what the program says of itself, or writes them.
+
+  scripts/write_reference.py --upright PROGRAM [--write]
+
+- docs/reference/effects.md: every effect of the registry, from `upright effects --json`.
+- docs/reference/commands.md: the options of every command, from its `--help`.
+The parts stand between two marker lines. Ends with 1 and a line for each page that differs.
+"""
+import argparse
+import json
+import pathlib
+import re
+import subprocess
+import sys
+
+BEGIN = "<!-- written by scripts/write_reference.py --write -->"
+END = "<!-- end -->"
+
+
+def said_by(program, *words):
+    return subprocess.run([program, *words], capture_output=True, text=True, check=True).stdout
+
+
+def range_of(parameter):
+    low, high = parameter["minimum"], parameter["maximum"]
+    least = "" if low is None else f"{'above' if parameter['minimum_excluded'] else 'at least'} {low:g}"
+    most = "" if high is None else f"at most {high:g}"
+    return ", ".join(part for part in (least, most) if part) or "any"
+
+
+def cell(text):
+    return text.replace("|", "\\|")
+
+
+def effects_of(program):
+    lines = []
+    for effect in json.loads(said_by(program, "effects", "--json"))["effects"]:
+        dry = ", dry friction" if effect["dry"] else ""
+        lines += ["", f"### {effect['kind']}", "", f"{effect['meaning'][0].upper()}{effect['meaning'][1:]}. Enters: {effect['enters']}{dry}.", "",
+                  f"    {effect['equation']}", "", "| parameter | unit | range | no effect at | meaning |", "|---|---|---|---|---|"]
+        for p in effect["parameters"]:
+            neutral = "-" if p["neutral"] is None else f"{p['neutral']:g}"
+            lines.append(f"| `{p['name']}` | {p['unit']} | {range_of(p)} | {neutral} | {cell(p['meaning'])} |")
+    return lines
+
+
+def commands_of(program):
+    listed = said_by(program, "--help").split("Subcommands:\n")[1].split("\n\n")[0]
+    lines = []
+    for name in re.findall(r"^  (\S+)", listed, re.MULTILINE):
+        lines += ["", f"### {name}", "", "```text", *(line.rstrip() for line in said_by(program, name, "--help").rstrip("\n").split("\n")), "```"]
+    return lines
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--upright", type=pathlib.Path, required=True, help="the program")
+    parser.add_argument("--root", type=pathlib.Path, default=pathlib.Path(__file__).resolve().parent.parent)
+    parser.add_argument("--write", action="store_true", help="write the pages")
+    arguments = parser.parse_args()
+    wrong = 0
+    for name, lines in (("effects", effects_of(arguments.upright)), ("commands", commands_of(arguments.upright))):
+        page = arguments.root / "docs" / "reference" / f"{name}.md"
+        text = page.read_text()
+        begin, end = text.index(BEGIN), text.index(END)
+        made = text[:begin] + "\n".join([BEGIN, *lines, ""]) + "\n" + text[end:]
+        if made == text:
+            continue
+        if arguments.write:
+            page.write_text(made)
+            continue
+        wrong += 1
+        print(f"{page}: is not what the program says: run scripts/write_reference.py --upright {arguments.upright} --write",
+              file=sys.stderr)
+    sys.exit(1 if wrong else 0)
+
+
+if __name__ == "__main__":
+    main()
