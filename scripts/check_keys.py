@@ -13,15 +13,16 @@ import pathlib
 import re
 import sys
 
-READERS = ("src/model/plant_file.cpp", "src/control/gain_file.cpp", "src/sweep/sweep_file.cpp", "src/experiment",
-           "src/measurement/dataset_file.cpp", "hal/rig_file.cpp", "hal/comedi/comedi_section.cpp",
-           "hal/gpio/gpio_section.cpp", "hal/quanser/quanser_section.cpp", "src/control/encoder_assumptions.cpp")
+# Folders whose sources that name YamlMap or PieceKeys read files of the user, and single such sources.
+READERS = ("src/model", "src/control", "src/sweep", "src/experiment", "hal", "src/measurement/dataset_file.cpp")
+JOURNAL = ("src/experiment/servo_model.cpp", "src/experiment/experiment.cpp")  # they read what the program wrote itself
 PAGES = ("docs/reference/files.md", "docs/reference/rig-files.md", "docs/reference/dataset-files.md",
          "docs/reference/experiment-files.md", "docs/reference/effects.md", "docs/explanation/quiet-control.md",
          "docs/how-to/run-sweeps.md")
 ASKED = re.compile(r'(?:\.|->)(?:number|number_or|optional_number|numbers|choice|flag|flag_or|integer|text|text_or|path|map|'
                    r'optional_map|maps|has|is_map)\(\s*(?:is_cart \? )?"([a-z0-9_]+)"(?: : "([a-z0-9_]+)")?')
-HELPED = re.compile(r'\b\w+(?:<\w+>)?\((?:map|zero|grid|document|section), "([a-z0-9_]+)"|\bcounts\("([a-z0-9_]+)"')
+HELPED = re.compile(r'\b\w+(?:<\w+>)?\((?:map|zero|grid|document|section), "([a-z0-9_]+)"|\bcounts\("([a-z0-9_]+)"'
+                    r'|\bkeys\.\w+\("([a-z0-9_]+)"')
 LISTED = re.compile(r'^\s*\{"([a-z0-9_]+)", &\w+::', re.MULTILINE)  # tables of keys and where they go
 
 
@@ -29,11 +30,10 @@ def keys_of(root):
     found = {}
     for reader in READERS:
         path = root / reader
-        files = sorted(path.glob("*_file.cpp")) if path.is_dir() else [path]
-        for file in files:
-            if not file.exists():
+        for file in sorted(path.rglob("*.?pp")) if path.is_dir() else [path]:
+            text = file.read_text() if file.exists() else ""
+            if path.is_dir() and not re.search("YamlMap|PieceKeys", text) or file.relative_to(root).as_posix() in JOURNAL:
                 continue
-            text = file.read_text()
             for match in [*ASKED.finditer(text), *HELPED.finditer(text), *LISTED.finditer(text)]:
                 for key in filter(None, match.groups()):
                     found.setdefault(key, file.relative_to(root).as_posix())

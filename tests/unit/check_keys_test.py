@@ -6,7 +6,7 @@ import tempfile
 import unittest
 
 SCRIPT = pathlib.Path(__file__).resolve().parents[2] / "scripts" / "check_keys.py"
-READER = 'config.delay_s = document.number("delay_s", range);\nconst auto sign = small(map, "sign", -1, 1);\n'
+READER = 'config.delay_s = document.number("delay_s", range);\nint f(const YamlMap& map) { return small(map, "sign", -1, 1); }\n'
 
 
 def check(page):
