@@ -121,7 +121,7 @@ def wrong_includes(root, targets):
                     continue
                 if other.name not in may_use:
                     findings.append(f"{where} of {other.name}, which {owner.name} does not link: link it, or move what is shared")
-                elif not is_api and pathlib.PurePosixPath(header).name not in other.offers:
+                elif not is_api and header.removeprefix(other.folder + "/") not in other.offers:
                     findings.append(f"{where}, which {other.name} does not offer: list it under OFFERS in "
                                     f"{other.folder}/CMakeLists.txt, or do without it")
     return findings

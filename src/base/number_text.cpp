@@ -48,6 +48,10 @@ std::string number_text(double value, int digits) {
   return with_power(text);
 }
 
+std::string brief_text(double value) {
+  return printed("%.*g", 3, value);
+}
+
 std::string number_within(double value, double low, double high) {
   const double half_width = 0.5 * (high - low);
   if (!(half_width > 0.0) || !std::isfinite(half_width) || !std::isfinite(value))

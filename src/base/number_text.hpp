@@ -9,6 +9,9 @@ namespace upright {
 /// is not a number.
 std::string number_text(double value, int digits = 4);
 
+/// Three significant digits as C prints them: short, for messages.
+std::string brief_text(double value);
+
 /// A value, or an end of its interval, with as many decimals as the interval's width bears: two digits of it.
 std::string number_within(double value, double low, double high);
 

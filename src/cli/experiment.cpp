@@ -15,12 +15,14 @@
 #include <numbers>
 #include <optional>
 #include <set>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "commands.hpp"
 #include "commissioning/sign_check.hpp"
+#include "experiment/pieces/sign_check.hpp"
 #include "hal/gpio_rig.hpp"
 #include "live.hpp"
 #include "options.hpp"
@@ -101,7 +103,7 @@ fs::path folder_of(const Arguments& arguments, const ExperimentSetup& setup,
 void print_plan(const std::vector<PlannedPiece>& plan, const ExperimentSetup& setup) {
   std::printf("%s: %s\n", setup.experiment.name.c_str(), setup.experiment.why.c_str());
   for (const PlannedPiece& p : plan)
-    std::printf("  %-24s %-18s %7.1f s  to %5.0f mm  %5.2f V\n", p.piece.label.c_str(), name_of(p.piece.kind),
+    std::printf("  %-24s %-18s %7.1f s  to %5.0f mm  %5.2f V\n", p.piece.label.c_str(), p.piece.kind->name(),
                 p.duration_s, p.farthest_m * 1e3, p.most_v);
   std::fflush(stdout);
 }
@@ -110,7 +112,7 @@ Json json_of(const std::vector<PlannedPiece>& plan) {
   Json list = Json::array();
   for (const PlannedPiece& p : plan)
     list.push_back({{"piece", p.piece.label},
-                    {"kind", name_of(p.piece.kind)},
+                    {"kind", p.piece.kind->name()},
                     {"duration_s", p.duration_s},
                     {"farthest_m", p.farthest_m},
                     {"largest_v", p.most_v}});
@@ -126,8 +128,9 @@ void refuse_unstable(const ExperimentSetup& setup) {
   };
   for (const Piece& piece : setup.experiment.pieces) {
     if (balances(piece) && !compares(piece)) judge(setup.experiment.gains, setup.control);
-    for (std::size_t k = 0; k < piece.controllers.size(); ++k)
-      judge(piece.controllers[k].file, control_of(setup, piece, k));
+    const std::span<const NamedGains> controllers = piece.kind->controllers();
+    for (std::size_t k = 0; k < controllers.size(); ++k)
+      judge(controllers[k].file, control_of(setup, piece, k));
   }
 }
 
@@ -171,25 +174,9 @@ Json json_of(const ExperimentResult& result, const ExperimentSetup& setup, const
           {"trials", trials}};
 }
 
-const char* lifting_words(const Piece& piece) {
-  if (piece.kind == PieceKind::free_decay)
-    return "hold the cart, lift the pendulum aside and keep it still; let go after a second";
-  if (balances(piece) && piece.start == StartBy::hand)
-    return "when the cart stands in the middle, lift the pendulum upright and hold it still until it "
-           "balances";
-  if (piece.kind == PieceKind::sign_check) return "let the pendulum hang still, the cart near the middle";
-  return "";
-}
-
 /// The trial in a few words.
 std::string words_for(const Piece& piece, const ExperimentTrial& trial) {
-  if (compares(piece))
-    return piece.label + ": " + piece.controllers[trial.controller].name + ", round " +
-           std::to_string(trial.repeat + 1) + " of " + std::to_string(piece.repeats);
-  if (piece.kind != PieceKind::delay_sweep) return piece.label;
-  char text[64];
-  std::snprintf(text, sizeof text, ": delay %.3f ms, repeat %d", trial.delay_s * 1e3, trial.repeat + 1);
-  return piece.label + text;
+  return piece.label + piece.kind->words(trial);
 }
 
 void announce(const Piece& piece, const ExperimentTrial& trial, bool simulated, bool ready, bool quiet,
@@ -198,7 +185,7 @@ void announce(const Piece& piece, const ExperimentTrial& trial, bool simulated, 
   std::fprintf(out, "%s\n", words_for(piece, trial).c_str());
   std::fflush(out);
   if (simulated) return;
-  if (const char* words = lifting_words(piece); *words != '\0') std::fprintf(stderr, "  %s\n", words);
+  if (const char* words = piece.kind->request(); *words != '\0') std::fprintf(stderr, "  %s\n", words);
   if (!needs_hands(piece) || ready) return;
   if (view != nullptr)
     view->say({LiveState::Kind::waiting, piece.operator_does + ", then press Enter in the terminal"});
@@ -218,7 +205,7 @@ void show_live(const LiveStatus& live, ScriptPhase phase) {
 LiveState state_of(const Piece& piece, const ExperimentTrial& trial, ScriptPhase phase, bool simulated) {
   if (phase != ScriptPhase::waiting || simulated)
     return {LiveState::Kind::running, words_for(piece, trial) + ": " + words_for(phase)};
-  return {LiveState::Kind::waiting, lifting_words(piece)};
+  return {LiveState::Kind::waiting, piece.kind->request()};
 }
 
 /// A sign check's verdict: kept beside the rig file, or the end of the experiment.
@@ -295,7 +282,7 @@ ExperimentResult perform(const Arguments& arguments, const ExperimentSetup& setu
   };
   options.finished = [&](const TrialResult& r) {
     if (on_terminal) std::fputs("\n", stderr);
-    if (pieces[r.trial.piece].kind == PieceKind::sign_check)
+    if (pieces[r.trial.piece].as<pieces::SignCheck>())
       judge_sign_check(setup, options.folder / r.run_directory, arguments.as_json);
     if (!arguments.as_json && (r.outcome != "done" || !r.controller.empty())) say([&] { print(r); });
   };
@@ -336,7 +323,7 @@ ExitCode run(const Arguments& arguments) {
   std::vector<Piece> pieces;
   pieces.reserve(plan.size());
   for (const PlannedPiece& planned : plan) pieces.push_back(planned.piece);
-  if (pieces.front().kind != PieceKind::sign_check) require_checked_signs(setup.rig, "");
+  if (!pieces.front().as<pieces::SignCheck>()) require_checked_signs(setup.rig, "");
   refuse_without_hands(setup, pieces, arguments.ready);
   const SignalFlag& signal = catch_signals();
   const fs::path folder = folder_of(arguments, setup, pieces);

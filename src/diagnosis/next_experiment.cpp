@@ -85,7 +85,7 @@ std::optional<NextExperiment> choose_experiment(
   std::optional<NextExperiment> best;
   for (const LibraryExperiment& item : experiment_library()) {
     const ExperimentSetup setup = setup_for(item.experiment, chosen);
-    if (!chosen.pendulum && item.experiment.pieces.front().kind == PieceKind::free_decay) continue;
+    if (!chosen.pendulum && item.experiment.pieces.front().kind->needs_pendulum()) continue;
     std::vector<Piece> pieces;
     try {
       pieces = plan_pieces(setup);

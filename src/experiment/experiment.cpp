@@ -1,6 +1,5 @@
 #include "experiment.hpp"
 
-#include <cmath>
 #include <fstream>
 #include <numbers>
 
@@ -20,18 +19,6 @@ constexpr double zero_patience_s = 2.0;
 constexpr int most_attempts = 3;
 constexpr const char* again = "; the same command makes this piece again";
 
-/// Of a run: tells the trials of a whole piece from each other.
-std::string label_of(const ExperimentTrial& trial, const Piece& piece) {
-  if (compares(piece))
-    return piece.label + "-" + piece.controllers[trial.controller].name + "-" +
-           std::to_string(trial.repeat + 1);
-  if (piece.kind != PieceKind::delay_sweep) return piece.label;
-  // Tenths of a microsecond: whole numbers sort and make no odd characters.
-  const auto tenths = static_cast<long long>(std::llround(trial.delay_s * 1e7));
-  return piece.label + "-" + std::to_string(tenths / 10000) + "." +
-         std::to_string(10000 + tenths % 10000).substr(1) + "ms-" + std::to_string(trial.repeat + 1);
-}
-
 std::string section_of(const ExperimentSetup& setup, const Piece& piece, const ScriptContext& context) {
   return "experiment:\n  name: " + setup.experiment.name + "\n  why: " + yaml_quoted(setup.experiment.why) +
          "\n  piece: " + piece_text(piece) + "\n  travel_m: " + exact_text(context.travel_m) +
@@ -46,7 +33,7 @@ RunSetup run_setup(const ExperimentSetup& setup, const Piece& piece, const Contr
   run.duration_s = longest_trial_s;
   run.seed = options.seed;
   run.control = control;
-  run.control.delay_s = piece.delay_s;
+  run.control.delay_s = piece.kind->delay_s();
   run.rig = setup.rig;
   if (simulated) run.plant = setup.simulated;
   run.limits = rig_limits(run.rig, setup.plant);
@@ -93,7 +80,7 @@ class TrialMaker {
                                 servo_model(setup_.plant), control.gains};
     ExperimentScript script(piece, context);
     RunSetup run = run_setup(setup_, piece, control, options_, hand_ != nullptr);
-    run.label = label_of(trial, whole);
+    run.label = whole.label + whole.kind->suffix(trial);
     run.fast = clock_.is_virtual();
     run.experiment_text = section_of(setup_, piece, context);
     SessionOptions session;
@@ -107,10 +94,10 @@ class TrialMaker {
     const LoopLimits limits = run.limits;
     const SessionResult done = run_session(std::move(run), rig_, clock_, signal_, std::move(session));
     Attempt attempt = judged(whole, trial, done, limits, script.phase() == ScriptPhase::over);
-    if (compares(whole)) attempt.result.controller = whole.controllers[trial.controller].name;
+    if (compares(whole)) attempt.result.controller = whole.kind->controllers()[trial.controller].name;
     if (balances(whole))
-      attempt.result.gains =
-          csv_name(compares(whole) ? whole.controllers[trial.controller].file : setup_.experiment.gains);
+      attempt.result.gains = csv_name(compares(whole) ? whole.kind->controllers()[trial.controller].file
+                                                      : setup_.experiment.gains);
     return attempt;
   }
 
@@ -153,7 +140,7 @@ class TrialMaker {
     }
     attempt.sentence += "; in " + done.directory.string() + again;
     const bool lost = reason == StopReason::not_ready || reason == StopReason::track_limit;
-    attempt.may_repeat = lost && balances(piece) && piece.start == StartBy::swing_up;
+    attempt.may_repeat = lost && balances(piece) && piece.kind->swings_up();
     return attempt;
   }
 

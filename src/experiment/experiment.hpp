@@ -12,7 +12,9 @@
 #include <string>
 #include <vector>
 
+#include "experiment_file.hpp"
 #include "experiment_script.hpp"
+#include "trial.hpp"
 #include "upright/base/progress.hpp"
 #include "upright/hal/simulated_rig.hpp"
 #include "upright/record/run_reader.hpp"
@@ -77,34 +79,10 @@ std::vector<Piece> plan_pieces(const ExperimentSetup& setup, const ProgressCallb
 /// What the operator does before a piece, on a simulated rig.
 Hand hand_for(const Piece& piece);
 
-/// One run: a piece, one delay of a sweep, or one controller of a comparison.
-struct ExperimentTrial {
-  std::size_t piece = 0;
-  int repeat = 0;
-  double delay_s = 0.0;
-  std::size_t controller = 0;  ///< place in Piece::controllers
-};
-
 /// The piece as one trial runs it: one delay, one controller, one start.
 Piece piece_of(const ExperimentTrial& trial, const Piece& piece);
 
-/// How a trial went. `outcome`: "done"; in comparisons also "fell"; for delay sweeps "stable", "oscillating"
-/// or "fell"; empty where
-/// the run ended before what it was to measure had begun, or was cut short: it is no result.
-struct TrialResult {
-  ExperimentTrial trial;
-  std::string run_directory;  ///< within the experiment's folder
-  std::string reason;         ///< of the loop's end
-  std::string outcome;
-  double theta0_rad = 0.0, theta_amplitude_rad = 0.0, cart_amplitude_m = 0.0;
-  double fall_time_s = 0.0;   ///< not a number: it did not fall
-  double frequency_hz = 0.0;  ///< of the angle; not a number where it does not oscillate
-  std::string controller;     ///< of a comparison: its name; otherwise empty
-  std::string gains;          ///< the gain file, where the piece balances; characters of CSV replaced
-};
-
-/// The next trial, given those that were done; none: all is done. Delays grow, so that falls come late; what
-/// lies between two outcomes is bisected, the fall last. Controllers take turns, round after round.
+/// The next trial, given those that were done; none: all is done.
 std::optional<ExperimentTrial> next_trial(const std::vector<Piece>& pieces,
                                           const std::vector<TrialResult>& done);
 

@@ -1,14 +1,13 @@
 // What is known before anything moves: files, limits, and a rehearsal of every piece.
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <numbers>
 
+#include "base/number_text.hpp"
 #include "control/filter_model.hpp"
 #include "experiment.hpp"
 #include "upright/base/error.hpp"
 #include "upright/control/model_parts.hpp"
-#include "upright/model/elementary.hpp"
 #include "upright/model/plant_file.hpp"
 
 namespace upright {
@@ -22,13 +21,6 @@ constexpr double room_to_limit_m = 0.02;
 constexpr double guard_slack_m = 0.01;
 /// Control periods and integration steps of a whole plan: some 10 s of computing, however stiff the plant is.
 constexpr std::uint64_t most_rehearsed_steps = 16'000'000;
-constexpr double steady_s = 0.15;  // at constant speed, to be worth measuring
-
-std::string brief(double value) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.3g", value);
-  return text;
-}
 
 ControlConfig without_feedback(double rate_hz) {
   ControlConfig control;
@@ -46,73 +38,39 @@ ControlConfig without_feedback(double rate_hz) {
   throw ConfigError(sentence + ": " + remedy);
 }
 
-const char* voltage_key(const Piece& piece) {
-  return !piece.voltages_v.empty() ? "voltages_v" : piece.amplitude_v > 0.0 ? "amplitude_v" : "largest_v";
-}
-
 void refuse_beyond_limits(const ExperimentSetup& setup, double amplifier_limit_v) {
   const Experiment& e = setup.experiment;
   const double widest = setup.rig.track_limit_m - room_to_limit_m;
   if (e.travel_m > widest) {
-    const std::string cause = "the rig stops at " + brief(setup.rig.track_limit_m) + " m, and " + e.name +
-                              " plans to " + brief(e.travel_m) + " m";
-    const std::string remedy = "lower travel_m to " + brief(widest) + " or less";
+    const std::string cause = "the rig stops at " + brief_text(setup.rig.track_limit_m) + " m, and " +
+                              e.name + " plans to " + brief_text(e.travel_m) + " m";
+    const std::string remedy = "lower travel_m to " + brief_text(widest) + " or less";
     if (e.source) e.source->fail("travel_m", "(" + cause + ")", remedy);
     throw ConfigError(cause + ": " + remedy);
   }
   for (const Piece& piece : e.pieces) {
-    double most = std::max(piece.amplitude_v, piece.largest_v);
-    for (const double v : piece.voltages_v) most = std::max(most, v);
-    if (most > amplifier_limit_v)
-      refuse(piece, voltage_key(piece), "asks for " + brief(most) + " V",
-             "lower its voltage to the amplifier's " + brief(amplifier_limit_v) + " V");
-    if (!setup.plant.pendulum && (balances(piece) || piece.kind == PieceKind::free_decay))
+    const KeyedVoltage most = largest_voltage(*piece.kind);
+    if (most.key && most.voltage_v > amplifier_limit_v)
+      refuse(piece, most.key, "asks for " + brief_text(most.voltage_v) + " V",
+             "lower its voltage to the amplifier's " + brief_text(amplifier_limit_v) + " V");
+    if (!setup.plant.pendulum && piece.kind->needs_pendulum())
       refuse(piece, "kind", "needs a pendulum, and the plant has none",
              "use a plant with a pendulum, or leave the piece out");
   }
 }
 
-/// A constant voltage must reach its speed on the travel.
-void refuse_short_travel(const Piece& piece, const ExperimentSetup& setup) {
-  const ServoModel m = servo_model(setup.plant);
-  const double tau = m.mass_kg / std::max(m.damping_n_per_mps, 1e-6);
-  const double room = 2.0 * setup.experiment.travel_m;
-  const auto needed = [&](double v) {
-    const double speed = std::max(0.0, (m.force_per_volt_n * v - m.sliding_n) / m.damping_n_per_mps);
-    ScriptContext context;
-    context.voltage_limit_v = setup.rig.amplifier.limit_v;
-    context.servo = m;
-    ControlState now;
-    now.cart_velocity_mps = speed;
-    const double stop = ExperimentScript(piece, context).stop_position_m(now);
-    return speed * (3.0 * tau - tau * (1.0 - elementary::exp(-3.0)) + steady_s) + stop + 0.03;
-  };
-  for (const double v : piece.voltages_v) {
-    if (m.force_per_volt_n * v <= 1.05 * m.sliding_n)
-      refuse(piece, "voltages_v", "would not keep the cart moving at " + brief(v) + " V",
-             "raise the voltage above " + brief(1.05 * m.sliding_n / m.force_per_volt_n) + " V");
-    if (needed(v) <= room) continue;
-    double fits = v;
-    while (fits > 0.05 && needed(fits) > room) fits *= 0.98;
-    refuse(piece, "voltages_v",
-           "needs " + brief(needed(v)) + " m to reach its speed at " + brief(v) + " V and to stop, and has " +
-               brief(room) + " m",
-           "lower the voltage to " + brief(fits) + " V or give travel_m " + brief(0.5 * needed(v)));
-  }
-}
-
-void scale(Piece& piece, double factor) {
-  piece.amplitude_v *= factor;
-  for (double& v : piece.voltages_v) v *= factor;
+void refuse_unreachable(const Piece& piece, const ExperimentSetup& setup) {
+  ScriptContext context;
+  context.travel_m = setup.experiment.travel_m;
+  context.voltage_limit_v = setup.rig.amplifier.limit_v;
+  context.servo = servo_model(setup.plant);
+  if (const std::optional<Refusal> why = piece.kind->unreachable(context))
+    refuse(piece, why->key, why->problem, why->remedy);
 }
 
 /// A rehearsal of a sweep is its shortest delay: the longer ones are there to fall.
-Piece first_trial_of(Piece piece) {
-  if (piece.kind == PieceKind::delay_sweep) {
-    piece.delay_s = piece.delays_s.front();
-    piece.delays_s = {piece.delay_s};
-  }
-  return piece;
+Piece first_trial_of(const Piece& piece) {
+  return piece_of(piece.kind->rehearsals().front(), piece);
 }
 
 struct RehearsalOptions {
@@ -167,7 +125,7 @@ Rehearsal rehearse(const Piece& piece, const ExperimentSetup& setup, const Plant
   simulated->open();
   simulated->handle(hand_for(piece));
   ControlConfig control = setup.control;
-  control.delay_s = piece.delay_s;
+  control.delay_s = piece.kind->delay_s();
   Controller controller(control, rig.amplifier.limit_v, make_model_parts(control));
   ExperimentScript script(piece, {control.period_s(), setup.experiment.travel_m, rig.amplifier.limit_v,
                                   servo_model(setup.plant), control.gains});
@@ -201,30 +159,25 @@ class Planner {
   PlannedPiece plan(const Piece& piece) { return compares(piece) ? plan_comparison(piece) : plan_one(piece); }
 
  private:
-  /// Every controller from every start.
   PlannedPiece plan_comparison(const Piece& piece) {
     PlannedPiece whole{piece};
-    const auto rounds =
-        std::min(static_cast<std::size_t>(piece.repeats), std::max<std::size_t>(1, piece.starts_rad.size()));
     ExperimentSetup with = setup_;
-    for (std::size_t k = 0; k < piece.controllers.size(); ++k) {
-      with.control = control_of(setup_, piece, k);
-      for (std::size_t round = 0; round < rounds; ++round) {
-        Piece one = piece_of({0, static_cast<int>(round), piece.delay_s, k}, piece);
-        one.label += " with the gains " + piece.controllers[k].name;
-        Planner planner(with, steps_left_);
-        const PlannedPiece planned = planner.plan_one(one);
-        steps_left_ = planner.steps_left_;
-        whole.duration_s = std::max(whole.duration_s, planned.duration_s);
-        whole.farthest_m = std::max(whole.farthest_m, planned.farthest_m);
-        whole.most_v = std::max(whole.most_v, planned.most_v);
-      }
+    for (const ExperimentTrial& trial : piece.kind->rehearsals()) {
+      with.control = control_of(setup_, piece, trial.controller);
+      Piece one = piece_of(trial, piece);
+      one.label += " with the gains " + piece.kind->controllers()[trial.controller].name;
+      Planner planner(with, steps_left_);
+      const PlannedPiece planned = planner.plan_one(one);
+      steps_left_ = planner.steps_left_;
+      whole.duration_s = std::max(whole.duration_s, planned.duration_s);
+      whole.farthest_m = std::max(whole.farthest_m, planned.farthest_m);
+      whole.most_v = std::max(whole.most_v, planned.most_v);
     }
     return whole;
   }
 
   PlannedPiece plan_one(Piece piece) {
-    if (piece.kind == PieceKind::constant_voltage && !piece.fit_to_travel) refuse_short_travel(piece, setup_);
+    if (!piece.fit_to_travel) refuse_unreachable(piece, setup_);
     constexpr int most_attempts = 16;
     for (int attempt = 0;; ++attempt) {
       const Rehearsal r = rehearsed(piece);
@@ -232,7 +185,7 @@ class Planner {
       if (within && r.outcome.reason == StopReason::duration)
         return {piece, r.outcome.time_s, r.farthest_m, r.most_v};
       if (within || !piece.fit_to_travel || attempt == most_attempts) refuse_for(piece, r);
-      scale(piece, 0.8);
+      scale_voltages(*piece.kind, 0.8);
     }
   }
 
@@ -251,8 +204,8 @@ class Planner {
   }
 
   [[noreturn]] void refuse_for(const Piece& piece, const Rehearsal& r) {
-    const std::string travel = "+-" + brief(setup_.experiment.travel_m) + " m";
-    const std::string when = " after " + brief(r.outcome.time_s) + " s by the plan";
+    const std::string travel = "+-" + brief_text(setup_.experiment.travel_m) + " m";
+    const std::string when = " after " + brief_text(r.outcome.time_s) + " s by the plan";
     if (r.outcome.reason == StopReason::not_ready)
       refuse(piece, "kind", "would not come to rest where it starts", "check the plant file and travel_m");
     if (r.outcome.reason == StopReason::not_finite)
@@ -261,15 +214,16 @@ class Planner {
     if (balances(piece))
       refuse(piece, "kind", "would fall, or leave the travel of " + travel + "," + when,
              "use shorter delays, smaller steps or other gains");
-    if (piece.amplitude_v > 0.0 && !stays_within(r)) {
+    if (const KeyedVoltage amplitude = amplitude_of(*piece.kind); amplitude.key && !stays_within(r)) {
       Piece smaller = piece;
       for (int i = 0; i < 12; ++i) {
-        scale(smaller, 0.85);
+        scale_voltages(*smaller.kind, 0.85);
         if (stays_within(rehearsed(smaller))) break;
       }
-      refuse(piece, "amplitude_v",
-             "would leave the travel of " + travel + " at " + brief(piece.amplitude_v) + " V",
-             "lower amplitude_v to " + brief(smaller.amplitude_v) + " or set fit_to_travel: true");
+      refuse(piece, amplitude.key,
+             "would leave the travel of " + travel + " at " + brief_text(amplitude.voltage_v) + " V",
+             std::string("lower ") + amplitude.key + " to " +
+                 brief_text(amplitude_of(*smaller.kind).voltage_v) + " or set fit_to_travel: true");
     }
     refuse(piece, "kind", "would leave the travel of " + travel + when,
            "enlarge travel_m or make the piece smaller");
@@ -293,7 +247,7 @@ ControlConfig on_rig(ControlConfig control, std::optional<double> sample_rate_hz
 /// Of an experiment whose only gain files are compared.
 double first_rate_hz(const Experiment& experiment) {
   for (const Piece& piece : experiment.pieces)
-    if (compares(piece)) return read_gain_file(piece.controllers.front().file).sample_rate_hz;
+    if (compares(piece)) return read_gain_file(piece.kind->controllers().front().file).sample_rate_hz;
   return default_rate_hz;
 }
 
@@ -302,19 +256,19 @@ double first_rate_hz(const Experiment& experiment) {
 void read_controllers(ExperimentSetup& setup, std::optional<double> sample_rate_hz) {
   const double rate_hz = setup.control.sample_rate_hz;
   for (const Piece& piece : setup.experiment.pieces)
-    for (const NamedGains& controller : piece.controllers) {
+    for (const NamedGains& controller : piece.kind->controllers()) {
       const ControlConfig control = on_rig(read_gain_file(controller.file), sample_rate_hz, setup.rig);
       if (control.sample_rate_hz != rate_hz)
         refuse(piece, "gains",
-               "has the gains " + controller.name + " at " + brief(control.sample_rate_hz) +
-                   " Hz, and the experiment runs at " + brief(rate_hz) + " Hz",
+               "has the gains " + controller.name + " at " + brief_text(control.sample_rate_hz) +
+                   " Hz, and the experiment runs at " + brief_text(rate_hz) + " Hz",
                "use gain files of one rate, or give sample_rate_hz");
       setup.controllers[controller.file] = control;
     }
 }
 
 const ControlConfig& control_of(const ExperimentSetup& setup, const Piece& piece, std::size_t controller) {
-  return compares(piece) ? setup.controllers.at(piece.controllers[controller].file) : setup.control;
+  return compares(piece) ? setup.controllers.at(piece.kind->controllers()[controller].file) : setup.control;
 }
 
 ExperimentSetup resolve_experiment(const std::filesystem::path& file, const std::filesystem::path& rig,
@@ -378,17 +332,7 @@ Hand hand_for(const Piece& piece) {
   Hand hand;
   hand.pose = {0.0, std::numbers::pi};
   hand.turned = piece.turned;
-  hand.amplifier_off = piece.amplifier_off;
-  hand.push_mps = piece.push_mps;
-  constexpr double holds_s = 2.0;
-  if (piece.kind == PieceKind::free_decay) {
-    hand.pose.theta_rad = std::numbers::pi - piece.angle_rad;
-    hand.cart_held = true;
-    hand.holds_s = 0.7;
-  } else if (balances(piece) && piece.start == StartBy::hand) {
-    hand.pose.theta_rad = piece.theta0_rad;
-    hand.holds_s = holds_s;
-  }
+  piece.kind->place(hand);
   return hand;
 }
 

@@ -6,10 +6,12 @@
 #include <cmath>
 #include <fstream>
 #include <limits>
+#include <span>
 #include <sstream>
 #include <stdexcept>
 
 #include "base/input_file.hpp"
+#include "pieces/delay_sweep.hpp"
 #include "record/provenance.hpp"
 #include "upright/base/error.hpp"
 #include "upright/control/delay_line.hpp"
@@ -20,83 +22,6 @@ namespace upright {
 namespace {
 
 constexpr double not_a_number = std::numeric_limits<double>::quiet_NaN();
-
-int severity(const TrialResult& result) {
-  return result.outcome == "fell" ? 2 : result.outcome == "oscillating" ? 1 : 0;
-}
-
-bool same_delay(double a, double b) {
-  return std::abs(a - b) < 1e-12;
-}
-
-/// The results of one repeat of a sweep, by delay.
-std::vector<TrialResult> of_repeat(const std::vector<TrialResult>& done, std::size_t piece, int repeat) {
-  std::vector<TrialResult> results;
-  for (const TrialResult& r : done)
-    if (r.trial.piece == piece && r.trial.repeat == repeat) results.push_back(r);
-  std::sort(results.begin(), results.end(),
-            [](const TrialResult& a, const TrialResult& b) { return a.trial.delay_s < b.trial.delay_s; });
-  return results;
-}
-
-/// The next delay of the file's list: in order, up to the first fall.
-std::optional<double> next_listed(const Piece& piece, const std::vector<TrialResult>& results) {
-  for (const double delay : piece.delays_s) {
-    const auto at = std::find_if(results.begin(), results.end(),
-                                 [&](const TrialResult& r) { return same_delay(r.trial.delay_s, delay); });
-    if (at == results.end()) return delay;
-    if (severity(*at) == 2) return std::nullopt;
-  }
-  return std::nullopt;
-}
-
-/// The middle of the gap in which the outcome becomes `from` or worse, while it is wider than asked for.
-std::optional<double> next_bisected(const Piece& piece, const std::vector<TrialResult>& results, int from) {
-  if (piece.bisect_to_s <= 0.0) return std::nullopt;
-  for (std::size_t i = 0; i < results.size(); ++i) {
-    if (severity(results[i]) < from) continue;
-    if (i == 0) return std::nullopt;
-    const double low = results[i - 1].trial.delay_s, high = results[i].trial.delay_s;
-    if (high - low <= piece.bisect_to_s * (1.0 + 1e-9)) return std::nullopt;
-    return 0.5 * (low + high);
-  }
-  return std::nullopt;
-}
-
-/// Round after round, each controller once.
-std::optional<ExperimentTrial> next_of_comparison(std::size_t index, const Piece& piece,
-                                                  const std::vector<TrialResult>& done) {
-  for (int repeat = 0; repeat < piece.repeats; ++repeat)
-    for (std::size_t controller = 0; controller < piece.controllers.size(); ++controller) {
-      const bool is_done = std::any_of(done.begin(), done.end(), [&](const TrialResult& r) {
-        return r.trial.piece == index && r.trial.repeat == repeat && r.trial.controller == controller;
-      });
-      if (!is_done) return ExperimentTrial{index, repeat, piece.delay_s, controller};
-    }
-  return std::nullopt;
-}
-
-std::optional<ExperimentTrial> next_of_sweep(std::size_t index, const Piece& piece,
-                                             const std::vector<TrialResult>& done) {
-  const auto over_repeats = [&](const auto& next) -> std::optional<ExperimentTrial> {
-    for (int repeat = 0; repeat < piece.repeats; ++repeat)
-      if (const auto delay = next(of_repeat(done, index, repeat)))
-        return ExperimentTrial{index, repeat, *delay, 0};
-    return std::nullopt;
-  };
-  // All repeats of a delay before the next one.
-  std::optional<ExperimentTrial> first;
-  for (int repeat = 0; repeat < piece.repeats; ++repeat)
-    if (const auto delay = next_listed(piece, of_repeat(done, index, repeat));
-        delay && (!first || *delay < first->delay_s))
-      first = ExperimentTrial{index, repeat, *delay, 0};
-  if (first) return first;
-  for (const int from : {1, 2})
-    if (const auto trial = over_repeats(
-            [&](const std::vector<TrialResult>& results) { return next_bisected(piece, results, from); }))
-      return trial;
-  return std::nullopt;
-}
 
 constexpr const char* journal_name = "trials.csv";
 constexpr const char* journal_columns =
@@ -154,10 +79,6 @@ bool read_line(const std::string& line, TrialResult& r) {
       "with --out");
 }
 
-bool is_sweep_outcome(const std::string& outcome) {
-  return outcome == "stable" || outcome == "oscillating" || outcome == "fell";
-}
-
 void write_whole(const std::filesystem::path& file, const std::string& text) {
   const std::filesystem::path partial = file.string() + ".partial";
   std::ofstream out(partial, std::ios::binary);
@@ -209,55 +130,29 @@ double frequency_of(RowIterator first, RowIterator last, std::int64_t from_ns, d
   return turns > 0 ? turns / (static_cast<double>(ended_ns - begun_ns) * 1e-9) : not_a_number;
 }
 
-/// The shortest delay of one repeat whose outcome is `from` or worse; not a number where there is none.
-double first_delay(const std::vector<TrialResult>& results, int from) {
-  for (const TrialResult& r : results)
-    if (severity(r) >= from) return r.trial.delay_s;
-  return not_a_number;
-}
-
 }  // namespace
 
 Piece piece_of(const ExperimentTrial& trial, const Piece& piece) {
   Piece one = piece;
-  one.delay_s = trial.delay_s;
-  if (piece.kind == PieceKind::delay_sweep) one.delays_s = {trial.delay_s};
-  if (!compares(piece)) return one;
-  if (!piece.starts_rad.empty())
-    one.theta0_rad = piece.starts_rad[static_cast<std::size_t>(trial.repeat) % piece.starts_rad.size()];
-  one.controllers.clear();
-  one.starts_rad.clear();
-  one.repeats = 1;
+  one.kind->become(trial);
   return one;
 }
 
 std::optional<ExperimentTrial> next_trial(const std::vector<Piece>& pieces,
                                           const std::vector<TrialResult>& done) {
-  for (std::size_t i = 0; i < pieces.size(); ++i) {
-    if (pieces[i].kind == PieceKind::delay_sweep) {
-      if (const auto trial = next_of_sweep(i, pieces[i], done)) return trial;
-      continue;
-    }
-    if (compares(pieces[i])) {
-      if (const auto trial = next_of_comparison(i, pieces[i], done)) return trial;
-      continue;
-    }
-    const bool is_done =
-        std::any_of(done.begin(), done.end(), [&](const TrialResult& r) { return r.trial.piece == i; });
-    if (!is_done) return ExperimentTrial{i, 0, pieces[i].delay_s, 0};
-  }
+  for (std::size_t i = 0; i < pieces.size(); ++i)
+    if (auto trial = pieces[i].kind->next_trial(i, done)) return trial;
   return std::nullopt;
 }
 
 std::string missing_transitions(const std::vector<Piece>& pieces, const std::vector<TrialResult>& done) {
   for (std::size_t i = 0; i < pieces.size(); ++i) {
-    if (pieces[i].kind != PieceKind::delay_sweep) continue;
-    for (int repeat = 0; repeat < pieces[i].repeats; ++repeat) {
-      const std::vector<TrialResult> results = of_repeat(done, i, repeat);
-      if (!std::isnan(first_delay(results, 2))) continue;
+    const auto* sweep = pieces[i].as<pieces::DelaySweep>();
+    if (!sweep) continue;
+    for (int repeat = 0; repeat < sweep->repeats; ++repeat) {
+      if (!std::isnan(pieces::falls_from_s(pieces::of_repeat(done, i, repeat)))) continue;
       return "the delay sweep " + pieces[i].label + " is not complete: in repeat " +
-             std::to_string(repeat + 1) + " nothing fell up to " +
-             exact_text(pieces[i].delays_s.back() * 1e3) +
+             std::to_string(repeat + 1) + " nothing fell up to " + exact_text(sweep->delays_s.back() * 1e3) +
              " ms, so that it is not known from which delay on it falls: add longer delays to delay_s";
     }
   }
@@ -295,12 +190,7 @@ TrialResult judge_trial(const ExperimentTrial& trial, const Piece& piece, const 
   result.theta_amplitude_rad = fell ? std::max(-theta_low, theta_high) : 0.5 * (theta_high - theta_low);
   result.cart_amplitude_m = fell ? std::max(-cart_low, cart_high) : 0.5 * (cart_high - cart_low);
   if (fell) result.fall_time_s = static_cast<double>(last->time_ns - first->time_ns) / 1e9;
-  if ((piece.kind == PieceKind::delay_sweep || compares(piece)) && fell)
-    result.outcome = "fell";
-  else if (reason == StopReason::duration)
-    result.outcome = piece.kind != PieceKind::delay_sweep                  ? "done"
-                     : result.theta_amplitude_rad < piece.stable_below_rad ? "stable"
-                                                                           : "oscillating";
+  result.outcome = piece.kind->outcome_of(fell, reason == StopReason::duration, result.theta_amplitude_rad);
   if (result.outcome == "oscillating")
     result.frequency_hz = frequency_of(first, last + 1, from_ns, upright + 0.5 * (theta_low + theta_high),
                                        result.theta_amplitude_rad);
@@ -356,16 +246,15 @@ std::vector<TrialResult> read_trials(const std::filesystem::path& folder, const 
   for (std::size_t i = 0; i < results.size(); ++i) {
     TrialResult& r = results[i];
     if (r.trial.piece >= pieces.size()) refuse_line(folder / journal_name, i + 2);
-    const std::vector<NamedGains>& controllers = pieces[r.trial.piece].controllers;
+    const std::span<const NamedGains> controllers = pieces[r.trial.piece].kind->controllers();
     if (controllers.empty()) continue;
     const auto at = std::find_if(controllers.begin(), controllers.end(),
                                  [&](const NamedGains& c) { return c.name == r.controller; });
     if (at == controllers.end()) refuse_line(folder / journal_name, i + 2);
     r.trial.controller = static_cast<std::size_t>(at - controllers.begin());
   }
-  std::erase_if(results, [&](const TrialResult& r) {
-    return pieces[r.trial.piece].kind == PieceKind::delay_sweep && !is_sweep_outcome(r.outcome);
-  });
+  std::erase_if(results,
+                [&](const TrialResult& r) { return !pieces[r.trial.piece].kind->is_result(r.outcome); });
   return results;
 }
 
@@ -388,14 +277,16 @@ std::vector<TrialResult> read_trials(const std::filesystem::path& folder) {
 
 void write_sweep_tables(const std::filesystem::path& folder, const std::vector<Piece>& pieces,
                         const std::vector<TrialResult>& results) {
-  const auto sweeps = std::count_if(pieces.begin(), pieces.end(),
-                                    [](const Piece& piece) { return piece.kind == PieceKind::delay_sweep; });
+  const auto sweeps = std::count_if(pieces.begin(), pieces.end(), [](const Piece& piece) {
+    return piece.as<pieces::DelaySweep>() != nullptr;
+  });
   for (std::size_t i = 0; i < pieces.size(); ++i) {
-    if (pieces[i].kind != PieceKind::delay_sweep) continue;
+    const auto* sweep = pieces[i].as<pieces::DelaySweep>();
+    if (!sweep) continue;
     std::string runs = "theta0_rad,delay_s,outcome,theta_amplitude_rad,cart_amplitude_m,fall_time_s\n";
     std::string transitions = "theta0_rad,oscillates_from_s,falls_from_s\n";
-    for (int repeat = 0; repeat < pieces[i].repeats; ++repeat) {
-      const std::vector<TrialResult> of_this = of_repeat(results, i, repeat);
+    for (int repeat = 0; repeat < sweep->repeats; ++repeat) {
+      const std::vector<TrialResult> of_this = pieces::of_repeat(results, i, repeat);
       if (of_this.empty()) continue;
       double theta0 = 0.0;
       for (const TrialResult& r : of_this) {
@@ -404,8 +295,8 @@ void write_sweep_tables(const std::filesystem::path& folder, const std::vector<P
                 exact_text(r.fall_time_s) + "\n";
         theta0 += std::abs(r.theta0_rad) / static_cast<double>(of_this.size());
       }
-      transitions += exact_text(theta0) + "," + exact_text(first_delay(of_this, 1)) + "," +
-                     exact_text(first_delay(of_this, 2)) + "\n";
+      transitions += exact_text(theta0) + "," + exact_text(pieces::oscillates_from_s(of_this)) + "," +
+                     exact_text(pieces::falls_from_s(of_this)) + "\n";
     }
     const std::string before = sweeps > 1 ? pieces[i].label + "-" : "";
     write_whole(folder / (before + "sweep.csv"), runs);

@@ -8,6 +8,7 @@
 #include "column_delay.hpp"
 #include "dataset_file.hpp"
 #include "experiment/experiment_file.hpp"
+#include "experiment/pieces/free_decay.hpp"
 #include "folded_angle.hpp"
 #include "upright/base/error.hpp"
 #include "upright/base/yaml_reader.hpp"
@@ -268,12 +269,12 @@ Dataset mapping_of_run(const fs::path& directory) {
   if (!fs::exists(directory / "run.yaml", problem)) return mapping;
   const YamlMap document = YamlMap::from_file(directory / "run.yaml");
   if (!document.has("experiment")) return mapping;
-  const PieceKind kind = read_piece(document.map("experiment").map("piece")).kind;
-  if (kind != PieceKind::free_decay && kind != PieceKind::closed_loop && kind != PieceKind::delay_sweep)
-    return mapping;
+  const Piece piece = read_piece(document.map("experiment").map("piece"));
+  const bool decays = piece.as<pieces::FreeDecay>() != nullptr;
+  if (!decays && !balances(piece)) return mapping;
   const std::vector<LogRecord> rows = read_samples(mapping.file).rows;
   std::size_t from = 0;
-  if (kind == PieceKind::free_decay) {
+  if (decays) {
     mapping.cart_locked = true;
     // Held still: the last row before the angle has left where it was held.
     constexpr double left_rad = 0.02;

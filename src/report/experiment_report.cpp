@@ -10,6 +10,8 @@
 #include "comparison/paired_comparison.hpp"
 #include "design/delay_margin.hpp"
 #include "experiment/experiment.hpp"
+#include "experiment/pieces/delay_sweep.hpp"
+#include "experiment/pieces/free_decay.hpp"
 #include "html.hpp"
 #include "paired_report.hpp"
 #include "plot.hpp"
@@ -96,15 +98,6 @@ std::string spread(std::vector<double> values) {
   return *low == *high ? milliseconds(*low) : milliseconds(*low) + " to " + milliseconds(*high);
 }
 
-double first_of(const std::vector<TrialResult>& trials, int repeat, bool fall) {
-  double first = std::nan("");
-  for (const TrialResult& r : trials)
-    if (r.trial.repeat == repeat && (r.outcome == "fell" || (!fall && r.outcome == "oscillating")) &&
-        !(first < r.trial.delay_s))
-      first = r.trial.delay_s;
-  return first;
-}
-
 /// What the linear analysis and a simulated sweep say of the plant that the plan was made with.
 struct SweepModel {
   std::vector<SweepRun> simulated;
@@ -133,9 +126,9 @@ SweepModel sweep_model(const std::filesystem::path& folder, const std::vector<Tr
   }
 }
 
-void add_sweep(HtmlPage& page, const std::filesystem::path& folder, const Piece& piece,
-               const std::vector<TrialResult>& trials) {
-  const auto [simulated, margin, sliding_margin] = sweep_model(folder, trials, piece.duration_s);
+void add_sweep(HtmlPage& page, const std::filesystem::path& folder, const std::string& label,
+               const pieces::DelaySweep& sweep, const std::vector<TrialResult>& trials) {
+  const auto [simulated, margin, sliding_margin] = sweep_model(folder, trials, sweep.duration_s);
   Plot plot;
   plot.title = "Amplitude over delay";
   plot.x.label = "delay [ms]";
@@ -148,7 +141,7 @@ void add_sweep(HtmlPage& page, const std::filesystem::path& folder, const Piece&
   for (const SweepRun& r : simulated) {
     line.x.push_back(1e3 * r.start.delay_s);
     line.y.push_back(std::max(r.theta_amplitude_rad * per_degree, least_degree));
-    const Outcome outcome = r.outcome(piece.stable_below_rad);
+    const Outcome outcome = r.outcome(sweep.stable_below_rad);
     if (outcome != Outcome::stable && std::isnan(simulated_oscillates))
       simulated_oscillates = r.start.delay_s;
     if (outcome == Outcome::fell && std::isnan(simulated_falls)) simulated_falls = r.start.delay_s;
@@ -169,21 +162,22 @@ void add_sweep(HtmlPage& page, const std::filesystem::path& folder, const Piece&
   };
   mark(margin, "linear, near rest");
   mark(sliding_margin, "linear, sliding");
-  page.section(piece.label == "delay_sweep" ? "Delay sweep" : "Delay sweep " + piece.label);
+  page.section(label == pieces::DelaySweep::kind ? "Delay sweep" : "Delay sweep " + label);
   page.figure(plot,
               "The rig's runs (points) over a simulated sweep of the same loop (line). Vertical: the "
               "critical delay of the linear analysis.");
   std::vector<double> oscillates, falls;
-  for (int repeat = 0; repeat < piece.repeats; ++repeat) {
-    oscillates.push_back(first_of(trials, repeat, false));
-    falls.push_back(first_of(trials, repeat, true));
+  for (int repeat = 0; repeat < sweep.repeats; ++repeat) {
+    const std::vector<TrialResult> results = pieces::of_repeat(trials, trials.front().trial.piece, repeat);
+    oscillates.push_back(pieces::oscillates_from_s(results));
+    falls.push_back(pieces::falls_from_s(results));
   }
   page.table({{"", "oscillates from [ms]", "falls from [ms]"},
               {{"rig, over its repeats", spread(oscillates), spread(falls)},
                {"simulated", milliseconds(simulated_oscillates), milliseconds(simulated_falls)},
                {"linear, near rest", "-", milliseconds(margin.critical_delay_s)},
                {"linear, while the cart slides", "-", milliseconds(sliding_margin.critical_delay_s)}},
-              "An amplitude below " + number_text(piece.stable_below_rad * per_degree, 3) +
+              "An amplitude below " + number_text(sweep.stable_below_rad * per_degree, 3) +
                   " degree counts as stable."});
 }
 
@@ -217,7 +211,7 @@ std::vector<Plot> small_plots(const RunData& run, const Piece& piece, const Tria
     cart.y.push_back(1e3 * row.cart_m);
     voltage.y.push_back(row.voltage_v);
   }
-  const bool is_sweep = piece.kind == PieceKind::delay_sweep;
+  const bool is_sweep = piece.as<pieces::DelaySweep>() != nullptr;
   theta.color = is_sweep ? color::of_outcome(trial.outcome) : color::angle;
   cart.color = color::cart;
   voltage.color = color::voltage;
@@ -226,7 +220,7 @@ std::vector<Plot> small_plots(const RunData& run, const Piece& piece, const Tria
   first.x.label = second.x.label = "time [s]";
   first.width_px = second.width_px = 450;
   first.height_px = second.height_px = 190;
-  const bool hangs = piece.kind == PieceKind::free_decay;
+  const bool hangs = piece.as<pieces::FreeDecay>() != nullptr;
   first.y.label = balances(piece) || hangs ? "theta [deg]" : "x [mm]";
   first.series = {balances(piece) || hangs ? theta : cart};
   second.y.label = balances(piece) ? "x [mm]" : "V";
@@ -250,7 +244,7 @@ void add_runs(HtmlPage& page, const std::filesystem::path& folder, const Record&
   }
   if (plots.empty()) return;
   const Piece& shown = record.pieces[piece];
-  if (shown.kind != PieceKind::delay_sweep) page.section(shown.label);
+  if (!shown.as<pieces::DelaySweep>()) page.section(shown.label);
   page.figures(plots, "The runs over time; each title leads to the run's own report.");
 }
 
@@ -285,8 +279,8 @@ std::filesystem::path write_experiment_report(const std::filesystem::path& folde
     std::vector<TrialResult> trials;
     for (const TrialResult& r : record.trials)
       if (r.trial.piece == i) trials.push_back(r);
-    if (!trials.empty() && record.pieces[i].kind == PieceKind::delay_sweep)
-      add_sweep(page, folder, record.pieces[i], trials);
+    if (const auto* sweep = record.pieces[i].as<pieces::DelaySweep>(); sweep && !trials.empty())
+      add_sweep(page, folder, record.pieces[i].label, *sweep, trials);
     add_runs(page, folder, record, i);
   }
   add_comparisons(page, folder, record);

@@ -1,0 +1,267 @@
+#include "piece_keys.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "piece.hpp"
+
+namespace upright {
+
+namespace {
+
+constexpr double radians_per_degree = std::numbers::pi / 180.0;
+constexpr std::size_t most_list = 1000;
+constexpr std::size_t most_controllers = 8, longest_controller_name = 20;  // a table that can be read
+
+class KeyReader final : public PieceKeys {
+ public:
+  explicit KeyReader(const YamlMap& map) : map_(map) {}
+
+  void number(const char* key, double& value, const Range& range, std::optional<double> otherwise) override {
+    value = otherwise ? map_.number_or(key, *otherwise, range) : map_.number(key, range);
+  }
+  void numbers(const char* key, std::vector<double>& values, const Range& range) override {
+    values = list(key, range);
+  }
+  void growing(const char* key, std::vector<double>& values, const Range& range) override {
+    if (map_.is_map(key))
+      values = grid(map_.map(key), range);
+    else
+      values = list(key, range);
+    for (std::size_t i = 1; i < values.size(); ++i)
+      if (!(values[i] > values[i - 1]))
+        map_.fail(key, "does not grow", "order the delays from short to long, each once");
+  }
+  void integer(const char* key, int& value, int low, int high, int otherwise) override {
+    value = static_cast<int>(map_.integer_or(key, otherwise, low, high));
+  }
+  void voltage(const char* key, double& value) override { value = map_.number(key, any_voltage); }
+  void voltages(const char* key, std::vector<double>& values) override { values = list(key, any_voltage); }
+  void largest_voltage(const char* key, double& value, double otherwise) override {
+    value = map_.number_or(key, otherwise, any_voltage);
+  }
+  void angle(const char* key, double& value_rad, const Range& degrees,
+             std::optional<double> otherwise_deg) override {
+    number(key, value_rad, degrees, otherwise_deg);
+    value_rad *= radians_per_degree;
+  }
+  void angle_or_list(const char* key, double& value_rad, std::vector<double>& values_rad,
+                     const Range& degrees, double otherwise_deg) override {
+    if (!map_.has(key) || !map_.is_list(key)) return angle(key, value_rad, degrees, otherwise_deg);
+    for (const double angle_deg : list(key, degrees)) values_rad.push_back(angle_deg * radians_per_degree);
+  }
+  void choice(const char* key, std::size_t& word, const std::vector<std::string>& words) override {
+    if (!map_.has(key)) return;
+    word = static_cast<std::size_t>(std::find(words.begin(), words.end(), map_.choice(key, words)) -
+                                    words.begin());
+  }
+  void flag(const char* key, bool& value) override { value = map_.flag_or(key, false); }
+  void controllers(const char* key, std::vector<NamedGains>& controllers) override {
+    if (!map_.has(key)) return;
+    const YamlMap files = map_.map(key);
+    for (const std::string& name : files.keys()) {
+      if (!is_plain_name(name, longest_controller_name))
+        files.fail(name, "is no name for a controller",
+                   "use at most " + std::to_string(longest_controller_name) +
+                       " lower-case letters, digits, '-' and '_', it names folders");
+      controllers.push_back({name, files.path(name)});
+    }
+    files.finish();
+    if (controllers.size() < 2 || controllers.size() > most_controllers)
+      map_.fail(
+          key, "has " + std::to_string(controllers.size()) + " controllers",
+          "give it 2 to " + std::to_string(most_controllers) + ", as {name: gain file, name: gain file}");
+  }
+  void check(const char* key, bool holds, const std::string& problem, const std::string& remedy) override {
+    if (!holds) map_.fail(key, problem, remedy);
+  }
+
+ private:
+  std::vector<double> list(const char* key, const Range& range) const {
+    std::vector<double> values = map_.numbers(key, range);
+    if (values.empty() || values.size() > most_list)
+      map_.fail(key, "has " + std::to_string(values.size()) + " numbers", "give it 1 to 1000 numbers");
+    return values;
+  }
+
+  static std::vector<double> grid(const YamlMap& map, const Range& range) {
+    const double from = map.number("from", range), to = map.number("to", range);
+    const auto count = map.integer("count", 2, static_cast<std::int64_t>(most_list));
+    map.finish();
+    std::vector<double> values;
+    for (std::int64_t i = 0; i < count; ++i)
+      values.push_back(from + (to - from) * static_cast<double>(i) / static_cast<double>(count - 1));
+    return values;
+  }
+
+  const YamlMap& map_;
+};
+
+/// Degrees whose reader gives the same radians, bit for bit where there are any.
+std::string degrees_text(double rad) {
+  double degrees = rad / radians_per_degree;
+  for (int i = -2; i <= 2; ++i) {
+    double near = degrees;
+    for (int j = 0; j < std::abs(i); ++j) near = std::nextafter(near, i < 0 ? -1e9 : 1e9);
+    if (near * radians_per_degree == rad) degrees = near;
+  }
+  const double rounded = std::round(degrees * 1e6) / 1e6;
+  return exact_text(rounded * radians_per_degree == rad ? rounded : degrees);
+}
+
+template <class Text>
+std::string list_text(const std::vector<double>& values, const Text& text_of) {
+  std::string text = "[";
+  for (const double value : values) text += (text.size() > 1 ? ", " : "") + text_of(value);
+  return text + "]";
+}
+
+class KeyWriter final : public PieceKeys {
+ public:
+  void number(const char* key, double& value, const Range&, std::optional<double>) override {
+    add(key, exact_text(value));
+  }
+  void numbers(const char* key, std::vector<double>& values, const Range&) override {
+    add(key, list_text(values, exact_text));
+  }
+  void growing(const char* key, std::vector<double>& values, const Range& range) override {
+    numbers(key, values, range);
+  }
+  void integer(const char* key, int& value, int, int, int) override { add(key, std::to_string(value)); }
+  void voltage(const char* key, double& value) override { add(key, exact_text(value)); }
+  void voltages(const char* key, std::vector<double>& values) override {
+    add(key, list_text(values, exact_text));
+  }
+  void largest_voltage(const char* key, double& value, double) override { add(key, exact_text(value)); }
+  void angle(const char* key, double& value_rad, const Range&, std::optional<double>) override {
+    add(key, degrees_text(value_rad));
+  }
+  void angle_or_list(const char* key, double& value_rad, std::vector<double>& values_rad, const Range&,
+                     double) override {
+    add(key, values_rad.empty() ? degrees_text(value_rad) : list_text(values_rad, degrees_text));
+  }
+  void choice(const char* key, std::size_t& word, const std::vector<std::string>& words) override {
+    add(key, words[word]);
+  }
+  void flag(const char* key, bool& value) override {
+    if (value) add(key, "true");
+  }
+  void controllers(const char* key, std::vector<NamedGains>& controllers) override {
+    if (controllers.empty()) return;
+    std::string files = "{";
+    for (const NamedGains& c : controllers)
+      files += (files.size() > 1 ? ", " : "") + c.name + ": " +
+               yaml_quoted(std::filesystem::absolute(c.file).lexically_normal().string());
+    add(key, files + "}");
+  }
+
+  const std::string& text() const noexcept { return text_; }
+
+ private:
+  void add(const char* key, const std::string& value) { text_ += std::string(", ") + key + ": " + value; }
+
+  std::string text_;
+};
+
+class LargestVoltage final : public PieceKeys {
+ public:
+  void voltage(const char* key, double& value) override { see(key, value); }
+  void voltages(const char* key, std::vector<double>& values) override {
+    for (const double value : values) see(key, value);
+  }
+  void largest_voltage(const char* key, double& value, double) override { see(key, value); }
+
+  KeyedVoltage found;
+
+ private:
+  void see(const char* key, double value) {
+    if (!found.key || value > found.voltage_v) found = {key, value};
+  }
+};
+
+class Amplitude final : public PieceKeys {
+ public:
+  void voltage(const char* key, double& value) override { found = {key, value}; }
+
+  KeyedVoltage found;
+};
+
+class Scaler final : public PieceKeys {
+ public:
+  explicit Scaler(double factor) : factor_(factor) {}
+  void voltage(const char*, double& value) override { value *= factor_; }
+  void voltages(const char*, std::vector<double>& values) override {
+    for (double& value : values) value *= factor_;
+  }
+
+ private:
+  double factor_;
+};
+
+class LimitCheck final : public PieceKeys {
+ public:
+  LimitCheck(double limit_v, const YamlMap& map) : limit_v_(limit_v), map_(map) {}
+  void voltage(const char* key, double& value) override { judge(key, "is ", value); }
+  void voltages(const char* key, std::vector<double>& values) override {
+    for (const double value : values) judge(key, "goes to ", value);
+  }
+  void largest_voltage(const char* key, double& value, double) override { judge(key, "is ", value); }
+
+ private:
+  void judge(const char* key, const char* verb, double value) const {
+    if (value > limit_v_)
+      map_.fail(key, verb + exact_text(value) + ", above voltage_limit_v",
+                "lower it, or raise voltage_limit_v");
+  }
+
+  double limit_v_;
+  const YamlMap& map_;
+};
+
+/// A visitor may change what it visits: those that only look get a copy.
+void look(const PieceKind& kind, PieceKeys& visitor) {
+  kind.clone()->keys(visitor);
+}
+
+}  // namespace
+
+void read_keys(PieceKind& kind, const YamlMap& map) {
+  KeyReader reader(map);
+  kind.keys(reader);
+}
+
+std::string keys_text(const PieceKind& kind) {
+  KeyWriter writer;
+  look(kind, writer);
+  return writer.text();
+}
+
+KeyedVoltage largest_voltage(const PieceKind& kind) {
+  LargestVoltage visitor;
+  look(kind, visitor);
+  return visitor.found;
+}
+
+KeyedVoltage amplitude_of(const PieceKind& kind) {
+  Amplitude visitor;
+  look(kind, visitor);
+  return visitor.found;
+}
+
+void scale_voltages(PieceKind& kind, double factor) {
+  Scaler scaler(factor);
+  kind.keys(scaler);
+}
+
+void refuse_voltages_above(double limit_v, const PieceKind& kind, const YamlMap& map) {
+  LimitCheck check(limit_v, map);
+  look(kind, check);
+}
+
+bool is_plain_name(const std::string& name, std::size_t longest) {
+  return !name.empty() && name.size() <= longest &&
+         name.find_first_not_of("abcdefghijklmnopqrstuvwxyz0123456789-_") == std::string::npos;
+}
+
+}  // namespace upright

@@ -1,0 +1,87 @@
+// The keys of a piece in an experiment file. Each kind lists them once, with range and default; what visits
+// the list reads the piece, writes it, or looks at its voltages.
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "upright/base/yaml_reader.hpp"
+
+namespace upright {
+
+/// A controller that takes turns with others: the name it is told by, and its gain file.
+struct NamedGains {
+  std::string name;
+  std::filesystem::path file;
+};
+
+// Ranges that several kinds share. The unit of a number stands in its key.
+constexpr double longest_piece_s = 3600.0;
+constexpr double highest_voltage_v = 100.0;
+constexpr double longest_travel_m = 10.0;
+constexpr Range any_voltage{0.0, highest_voltage_v, true};
+constexpr Range any_duration{0.0, longest_piece_s, true};
+constexpr Range any_period = Range::within(0.01, longest_piece_s);
+constexpr std::nullopt_t required = std::nullopt;  ///< in place of a default
+
+/// Visits the keys of a piece in the order of the file. A visitor overrides what it cares for.
+class PieceKeys {
+ public:
+  virtual ~PieceKeys() = default;
+  virtual void number(const char* /*key*/, double& /*value*/, const Range& /*range*/,
+                      std::optional<double> /*otherwise*/) {}
+  virtual void numbers(const char* /*key*/, std::vector<double>& /*values*/, const Range& /*range*/) {}
+  /// A list that grows, or {from, to, count}.
+  virtual void growing(const char* /*key*/, std::vector<double>& /*values*/, const Range& /*range*/) {}
+  virtual void integer(const char* /*key*/, int& /*value*/, int /*low*/, int /*high*/, int /*otherwise*/) {}
+  /// A voltage that the piece puts out: the plan may lower it.
+  virtual void voltage(const char* /*key*/, double& /*value*/) {}
+  virtual void voltages(const char* /*key*/, std::vector<double>& /*values*/) {}
+  /// The voltage up to which a piece may go.
+  virtual void largest_voltage(const char* /*key*/, double& /*value*/, double /*otherwise*/) {}
+  /// An angle that stands in the file in degrees.
+  virtual void angle(const char* /*key*/, double& /*value_rad*/, const Range& /*degrees*/,
+                     std::optional<double> /*otherwise_deg*/) {}
+  /// One angle, or a list of them: then `values_rad` is not empty.
+  virtual void angle_or_list(const char* /*key*/, double& /*value_rad*/, std::vector<double>& /*values_rad*/,
+                             const Range& /*degrees*/, double /*otherwise_deg*/) {}
+  /// One of `words`, the first where the key is left out.
+  virtual void choice(const char* /*key*/, std::size_t& /*word*/, const std::vector<std::string>& /*words*/) {
+  }
+  /// Left out: false.
+  virtual void flag(const char* /*key*/, bool& /*value*/) {}
+  /// 2 to 8 gain files by name; left out: none.
+  virtual void controllers(const char* /*key*/, std::vector<NamedGains>& /*controllers*/) {}
+  /// Refuses the file where `holds` is false. `problem` goes on from the key.
+  virtual void check(const char* /*key*/, bool /*holds*/, const std::string& /*problem*/,
+                     const std::string& /*remedy*/) {}
+};
+
+class PieceKind;
+
+/// Sets the values of a piece from its map. Throws ConfigError with remedy, file, line and key.
+void read_keys(PieceKind& kind, const YamlMap& map);
+/// ", key: value" for each key, as `read_keys` reads it back exactly.
+std::string keys_text(const PieceKind& kind);
+
+/// A voltage among the keys of a piece.
+struct KeyedVoltage {
+  const char* key = nullptr;  ///< null: it has none
+  double voltage_v = 0.0;
+};
+/// The largest voltage that a piece asks for.
+KeyedVoltage largest_voltage(const PieceKind& kind);
+/// The one voltage about which a piece swings; none where it has a list of them, or only a bound.
+KeyedVoltage amplitude_of(const PieceKind& kind);
+/// Lowers the voltages that a piece puts out.
+void scale_voltages(PieceKind& kind, double factor);
+/// Throws ConfigError at the key of `map` whose voltage is above `limit_v`, of an experiment.
+void refuse_voltages_above(double limit_v, const PieceKind& kind, const YamlMap& map);
+
+/// Names folders: lower-case letters, digits, '-' and '_'.
+bool is_plain_name(const std::string& name, std::size_t longest);
+
+}  // namespace upright
