@@ -4,12 +4,10 @@
 #include <utility>
 #include <vector>
 
-#include "comedi/comedi_rig.hpp"
+#include "backends.hpp"
 #include "gpio_rig.hpp"
 #include "guarded_rig.hpp"
 #include "joined_rig.hpp"
-#include "modbus/modbus_rig.hpp"
-#include "quanser/quanser_rig.hpp"
 #include "upright/base/error.hpp"
 
 namespace upright {
@@ -33,23 +31,6 @@ double line_time_s(const RigFile& rig) {
   const ModbusRig& modbus = *rig.modbus;
   const int bits_per_byte = 1 + 8 + (modbus.parity == Parity::none ? 0 : 1) + modbus.stop_bits;
   return static_cast<double>(fewest_bytes(rig) * bits_per_byte) / modbus.baud;
-}
-
-std::unique_ptr<Rig> make_part(const RigFile& rig, Backend backend, double period_s) {
-  switch (backend) {
-    case Backend::modbus_tcp:
-    case Backend::modbus_rtu:
-      return std::make_unique<ModbusTransport>(rig, period_s);
-    case Backend::gpio:
-      return make_gpio_encoders(rig, period_s);
-    case Backend::comedi:
-      return std::make_unique<ComediTransport>(rig, period_s);
-    case Backend::quanser_hil:
-      return std::make_unique<QuanserTransport>(rig, period_s);
-    case Backend::simulated:
-      break;
-  }
-  throw ConfigError(rig.file.string() + ":1: backend is simulated: name a hardware backend");
 }
 
 }  // namespace
@@ -84,7 +65,8 @@ std::unique_ptr<Rig> make_rig(const RigFile& rig, const RigOptions& options) {
   std::vector<RigPart> parts;
   parts.reserve(backends.size());
   for (const Backend backend : backends) {
-    std::unique_ptr<Rig> part = make_part(rig, backend, options.period_s);
+    std::unique_ptr<Rig> part =
+        all_backends.at(static_cast<std::size_t>(backend))().make(rig, options.period_s);
     parts.push_back({std::move(part), roles_of(rig, backend)});
   }
   std::unique_ptr<Rig> whole =

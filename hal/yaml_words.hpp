@@ -1,4 +1,4 @@
-// Enumerations as words, as the sections of a rig file have them.
+// What the sections of a rig file have in common: enumerations as words, small integers.
 #pragma once
 
 #include <algorithm>
@@ -17,6 +17,10 @@ template <class Enum, std::size_t N>
 Enum choose(const YamlMap& map, const std::string& key, const Words<N>& words) {
   const std::string word = map.choice(key, {words.begin(), words.end()});
   return static_cast<Enum>(std::find(words.begin(), words.end(), word) - words.begin());
+}
+
+inline int small_integer(const YamlMap& map, const std::string& key, int low, int high) {
+  return static_cast<int>(map.integer(key, low, high));
 }
 
 template <class Enum, std::size_t N>

@@ -1,11 +1,13 @@
 #include "comedi_section.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <vector>
 
+#include "../backends.hpp"
 #include "../quoted.hpp"
+#include "../yaml_words.hpp"
+#include "comedi_rig.hpp"
 
 namespace upright {
 
@@ -14,22 +16,16 @@ namespace {
 constexpr int last_subdevice = 255;
 constexpr int last_channel = 65535;
 constexpr int last_line = 15;
-constexpr std::array kinds = {"counter", "plain_counter", "analog_input"};
-constexpr std::array references = {"ground", "common", "difference", "other"};
-
-template <class Enum, std::size_t N>
-Enum choose(const YamlMap& map, const std::string& key, const std::array<const char*, N>& words) {
-  const std::string word = map.choice(key, {words.begin(), words.end()});
-  return static_cast<Enum>(std::find(words.begin(), words.end(), word) - words.begin());
-}
+constexpr Words<3> kinds = {"counter", "plain_counter", "analog_input"};
+constexpr Words<4> references = {"ground", "common", "difference", "other"};
 
 /// A channel of a device: the section's own, unless this part of the rig names another.
 template <class Channel>
 void read_channel(const YamlMap& map, const std::string& device, Channel& channel) {
   channel.device = map.text_or("device", device);
   if (channel.device.empty()) map.fail("device", "is missing here and in comedi", "add device: /dev/comedi0");
-  channel.subdevice = static_cast<int>(map.integer("subdevice", 0, last_subdevice));
-  channel.channel = static_cast<int>(map.integer("channel", 0, last_channel));
+  channel.subdevice = small_integer(map, "subdevice", 0, last_subdevice);
+  channel.channel = small_integer(map, "channel", 0, last_channel);
 }
 
 ComediRange read_range(const YamlMap& map) {
@@ -41,8 +37,7 @@ ComediRange read_range(const YamlMap& map) {
 }
 
 ComediLines read_lines(const YamlMap& map) {
-  const ComediLines lines = {static_cast<int>(map.integer("a", 0, last_line)),
-                             static_cast<int>(map.integer("b", 0, last_line))};
+  const ComediLines lines = {small_integer(map, "a", 0, last_line), small_integer(map, "b", 0, last_line)};
   if (lines.a == lines.b) map.fail("b", "is the line of a", "give A and B a line each");
   map.finish();
   return lines;
@@ -102,14 +97,13 @@ std::string range_text(const ComediRange& range) {
 }
 
 std::string encoder_text(const char* key, const ComediEncoder& encoder) {
-  std::string text = std::string("  ") + key + ": {kind: " + kinds[static_cast<std::size_t>(encoder.kind)] +
-                     ", " + channel_text(encoder);
+  std::string text =
+      std::string("  ") + key + ": {kind: " + word_of(encoder.kind, kinds) + ", " + channel_text(encoder);
   if (encoder.lines)
     text +=
         ", lines: {a: " + std::to_string(encoder.lines->a) + ", b: " + std::to_string(encoder.lines->b) + "}";
   if (encoder.kind == ComediEncoderKind::analog_input)
-    text += range_text(encoder.range) +
-            ", reference: " + references[static_cast<std::size_t>(encoder.reference)] +
+    text += range_text(encoder.range) + ", reference: " + word_of(encoder.reference, references) +
             ", counts_per_v: " + exact_text(encoder.counts_per_v);
   return text + "}\n";
 }
@@ -138,6 +132,17 @@ std::string comedi_text(const ComediRig& rig) {
     text += "  output: {" + channel_text(*rig.output) + range_text(rig.output->range) +
             ", amplifier_gain: " + exact_text(rig.output->amplifier_gain) + "}\n";
   return text;
+}
+
+BackendKind comedi_backend() {
+  const auto read = [](const YamlMap& document, RigFile& rig) {
+    rig.comedi = read_comedi(document.map("comedi"), rig);
+  };
+  const auto text = [](const RigFile& rig) { return rig.comedi ? comedi_text(*rig.comedi) : std::string(); };
+  const auto make = [](const RigFile& rig, double period_s) -> std::unique_ptr<Rig> {
+    return std::make_unique<ComediTransport>(rig, period_s);
+  };
+  return {"comedi", read, text, make};
 }
 
 }  // namespace upright

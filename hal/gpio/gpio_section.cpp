@@ -4,6 +4,8 @@
 #include <array>
 #include <vector>
 
+#include "../backends.hpp"
+#include "../gpio_rig.hpp"
 #include "../quoted.hpp"
 #include "../yaml_words.hpp"
 
@@ -21,7 +23,7 @@ constexpr Words<2> ends = {"plus_x", "minus_x"};
 class TakenLines {
  public:
   int take(const YamlMap& map, const std::string& key) {
-    const auto line = static_cast<int>(map.integer(key, 0, highest_line));
+    const auto line = small_integer(map, key, 0, highest_line);
     const bool is_taken = std::find(lines_.begin(), lines_.end(), line) != lines_.end();
     if (is_taken)
       map.fail(key, "is " + std::to_string(line) + ", which is in use already", "give each its own line");
@@ -124,6 +126,11 @@ std::string gpio_text(const GpioRig& rig) {
   if (rig.cart_encoder) text += "  cart_encoder: " + encoder_text(*rig.cart_encoder);
   if (rig.pendulum_encoder) text += "  pendulum_encoder: " + encoder_text(*rig.pendulum_encoder);
   return text;
+}
+
+BackendKind gpio_backend() {
+  // Its section holds the lines of any rig, too: `read_rig` reads and writes it.
+  return {"gpio", nullptr, nullptr, make_gpio_encoders};
 }
 
 }  // namespace upright

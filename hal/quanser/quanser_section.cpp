@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <filesystem>
 
+#include "../backends.hpp"
 #include "../quoted.hpp"
 #include "../yaml_words.hpp"
 #include "card_kinds.hpp"
+#include "quanser_rig.hpp"
 
 namespace upright {
 
@@ -14,7 +16,6 @@ namespace {
 constexpr int last_channel = 255;
 constexpr std::size_t longest_board_type = 64;
 constexpr std::size_t longest_text = 1000;
-constexpr double longest_watchdog_s = 10.0;
 constexpr Words<2> levels = {"low", "high"};
 
 std::string words(const YamlMap& map, const std::string& key, const std::string& text, std::size_t longest) {
@@ -108,7 +109,7 @@ QuanserEnable read_enable(const YamlMap& map) {
 
 double read_watchdog(const YamlMap& map, const QuanserCardKind* kind, const std::string& board_type) {
   if (!map.has("watchdog_s")) return 0.0;
-  const double time_s = map.number("watchdog_s", Range{0.0, longest_watchdog_s, true});
+  const double time_s = map.number("watchdog_s", Range{0.0, RigFile::longest_watchdog_s, true});
   if (kind != nullptr && (time_s < kind->shortest_watchdog_s || time_s > kind->longest_watchdog_s))
     map.fail("watchdog_s", "is not a time that the watchdog of a " + board_type + " can be set to",
              "give " + exact_text(kind->shortest_watchdog_s) + " to " + exact_text(kind->longest_watchdog_s));
@@ -166,6 +167,19 @@ std::string quanser_text(const QuanserRig& rig) {
             ", active: " + word_of(rig.amplifier_enable->active_high ? 1 : 0, levels) + "}\n";
   if (rig.watchdog_s > 0.0) text += "  watchdog_s: " + exact_text(rig.watchdog_s) + "\n";
   return text;
+}
+
+BackendKind quanser_backend() {
+  const auto read = [](const YamlMap& document, RigFile& rig) {
+    rig.quanser = read_quanser(document.map("quanser_hil"), rig);
+  };
+  const auto text = [](const RigFile& rig) {
+    return rig.quanser ? quanser_text(*rig.quanser) : std::string();
+  };
+  const auto make = [](const RigFile& rig, double period_s) -> std::unique_ptr<Rig> {
+    return std::make_unique<QuanserTransport>(rig, period_s);
+  };
+  return {"quanser-hil", read, text, make};
 }
 
 }  // namespace upright

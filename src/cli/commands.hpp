@@ -1,26 +1,48 @@
-// The commands of `upright`: one function and one file each. `add_NAME` declares the command, its flags and
-// what it does. It throws Error for whatever the user should read; main turns that into one sentence on
-// stderr.
+// The registration of every command of `upright`: one function and one file each. `add_NAME` declares the
+// command, its flags and what it does. It throws Error for whatever the user should read; main turns that
+// into one sentence on stderr. Their order here is the order of the help.
 #pragma once
+
+#include <array>
 
 #include "command_line.hpp"
 
 namespace upright::cli {
 
-void add_check(CommandLine& line);
-void add_compare(CommandLine& line);
-void add_design(CommandLine& line);
-void add_diagnose(CommandLine& line);
-void add_doctor(CommandLine& line);
-void add_effects(CommandLine& line);
-void add_experiment(CommandLine& line);
-void add_identify(CommandLine& line);
-void add_paper(CommandLine& line);
-void add_margin(CommandLine& line);
-void add_replay(CommandLine& line);
-void add_report(CommandLine& line);
-void add_run(CommandLine& line);
-void add_sweep(CommandLine& line);
-void add_virtual_rig(CommandLine& line);
+using AddCommand = void(CommandLine&);
+
+// clang-format off
+AddCommand add_effects,
+           add_check,
+           add_paper,
+           add_sweep,
+           add_run,
+           add_experiment,
+           add_replay,
+           add_report,
+           add_compare,
+           add_design,
+           add_margin,
+           add_diagnose,
+           add_identify,
+           add_virtual_rig,
+           add_doctor;
+
+inline constexpr std::array all_commands = {add_effects,
+                                            add_check,
+                                            add_paper,
+                                            add_sweep,
+                                            add_run,
+                                            add_experiment,
+                                            add_replay,
+                                            add_report,
+                                            add_compare,
+                                            add_design,
+                                            add_margin,
+                                            add_diagnose,
+                                            add_identify,
+                                            add_virtual_rig,
+                                            add_doctor};
+// clang-format on
 
 }  // namespace upright::cli

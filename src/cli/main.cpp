@@ -24,21 +24,7 @@ ExitCode run(int argc, char** argv) {
       "Start here:  scripts/demo.sh   (needs no hardware)\n"
       "Each command shows an example:  upright COMMAND --help\n"
       "Exit codes: 0 done; 2 usage or configuration; 3 safety stop or fall; 4 link or device");
-  upright::cli::add_effects(line);
-  upright::cli::add_check(line);
-  upright::cli::add_paper(line);
-  upright::cli::add_sweep(line);
-  upright::cli::add_run(line);
-  upright::cli::add_experiment(line);
-  upright::cli::add_replay(line);
-  upright::cli::add_report(line);
-  upright::cli::add_compare(line);
-  upright::cli::add_design(line);
-  upright::cli::add_margin(line);
-  upright::cli::add_diagnose(line);
-  upright::cli::add_identify(line);
-  upright::cli::add_virtual_rig(line);
-  upright::cli::add_doctor(line);
+  for (upright::cli::AddCommand* add : upright::cli::all_commands) add(line);
   const ExitCode code = line.run(argc, argv);
   upright::cli::finish_output();
   return code;

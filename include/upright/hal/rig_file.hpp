@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <string>
 
@@ -17,6 +18,7 @@
 
 namespace upright {
 
+/// A backend by its place in hal/backends.hpp.
 enum class Backend : std::uint8_t { simulated, modbus_tcp, modbus_rtu, gpio, comedi, quanser_hil };
 
 /// "simulated", "modbus-tcp", ...
@@ -94,7 +96,14 @@ struct ModbusRig {
   std::optional<DeviceWatchdog> watchdog;
 };
 
+/// The section of a backend that has no member of its own in RigFile.
+struct BackendWiring {
+  virtual ~BackendWiring() = default;
+};
+
 struct RigFile {
+  static constexpr double longest_watchdog_s = 10.0;  ///< a longer one watches nothing
+
   std::filesystem::path file;
   // Where the counts come from and where the voltage goes. Simulated is all of them or none.
   Backend cart_encoder = Backend::simulated;
@@ -114,6 +123,7 @@ struct RigFile {
   std::optional<ComediRig> comedi;
   std::optional<QuanserRig> quanser;
   std::optional<GpioRig> gpio;
+  std::shared_ptr<const BackendWiring> wiring;  ///< of any other backend, of which a rig has one at most
   std::optional<EncoderAssumptions> encoder_watch;
 };
 

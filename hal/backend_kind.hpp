@@ -1,0 +1,26 @@
+// What a backend says of itself: its name and section in rig files, and the rig that it makes. One folder per
+// backend, one line in backends.hpp; rig files, joined rigs, doctor and error messages follow from there.
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "upright/base/yaml_reader.hpp"
+#include "upright/hal/rig.hpp"
+#include "upright/hal/rig_file.hpp"
+
+namespace upright {
+
+struct BackendKind {
+  const char* name;  ///< in rig files
+  /// Reads its section of a rig file in which it has a role, into `rig`, which has been read as far as
+  /// backends, calibration, amplifier and limits. Throws ConfigError. Null: `read_rig` reads it, for any rig
+  /// may have it.
+  void (*read)(const YamlMap& document, RigFile& rig);
+  /// The same section as text that reads back; empty where the rig has none. Null as `read`.
+  std::string (*text)(const RigFile& rig);
+  /// The rig, or its part that has the roles of this backend, for a loop of this period. Not open yet.
+  std::unique_ptr<Rig> (*make)(const RigFile& rig, double period_s);
+};
+
+}  // namespace upright
