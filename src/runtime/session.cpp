@@ -150,13 +150,13 @@ SessionResult run_to_its_stop(RunSetup setup, Rig& rig, Clock& clock, const Sign
   std::thread thread([&] {
     try {
       if (!clock.is_virtual()) setup.scheduling = enter_realtime(options.realtime);
-      result.outcome.realtime = setup.scheduling.policy == "SCHED_FIFO";
       if (awake && awake->held()) setup.scheduling.note += ", processors kept out of deep sleep";
       if (!clock.is_virtual() && setup.limits.spin_ns > 0)
         setup.scheduling.note += ", awake for the last " + exact_text(setup.rig.spin_us) + " us of each wait";
       directory.write_start(setup);
       const std::uint64_t faults_before = page_faults();
       loop.run(result.outcome);
+      result.outcome.realtime = setup.scheduling.policy == "SCHED_FIFO";
       result.outcome.counts.page_faults = page_faults() - faults_before;
       finished.set_value();
     } catch (...) {
