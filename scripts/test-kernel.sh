@@ -87,7 +87,7 @@ mount -t devtmpfs devtmpfs /dev
 mkdir -p /dev/shm
 ip link set lo up
 modprobe configfs && mount -t configfs configfs /sys/kernel/config
-export GTEST_COLOR=no
+export GTEST_COLOR=no UPRIGHT_RETRY_LOG=/retries_and_skips.log
 status=0
 while read -r program modules; do
   for module in $modules; do modprobe "$module" || status=1; done
@@ -95,6 +95,7 @@ while read -r program modules; do
   "$program" || { status=$?; echo "== $(basename "$program") FAILED ($status)"; }
 done </programs
 for record in /records/*; do [ ! -e "$record" ] || echo "guest: outcome $(basename "$record") $(cat "$record")"; done
+[ ! -e "$UPRIGHT_RETRY_LOG" ] || sed "s/^/guest: counted /" "$UPRIGHT_RETRY_LOG"
 echo "guest: exit $status"
 poweroff -f
 INIT
@@ -141,6 +142,7 @@ boot() {
 }
 for ((i = 0; i < guests; ++i)); do boot "$i" & done
 wait
+sed -n 's/^guest: counted //p' "$consoles"/* >>"$build/retries_and_skips.log"
 status=0
 for ((i = 0; i < guests; ++i)); do
   said=$(sed -n 's/^guest: exit \([0-9]*\)$/\1/p' "$consoles/$i")

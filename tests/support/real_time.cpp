@@ -1,0 +1,116 @@
+#include "real_time.hpp"
+
+#include <fcntl.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <cstdio>
+#include <cstdlib>
+#include <sstream>
+#include <thread>
+
+namespace upright::test {
+
+namespace {
+
+/// What a stall has excused.
+struct Excused {
+  std::string what;
+  Interval stall;
+};
+
+bool attempting = false;
+
+StallDetector& detector() {
+  static StallDetector one;
+  return one;
+}
+
+std::string test_name() {
+  const testing::TestInfo* info = testing::UnitTest::GetInstance()->current_test_info();
+  return std::string(info->test_suite_name()) + "." + info->name();
+}
+
+std::string words_of(const Interval& stall) {
+  std::ostringstream words;
+  words.precision(1);
+  words << std::fixed << 1e3 * (stall.end_s - stall.begin_s) << " ms";
+  return words.str();
+}
+
+/// A line with tabs: retry or skip, test, what was excused, the stall's begin and end.
+void count(const char* kind, const Excused& excused) {
+  const char* named = std::getenv("UPRIGHT_RETRY_LOG");
+  std::string what = excused.what;
+  for (char& c : what)
+    if (c == '\n' || c == '\t') c = ' ';
+  std::ostringstream line;
+  line.precision(3);
+  line << std::fixed << kind << '\t' << test_name() << '\t' << what << '\t' << excused.stall.begin_s << '\t'
+       << excused.stall.end_s << '\n';
+  const std::string text = line.str();
+  const int file =
+      ::open(named != nullptr ? named : UPRIGHT_RETRY_LOG, O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0644);
+  // In one go, for tests write it side by side.
+  if (file < 0 || ::write(file, text.data(), text.size()) != static_cast<ssize_t>(text.size()))
+    ADD_FAILURE() << "a " << kind << " could not be counted: the file cannot be written";
+  if (file >= 0) ::close(file);
+}
+
+/// Until a moment has passed without a stall: an attempt right after one is likely to meet the next.
+void await_calm() {
+  constexpr auto calm = std::chrono::milliseconds(500);
+  constexpr int most_waits = 20;
+  for (int i = 0; i < most_waits; ++i) {
+    const Since begin;
+    std::this_thread::sleep_for(calm);
+    if (!detector().stall_in(begin.until_now())) return;
+  }
+}
+
+/// What excuses the attempt, if anything has to.
+std::optional<Excused> attempted(const std::function<void()>& attempt) {
+  std::optional<Excused> excused;
+  attempting = true;
+  try {
+    attempt();
+  } catch (const Excused& thrown) {
+    excused = thrown;
+  } catch (...) {
+    attempting = false;
+    throw;
+  }
+  attempting = false;
+  return excused;
+}
+
+}  // namespace
+
+bool in_real_time(const std::function<void()>& attempt) {
+  detector();
+  for (int made = 1;; ++made) {
+    const std::optional<Excused> excused = attempted(attempt);
+    if (!excused || testing::Test::HasFailure()) return true;
+    std::printf("!! a stall of %s excuses attempt %d: %s\n", words_of(excused->stall).c_str(), made,
+                excused->what.c_str());
+    if (made == most_attempts) {
+      count("skip", *excused);
+      [] { GTEST_SKIP() << "each attempt was hit by a stall of this machine"; }();
+      return false;
+    }
+    count("retry", *excused);
+    await_calm();
+  }
+}
+
+void expect_timing(const Interval& when, bool holds, const char* condition, const std::string& what,
+                   const char* file, int line) {
+  if (holds) return;
+  const std::optional<Interval> stall = attempting ? detector().stall_in(when) : std::nullopt;
+  if (stall) throw Excused{what, *stall};
+  ADD_FAILURE_AT(file, line) << what << ": " << condition << " does not hold, and no stall overlaps its "
+                             << words_of(when);
+}
+
+}  // namespace upright::test
