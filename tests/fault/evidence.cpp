@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tests/support/run_end.hpp"
 #include "upright/record/replay.hpp"
 #include "upright/record/run_reader.hpp"
 
@@ -32,18 +33,6 @@ bool is_late(const Evidence& evidence, const Expectation& expectation) {
   return last_voltage_s(evidence) - evidence.fault_s >= expectation.zero_within_s + busy_machine_s;
 }
 
-/// The reason in run.yaml.
-std::string reason_of(const Evidence& evidence) {
-  const RunRecord run = read_run(evidence.run);
-  return run.outcome ? run.outcome->text("reason") : "";
-}
-
-bool machine_was_too_busy(const Evidence& evidence, const Expectation& expectation) {
-  const std::string reason = reason_of(evidence);
-  if (is_right(reason, expectation)) return reason != "duration" && is_late(evidence, expectation);
-  return reason == "overrun" || reason == "stale_encoder" || reason == "link_lost";
-}
-
 void judge_plant(const Evidence& evidence, const Expectation& expectation, const std::string& reason) {
   ASSERT_FALSE(evidence.plant.empty());
   double farthest_m = 0.0;
@@ -52,14 +41,13 @@ void judge_plant(const Evidence& evidence, const Expectation& expectation, const
   EXPECT_EQ(evidence.plant.back().voltage_v, 0.0) << "and is off in the end";
   EXPECT_LT(farthest_m, track_end_m);
   if (reason == "duration") return;
-  EXPECT_FALSE(is_late(evidence, expectation))
-      << reason << ": zero volts after " << last_voltage_s(evidence) - evidence.fault_s << " s, not "
-      << expectation.zero_within_s;
+  const double on_until_s = last_voltage_s(evidence);
+  EXPECT_TIMING((Interval{evidence.fault_s, on_until_s}), !is_late(evidence, expectation),
+                reason + ": zero volts after " + std::to_string(on_until_s - evidence.fault_s) + " s, not " +
+                    std::to_string(expectation.zero_within_s));
 }
 
-void judge_log(const Evidence& evidence, const std::string& reason) {
-  const RunRecord run = read_run(evidence.run);
-  ASSERT_TRUE(run.outcome.has_value());
+void judge_log(const Evidence& evidence, const RunRecord& run, const std::string& reason) {
   EXPECT_FALSE(run.samples.truncated);
   const std::vector<LogRecord>& rows = run.samples.rows;
   ASSERT_FALSE(rows.empty());
@@ -91,18 +79,30 @@ double log_end_s(const std::filesystem::path& run) {
          1e-9 * static_cast<double>(record.samples.rows.back().time_ns);
 }
 
-void judge(const Evidence& evidence, const Expectation& expectation) {
-  const std::string reason = reason_of(evidence);
-  EXPECT_TRUE(is_right(reason, expectation)) << "it ended with: " << reason;
-  judge_plant(evidence, expectation, reason);
-  judge_log(evidence, reason);
+void expect_came_about(bool came, const Since& begin, const std::filesystem::path& runs) {
+  if (came) return;
+  std::error_code none;
+  const std::filesystem::path run = std::filesystem::exists(runs, none) ? only_entry(runs) : "";
+  const std::optional<RunEnd> end = run.empty() ? std::nullopt : run_end(text_of(run / "run.yaml"));
+  EXPECT_TIMING(end ? end->before() : begin.until_now(), came,
+                "the run does not begin, or ends before its fault comes about");
 }
 
-void judge_attempts(const std::function<std::optional<Evidence>()>& attempt, const Expectation& expectation) {
-  const std::optional<Evidence> evidence =
-      tried(attempt, [&](const Evidence& left) { return !machine_was_too_busy(left, expectation); });
-  ASSERT_TRUE(evidence.has_value()) << never_came_about;
-  judge(*evidence, expectation);
+void judge(const Evidence& evidence, const Expectation& expectation) {
+  const RunRecord run = read_run(evidence.run);
+  ASSERT_TRUE(run.outcome.has_value());
+  const std::string reason = run.outcome->text("reason");
+  EXPECT_END(run_end(text_of(evidence.run / "run.yaml")).value(), is_right(reason, expectation));
+  judge_plant(evidence, expectation, reason);
+  judge_log(evidence, run, reason);
+}
+
+void fault_case(const std::string& fault, Bench bench, const std::string& cell,
+                const std::function<void()>& attempt) {
+  if (!in_real_time(attempt))
+    record_skipped(fault, bench);
+  else if (!testing::Test::HasFailure())
+    record(fault, bench, cell);
 }
 
 }  // namespace upright::test

@@ -9,6 +9,7 @@
 
 #include "../integration/virtual_rig_process.hpp"
 #include "fault_table.hpp"
+#include "tests/support/real_time.hpp"
 
 namespace upright::test {
 
@@ -30,30 +31,26 @@ struct Evidence {
 /// When the last row of a run's log was written, on the monotonic clock.
 double log_end_s(const std::filesystem::path& run);
 
-/// What attempts come to that give nothing: each run was over before it was put to the test.
-inline constexpr const char* never_came_about =
-    "the run does not begin, or ends before its fault comes about";
+/// Asserts, as a matter of timing, that a run came so far that its fault came about. `runs` is the folder of
+/// its directory, where it has one.
+void expect_came_about(bool came, const Since& begin, const std::filesystem::path& runs);
 
-/// The first result that `is_good`, on a machine that may be too busy for it, or the last of several
-/// attempts.
-template <class Attempt, class IsGood>
-auto tried(const Attempt& attempt, const IsGood& is_good) {
-  constexpr int more_attempts = 4;
-  auto result = attempt();
-  for (int i = 0; i < more_attempts && !(result && is_good(*result)); ++i) result = attempt();
+/// What `run` gives; nothing is a failure.
+template <class Run>
+auto came_about(const std::filesystem::path& runs, const Run& run) {
+  const Since begin;
+  auto result = run();
+  expect_came_about(result.has_value(), begin, runs);
   return result;
-}
-template <class Attempt>
-auto tried(const Attempt& attempt) {
-  return tried(attempt, [](const auto&) { return true; });
 }
 
 /// The motor was on; the run ended as expected; zero volts in time and for good; the cart stayed on the
-/// track; the log is whole and replays.
+/// track; the log is whole and replays. How it ended is a matter of timing where it ended for being late, or
+/// for a link or encoders that are late; so is when the voltage was zero.
 void judge(const Evidence& evidence, const Expectation& expectation);
 
-/// Judges what the first attempt leaves that ends neither too late nor in a way that is not expected but that
-/// a machine too busy for it brings about, or else the last.
-void judge_attempts(const std::function<std::optional<Evidence>()>& attempt, const Expectation& expectation);
+/// A case of the suite: makes the attempt in real time, and keeps the table's cell once it has passed.
+void fault_case(const std::string& fault, Bench bench, const std::string& cell,
+                const std::function<void()>& attempt);
 
 }  // namespace upright::test

@@ -43,6 +43,10 @@ struct Expectation {
 /// fallen.
 inline constexpr double stuck_noticed_s = 2.5;
 
+/// At 200 Hz three periods are missed then, as many as a run goes on after, and with 20 ms, of which a busy
+/// machine makes a little more, it could be four.
+inline constexpr double short_standstill_s = 0.018;
+
 Expectation goes_on();
 Expectation stops(std::vector<std::string> reasons, double within_s);
 
@@ -51,6 +55,8 @@ std::string cell_of(const Expectation& expectation);
 
 /// Keeps the cell of a test that passed, under the folder UPRIGHT_FAULT_RECORDS.
 void record(const std::string& fault, Bench bench, const std::string& cell);
+/// That the machine kept a test from judging: the page's cell stays as it is.
+void record_skipped(const std::string& fault, Bench bench);
 
 /// The page with the cells of `benches` from what was kept, and those of the others as in `page`, for no
 /// machine runs them all at once. A dash is a cell that no test has.

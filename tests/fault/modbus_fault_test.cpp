@@ -145,17 +145,18 @@ std::optional<Evidence> evidence_of(const Case& c, Setting& setting) {
 
 class ModbusFault : public testing::TestWithParam<On> {};
 
+Bench bench_of(bool serial) {
+  return serial ? Bench::modbus_rtu : Bench::modbus_tcp;
+}
+
 TEST_P(ModbusFault, HasItsOutcome) {
   const On& on = GetParam();
   const Expectation& expectation = on.what.process.expectation;
-  std::optional<Setting> setting;
-  const auto attempt = [&] {
-    setting.emplace(on.serial, on.what);
-    return evidence_of(on.what, *setting);
-  };
-  judge_attempts(attempt, expectation);
-  if (!HasFailure())
-    record(on.what.process.fault, on.serial ? Bench::modbus_rtu : Bench::modbus_tcp, cell_of(expectation));
+  fault_case(on.what.process.fault, bench_of(on.serial), cell_of(expectation), [&] {
+    Setting setting(on.serial, on.what);
+    const auto evidence = came_about(setting.runs(), [&] { return evidence_of(on.what, setting); });
+    if (evidence) judge(*evidence, expectation);
+  });
 }
 
 INSTANTIATE_TEST_SUITE_P(, ModbusFault, testing::ValuesIn(all()), [](const auto& item) {
@@ -167,8 +168,7 @@ struct Killed {
   std::size_t rows = 0;
 };
 
-std::optional<Killed> killed(bool serial) {
-  Setting setting(serial, {});
+std::optional<Killed> killed(Setting& setting) {
   const std::optional<double> killed_s = kill_run(setting.files(60.0));
   if (!killed_s) return std::nullopt;
   sleep_s(2 * watchdog_s);
@@ -181,14 +181,16 @@ class ModbusKilled : public testing::TestWithParam<bool> {};
 
 TEST_P(ModbusKilled, IsAtZeroVoltsByTheDevicesWatchdog) {
   const bool serial = GetParam();
-  const std::optional<Killed> run = tried([serial] { return killed(serial); });
-  ASSERT_TRUE(run.has_value()) << never_came_about;
-  EXPECT_GT(run->on_until_s, run->killed_s - watchdog_s) << "it was still balancing";
-  EXPECT_LT(run->on_until_s - run->killed_s, watchdog_s + 0.05);
-  EXPECT_GT(run->rows, 0u) << "the log reads";
-  if (!HasFailure())
-    record("sigkill", serial ? Bench::modbus_rtu : Bench::modbus_tcp,
-           "the device's watchdog: 0 V within 100 ms");
+  fault_case("sigkill", bench_of(serial), "the device's watchdog: 0 V within 100 ms", [&] {
+    Setting setting(serial, {});
+    const auto run = came_about(setting.runs(), [&] { return killed(setting); });
+    if (!run) return;
+    EXPECT_TIMING((Interval{run->killed_s - watchdog_s, run->killed_s}),
+                  run->on_until_s > run->killed_s - watchdog_s, "it was still balancing");
+    EXPECT_TIMING((Interval{run->killed_s, run->on_until_s}),
+                  run->on_until_s < run->killed_s + watchdog_s + 0.05, "the watchdog is in time");
+    EXPECT_GT(run->rows, 0u) << "the log reads";
+  });
 }
 
 INSTANTIATE_TEST_SUITE_P(, ModbusKilled, testing::Bool(), [](const auto& item) {
@@ -209,13 +211,12 @@ class ModbusBroken : public testing::TestWithParam<bool> {};
 TEST_P(ModbusBroken, StopsWhenAValueIsNotANumber) {
   const bool serial = GetParam();
   const Expectation expectation = stops({"not_finite"}, period_s);
-  std::optional<Setting> setting;
-  const auto attempt = [&] {
-    setting.emplace(serial, Case{});
-    return evidence_of_a_broken_controller(*setting);
-  };
-  judge_attempts(attempt, expectation);
-  if (!HasFailure()) record("nan", serial ? Bench::modbus_rtu : Bench::modbus_tcp, cell_of(expectation));
+  fault_case("nan", bench_of(serial), cell_of(expectation), [&] {
+    Setting setting(serial, Case{});
+    const auto evidence =
+        came_about(setting.runs(), [&] { return evidence_of_a_broken_controller(setting); });
+    if (evidence) judge(*evidence, expectation);
+  });
 }
 
 INSTANTIATE_TEST_SUITE_P(, ModbusBroken, testing::Bool(),

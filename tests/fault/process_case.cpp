@@ -94,7 +94,7 @@ std::vector<ProcessCase> machine_cases(double period_s, const Expectation& stood
                        .begins = Begins::when_done};
   };
   std::vector<ProcessCase> cases = {
-      done("missed_cycles", goes_on(), standing_still(0.02)),
+      done("missed_cycles", goes_on(), standing_still(short_standstill_s)),
       done("overrun", stood_still, standing_still(0.25)),
       done("sigterm", stops({"signal"}, period_s), signalled(SIGTERM)),
       {.fault = "clock_step", .expectation = goes_on(), .shim = shim_words(Disturbance::step_clock, 3600.0)},

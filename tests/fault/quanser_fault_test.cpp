@@ -128,14 +128,13 @@ class QuanserFault : public testing::TestWithParam<Case> {};
 
 TEST_P(QuanserFault, HasItsOutcome) {
   const Case& c = GetParam();
-  std::optional<Setting> setting;
-  const auto attempt = [&] {
-    setting.emplace(c);
-    return evidence_of(c, *setting);
-  };
-  judge_attempts(attempt, c.process.expectation);
-  expect_card_off(*setting);
-  if (!HasFailure()) record(c.process.fault, Bench::quanser_hil, cell_of(c.process.expectation));
+  fault_case(c.process.fault, Bench::quanser_hil, cell_of(c.process.expectation), [&] {
+    Setting setting(c);
+    const auto evidence = came_about(setting.runs(), [&] { return evidence_of(c, setting); });
+    if (!evidence) return;
+    judge(*evidence, c.process.expectation);
+    expect_card_off(setting);
+  });
 }
 
 INSTANTIATE_TEST_SUITE_P(, QuanserFault, testing::ValuesIn(all()),
@@ -156,17 +155,17 @@ std::optional<Killed> killed(Setting& setting) {
 }
 
 TEST(QuanserKilled, IsAtZeroVoltsByTheCardsWatchdog) {
-  std::optional<Setting> setting;
-  const std::optional<Killed> run = tried([&] {
-    setting.emplace(Case{});
-    return killed(*setting);
+  fault_case("sigkill", Bench::quanser_hil, "the device's watchdog: 0 V within 100 ms", [] {
+    Setting setting(Case{});
+    const auto run = came_about(setting.runs(), [&] { return killed(setting); });
+    if (!run) return;
+    EXPECT_TIMING((Interval{run->killed_s - watchdog_s, run->killed_s}),
+                  run->on_until_s > run->killed_s - watchdog_s, "it was still balancing");
+    EXPECT_TIMING((Interval{run->killed_s, run->on_until_s}),
+                  run->on_until_s < run->killed_s + watchdog_s + 0.05, "the watchdog is in time");
+    EXPECT_GT(run->rows, 0u) << "the log reads";
+    expect_card_off(setting);
   });
-  ASSERT_TRUE(run.has_value()) << never_came_about;
-  EXPECT_GT(run->on_until_s, run->killed_s - watchdog_s) << "it was still balancing";
-  EXPECT_LT(run->on_until_s - run->killed_s, watchdog_s + 0.05);
-  EXPECT_GT(run->rows, 0u) << "the log reads";
-  expect_card_off(*setting);
-  if (!HasFailure()) record("sigkill", Bench::quanser_hil, "the device's watchdog: 0 V within 100 ms");
 }
 
 /// A run that is stopped while its card does not answer.
@@ -203,21 +202,21 @@ class QuanserStop : public testing::TestWithParam<bool> {};
 
 TEST_P(QuanserStop, IsAtZeroVoltsByTheCardsWatchdogWhenTheCardIsSilent) {
   const bool for_good = GetParam();
-  std::optional<Setting> setting;
-  const std::optional<StoppedRun> run = tried([&] {
-    setting.emplace(Case{{}, {"--silent-s", for_good ? "60" : "1"}});
-    return stopped_run(*setting, for_good);
+  const char* cell = for_good ? "the device's watchdog: 0 V within 100 ms, not "
+                                "confirmed: said aloud, exit code 4"
+                              : "the device's watchdog: 0 V within 100 ms, "
+                                "confirmed once it answers";
+  fault_case(for_good ? "stop_silent_watchdog" : "stop_refused_connections", Bench::quanser_hil, cell, [&] {
+    Setting setting(Case{{}, {"--silent-s", for_good ? "60" : "1"}});
+    const auto run = came_about(setting.runs(), [&] { return stopped_run(setting, for_good); });
+    if (!run) return;
+    EXPECT_GT(run->on_until_s, 0.0);
+    EXPECT_TIMING((Interval{run->silent_s, run->on_until_s}),
+                  run->on_until_s < run->silent_s + watchdog_s + 0.05, "the watchdog is in time");
+    expect_card_off(setting);
+    EXPECT_EQ(run->zero_volts, for_good ? "not_confirmed" : "confirmed");
+    EXPECT_EQ(run->exit_code, for_good ? 4 : 3);
   });
-  ASSERT_TRUE(run.has_value()) << never_came_about;
-  EXPECT_GT(run->on_until_s, 0.0);
-  EXPECT_LT(run->on_until_s - run->silent_s, watchdog_s + 0.05);
-  expect_card_off(*setting);
-  EXPECT_EQ(run->zero_volts, for_good ? "not_confirmed" : "confirmed");
-  EXPECT_EQ(run->exit_code, for_good ? 4 : 3);
-  if (!HasFailure())
-    record(for_good ? "stop_silent_watchdog" : "stop_refused_connections", Bench::quanser_hil,
-           for_good ? "the device's watchdog: 0 V within 100 ms, not confirmed: said aloud, exit code 4"
-                    : "the device's watchdog: 0 V within 100 ms, confirmed once it answers");
 }
 
 INSTANTIATE_TEST_SUITE_P(, QuanserStop, testing::Bool(),
@@ -225,18 +224,19 @@ INSTANTIATE_TEST_SUITE_P(, QuanserStop, testing::Bool(),
 
 TEST(QuanserBroken, StopsWhenAValueIsNotANumber) {
   const Expectation expectation = stops({"not_finite"}, period_s);
-  std::optional<Setting> setting;
-  const auto attempt = [&]() -> std::optional<Evidence> {
-    setting.emplace(Case{});
-    const ProcessFiles files = setting->files(0.0);
-    const std::optional<BrokenRun> run = broken_run(files.rig_file, setting->gain_file(), files.runs);
-    if (!run) return std::nullopt;
-    sleep_s(watchdog_s);
-    return Evidence{rows_of(*setting), run->began_s, run->directory, false, false};
-  };
-  judge_attempts(attempt, expectation);
-  expect_card_off(*setting);
-  if (!HasFailure()) record("nan", Bench::quanser_hil, cell_of(expectation));
+  fault_case("nan", Bench::quanser_hil, cell_of(expectation), [&] {
+    Setting setting(Case{});
+    const auto evidence = came_about(setting.runs(), [&]() -> std::optional<Evidence> {
+      const ProcessFiles files = setting.files(0.0);
+      const std::optional<BrokenRun> run = broken_run(files.rig_file, setting.gain_file(), files.runs);
+      if (!run) return std::nullopt;
+      sleep_s(watchdog_s);
+      return Evidence{rows_of(setting), run->began_s, run->directory, false, false};
+    });
+    if (!evidence) return;
+    judge(*evidence, expectation);
+    expect_card_off(setting);
+  });
 }
 
 }  // namespace

@@ -130,16 +130,15 @@ class BoardFault : public testing::TestWithParam<Case> {};
 
 TEST_P(BoardFault, HasItsOutcome) {
   const Case& c = GetParam();
-  std::optional<BoardSetting> setting;
-  const auto attempt = [&] {
-    setting.emplace(c.process, c.line);
-    return evidence_of(c, *setting);
-  };
-  ASSERT_NO_FATAL_FAILURE(judge_attempts(attempt, c.process.expectation));
-  EXPECT_TRUE(setting->board().at_rest());
-  const std::string sentence = read_run(only_entry(setting->runs())).outcome->text("sentence");
-  EXPECT_NE(sentence.find(c.cause), std::string::npos) << sentence;
-  if (!HasFailure()) record(c.process.fault, Bench::board, cell_of(c.process.expectation));
+  fault_case(c.process.fault, Bench::board, cell_of(c.process.expectation), [&] {
+    BoardSetting setting(c.process, c.line);
+    const auto evidence = came_about(setting.runs(), [&] { return evidence_of(c, setting); });
+    if (!evidence) return;
+    ASSERT_NO_FATAL_FAILURE(judge(*evidence, c.process.expectation));
+    EXPECT_TRUE(setting.board().at_rest());
+    const std::string sentence = read_run(evidence->run).outcome->text("sentence");
+    EXPECT_NE(sentence.find(c.cause), std::string::npos) << sentence;
+  });
 }
 
 INSTANTIATE_TEST_SUITE_P(, BoardFault, testing::ValuesIn(all()), [](const auto& item) {
@@ -148,18 +147,19 @@ INSTANTIATE_TEST_SUITE_P(, BoardFault, testing::ValuesIn(all()), [](const auto& 
 
 TEST(BoardBroken, StopsWhenAValueIsNotANumber) {
   const Expectation expectation = stops({"not_finite"}, period_s);
-  std::optional<BoardSetting> setting;
-  const auto attempt = [&]() -> std::optional<Evidence> {
-    setting.emplace();
-    const std::optional<BrokenRun> run =
-        broken_run(setting->rig_file(), setting->gain_file(), setting->runs());
-    if (!run) return std::nullopt;
-    sleep_s(watchdog_s);
-    return Evidence{plant_rows(setting->board().record()), run->began_s, run->directory, false, false};
-  };
-  ASSERT_NO_FATAL_FAILURE(judge_attempts(attempt, expectation));
-  EXPECT_TRUE(setting->board().at_rest());
-  if (!HasFailure()) record("nan", Bench::board, cell_of(expectation));
+  fault_case("nan", Bench::board, cell_of(expectation), [&] {
+    BoardSetting setting;
+    const auto evidence = came_about(setting.runs(), [&]() -> std::optional<Evidence> {
+      const std::optional<BrokenRun> run =
+          broken_run(setting.rig_file(), setting.gain_file(), setting.runs());
+      if (!run) return std::nullopt;
+      sleep_s(watchdog_s);
+      return Evidence{plant_rows(setting.board().record()), run->began_s, run->directory, false, false};
+    });
+    if (!evidence) return;
+    ASSERT_NO_FATAL_FAILURE(judge(*evidence, expectation));
+    EXPECT_TRUE(setting.board().at_rest());
+  });
 }
 
 struct Killed {
@@ -167,8 +167,7 @@ struct Killed {
   std::size_t rows = 0;
 };
 
-std::optional<Killed> killed() {
-  BoardSetting setting;
+std::optional<Killed> killed(BoardSetting& setting) {
   const std::optional<double> killed_s = kill_run(setting.files(60.0));
   if (!killed_s) return std::nullopt;
   sleep_s(2 * watchdog_s);
@@ -177,12 +176,16 @@ std::optional<Killed> killed() {
 }
 
 TEST(BoardKilled, ItsWatchdogTakesTheVoltageAway) {
-  const std::optional<Killed> run = tried(killed);
-  ASSERT_TRUE(run.has_value()) << never_came_about;
-  EXPECT_GT(run->on_until_s, run->killed_s) << "the board kept the last voltage";
-  EXPECT_LT(run->on_until_s - run->killed_s, watchdog_s + period_s);
-  EXPECT_GT(run->rows, 0u) << "the log reads";
-  if (!HasFailure()) record("sigkill", Bench::board, "the device's watchdog: 0 V within 100 ms");
+  fault_case("sigkill", Bench::board, "the device's watchdog: 0 V within 100 ms", [] {
+    BoardSetting setting;
+    const auto run = came_about(setting.runs(), [&] { return killed(setting); });
+    if (!run) return;
+    EXPECT_TIMING((Interval{run->killed_s - watchdog_s, run->killed_s}), run->on_until_s > run->killed_s,
+                  "the board kept the last voltage");
+    EXPECT_TIMING((Interval{run->killed_s, run->on_until_s}),
+                  run->on_until_s < run->killed_s + watchdog_s + period_s, "the watchdog is in time");
+    EXPECT_GT(run->rows, 0u) << "the log reads";
+  });
 }
 
 }  // namespace

@@ -61,6 +61,7 @@ struct Stopped {
   double at_report_v = 0.0;  ///< when the report was made
   double later_v = 0.0;      ///< and 0.2 s later, the rig destroyed
   bool enabled_later = true;
+  double begun_s = 0.0;  ///< when the stop began, on the monotonic clock
   double took_s = 0.0;
   double on_for_s = 0.0;  ///< how long the voltage stayed, from the stop on
 };
@@ -71,7 +72,7 @@ inline Stopped stopped(const StopCase& c, const StopWatcher& watcher = {}) {
   result.ran_v = driven.ran_v;
   driven.device.begin(c.trouble, c.for_s);
   MonotonicClock clock;
-  const double begun_s = monotonic_s();
+  const double begun_s = result.begun_s = monotonic_s();
   result.report = stop_and_wait(*driven.rig, clock, watcher);
   result.at_report_v = driven.device.voltage_v();
   result.took_s = monotonic_s() - begun_s;

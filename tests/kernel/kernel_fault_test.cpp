@@ -173,16 +173,16 @@ class KernelFault : public testing::TestWithParam<On> {};
 
 TEST_P(KernelFault, HasItsOutcome) {
   const On& on = GetParam();
-  std::optional<Setting> setting;
-  const auto attempt = [&] {
-    setting.emplace(on);
-    return evidence_of(on.what, *setting);
-  };
-  ASSERT_NO_FATAL_FAILURE(judge_attempts(attempt, on.what.process.expectation));
-  EXPECT_TRUE(setting->wires().at_rest());
-  const std::string sentence = read_run(only_entry(setting->files().runs())).outcome->text("sentence");
-  EXPECT_NE(sentence.find(on.what.cause), std::string::npos) << sentence;
-  if (!HasFailure()) record(on.what.process.fault, on.bench, cell_of(on.what.process.expectation));
+  const Expectation& expectation = on.what.process.expectation;
+  fault_case(on.what.process.fault, on.bench, cell_of(expectation), [&] {
+    Setting setting(on);
+    const auto evidence = came_about(setting.files().runs(), [&] { return evidence_of(on.what, setting); });
+    if (!evidence) return;
+    ASSERT_NO_FATAL_FAILURE(judge(*evidence, expectation));
+    EXPECT_TRUE(setting.wires().at_rest());
+    const std::string sentence = read_run(evidence->run).outcome->text("sentence");
+    EXPECT_NE(sentence.find(on.what.cause), std::string::npos) << sentence;
+  });
 }
 
 std::vector<On> on_bench(Bench bench, const std::vector<Case>& cases) {
@@ -213,14 +213,14 @@ std::optional<Evidence> evidence_of_a_broken_controller(Setting& setting) {
 
 TEST_P(KernelBroken, StopsWhenAValueIsNotANumber) {
   const Expectation expectation = stops({"not_finite"}, period_s);
-  std::optional<Setting> setting;
-  const auto attempt = [&] {
-    setting.emplace(On{GetParam(), {}});
-    return evidence_of_a_broken_controller(*setting);
-  };
-  ASSERT_NO_FATAL_FAILURE(judge_attempts(attempt, expectation));
-  EXPECT_TRUE(setting->wires().at_rest());
-  if (!HasFailure()) record("nan", GetParam(), cell_of(expectation));
+  fault_case("nan", GetParam(), cell_of(expectation), [&] {
+    Setting setting(On{GetParam(), {}});
+    const auto evidence =
+        came_about(setting.files().runs(), [&] { return evidence_of_a_broken_controller(setting); });
+    if (!evidence) return;
+    ASSERT_NO_FATAL_FAILURE(judge(*evidence, expectation));
+    EXPECT_TRUE(setting.wires().at_rest());
+  });
 }
 
 INSTANTIATE_TEST_SUITE_P(, KernelBroken, testing::Values(Bench::gpio, Bench::comedi),
@@ -229,7 +229,7 @@ INSTANTIATE_TEST_SUITE_P(, KernelBroken, testing::Values(Bench::gpio, Bench::com
 TEST(KernelKilled, TheHeartStopsAndItsWatchdogTakesTheVoltageAway) {
   Setting setting({Bench::gpio, {}});
   const std::optional<double> killed_s = kill_run(setting.files().files(60.0));
-  ASSERT_TRUE(killed_s.has_value()) << never_came_about;
+  ASSERT_TRUE(killed_s.has_value()) << "the run does not begin, or ends before it is killed";
   sleep_s(3 * heart_s);
   const double on_until_s = last_voltage_s(setting.plant().record());
   EXPECT_GT(on_until_s, *killed_s - period_s) << "it was still balancing";
@@ -241,7 +241,7 @@ TEST(KernelKilled, TheHeartStopsAndItsWatchdogTakesTheVoltageAway) {
 /// What the documentation says: a card has no watchdog of its own.
 TEST(KernelKilled, ACardKeepsItsVoltageUntilTheNextStart) {
   Setting setting({Bench::comedi, {}});
-  ASSERT_TRUE(kill_run(setting.files().files(60.0)).has_value()) << never_came_about;
+  ASSERT_TRUE(kill_run(setting.files().files(60.0)).has_value()) << "the run does not begin";
   EXPECT_FALSE(setting.wires().at_rest());
   sleep_s(3 * watchdog_s);
   EXPECT_FALSE(setting.wires().at_rest());
