@@ -2,12 +2,14 @@
 """Lets the controller run for long and holds what it leaves behind against what it should.
 
   scripts/soak.py [--virtual-hours 2] [--real-minutes 10] [--seed N] [--rate 200] [--binary PATH] [--keep FOLDER] [--busy]
+                  [--stalls PROGRAM --retry-log FILE]
 
 First in virtual time on the simulated rig, then in real time over Modbus TCP against `upright virtual-rig`, whose replies are
 late, lost, corrupt, old or out of order at random (--seed). Both parts are judged alike: memory of every process once it is
 warm, ticks and time stamps of each row, the rows against what run.yaml counted, the replay, the report and what both took.
 --busy: on a machine that has other work, a run that stopped for being late (and only for that) is followed by another one until
-the time is up; how often is said. Prints what was measured; exit code 1 and a sentence for each demand that was not met.
+the time is up; how often is said. --stalls (tests/support/stall_answers.cpp): the same where a stall of the machine overlaps the
+moment at which it stopped; a line in the retry log counts it. Prints what was measured; exit code 1 and a sentence for each demand that was not met.
 """
 import argparse
 import json
@@ -114,6 +116,34 @@ class Rows:
         return min(self.last_s) - min(self.first_s)
 
 
+class Stalls:
+    """What a stall of the machine excuses: a run that stopped for being late, at most this long after the stall."""
+    LATE_S = 0.05
+
+    def __init__(self, program, log):
+        self.log = log
+        self.watcher = subprocess.Popen([program], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) if program else None
+
+    def excuse(self, run, said):
+        if self.watcher is None or said["reason"] != "overrun":
+            return False
+        started_s = float(re.search(r"\n  started_monotonic_s: (\S+)", (run / "run.yaml").read_text())[1])
+        stopped_s = started_s + said["time_s"]
+        self.watcher.stdin.write(f"{stopped_s - self.LATE_S} {stopped_s}\n")
+        self.watcher.stdin.flush()
+        stall = self.watcher.stdout.readline().split()
+        if len(stall) != 2:
+            return False
+        with open(self.log, "a") as log:
+            log.write(f"retry\tsoak_short\tthe run ended with overrun\t{stall[0]}\t{stall[1]}\n")
+        return True
+
+    def end(self):
+        if self.watcher is not None:
+            self.watcher.stdin.close()
+            self.watcher.wait()
+
+
 def outcome_of(run):
     """The counts of run.yaml's outcome."""
     text = (run / "run.yaml").read_text()
@@ -197,25 +227,28 @@ def soak_real(options, folder):
     print(f"{seconds:.0f} s in real time over Modbus TCP at {options.rate} Hz, seed {options.seed}; of the replies {faults}", flush=True)
     server = start_server(options, folder)
     left_s, late_stops, troubles = seconds, 0, {}
+    stalls = Stalls(options.stalls, options.retry_log)
     try:
         while left_s > 0:
             run = Watched([options.binary, "run", "--rig", folder / "rig.yaml", "--gains", folder / "gains.yaml", "--duration", left_s,
                            "--out", folder, "--unchecked", "--json"])
             code, out, err = run.finish()
             said = json.loads(out)
-            late = options.busy and said["reason"] == "overrun"
+            run_directory = pathlib.Path(said["run_directory"])
+            late = options.busy and said["reason"] == "overrun" or stalls.excuse(run_directory, said)
             late_stops += late
             demand(code == 0 or late, f"the run stopped after {said['time_s']:.1f} s: {said['sentence']} {err}")
             print(f"  {said['sentence']}", flush=True)
             print(f"  woke late by {said['timing']['wake_late']['p99_9_us']:.0f} us (99.9 %), "
                   f"{said['timing']['wake_late']['max_us']:.0f} us at worst", flush=True)
             judge_memory("controller", run)
-            counts = judge_run(options, pathlib.Path(said["run_directory"]), options.rate, False)
+            counts = judge_run(options, run_directory, options.rate, False)
             for cause in ("late_reply", "no_reply", "no_connection", "wrong_reply", "refused", "other", "recoveries"):
                 troubles[cause] = troubles.get(cause, 0) + counts[cause]
             left_s = left_s - said["time_s"] if late else 0
             time.sleep(1)  # by then the rig knows that its master has gone
     finally:
+        stalls.end()
         server.process.terminate()
         server.finish()
     judge_memory("virtual rig", server)
@@ -235,6 +268,8 @@ def main():
     parser.add_argument("--binary", type=pathlib.Path, default=ROOT / "build/release/src/cli/upright")
     parser.add_argument("--keep", type=pathlib.Path)
     parser.add_argument("--busy", action="store_true")
+    parser.add_argument("--stalls", type=pathlib.Path)
+    parser.add_argument("--retry-log", type=pathlib.Path)
     options = parser.parse_args()
     folder = options.keep or pathlib.Path(tempfile.mkdtemp(prefix="upright-soak-"))
     folder.mkdir(parents=True, exist_ok=True)

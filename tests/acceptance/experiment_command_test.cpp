@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "command.hpp"
+#include "tests/support/run_end.hpp"
 
 namespace upright::testing {
 namespace {
@@ -47,15 +48,16 @@ TEST(ExperimentCommand, EachPieceIsARunDirectoryThatReplays) {
   EXPECT_EQ(run_upright("experiment " + file.string() + rig + " --fast --out " + out.string()).exit_code, 2);
 }
 
-TEST(ExperimentCommand, GoesOnWhereItWasInterrupted) {
+void interrupt_and_go_on() {
   const TemporaryFolder folder;
   const fs::path file = folder.write("test.yaml", experiment("    - {kind: observe, duration_s: 0.3}\n"
                                                              "    - {kind: observe, duration_s: 20}\n"
                                                              "    - {kind: observe, duration_s: 0.3}\n"));
-  const std::string out = (folder.path() / "out").string();
-  const std::string command = "experiment " + file.string() + rig + " --out " + out;
+  const fs::path out = folder.path() / "out";
+  const std::string command = "experiment " + file.string() + rig + " --out " + out.string();
   const CommandResult first =
       run_shell("timeout -s INT 3 " + shell_quoted(UPRIGHT_BINARY) + " " + command + "; echo code $?");
+  test::expect_no_late_end(out);
   EXPECT_NE(first.err.find("SIGINT"), std::string::npos) << first.err;
   // In virtual time the rest takes no time; the experiment is the same.
   const CommandResult second = run_upright(command + " --fast --json");
@@ -63,6 +65,10 @@ TEST(ExperimentCommand, GoesOnWhereItWasInterrupted) {
   const Json document = Json::parse(second.out);
   EXPECT_EQ(document.at("made"), 2);
   EXPECT_EQ(document.at("trials").size(), 3u);
+}
+
+TEST(ExperimentCommand, GoesOnWhereItWasInterrupted) {
+  test::in_real_time(interrupt_and_go_on);
 }
 
 TEST(ExperimentCommand, ADelaySweepFindsWhereItOscillatesAndFalls) {

@@ -2,7 +2,6 @@
 // same over plain HTTP. Pictures of the page stay in the test's run folder.
 #include <gtest/gtest.h>
 #include <httplib.h>
-#include <time.h>
 
 #include <chrono>
 #include <cstdlib>
@@ -16,6 +15,7 @@
 #include "base/palette.hpp"
 #include "browser.hpp"
 #include "command.hpp"
+#include "tests/support/run_end.hpp"
 
 namespace upright::testing {
 namespace {
@@ -54,18 +54,7 @@ fs::path only_run_in(const fs::path& folder) {
   return first->path();
 }
 
-double monotonic_s() {
-  timespec now{};
-  clock_gettime(CLOCK_MONOTONIC, &now);
-  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
-}
-
-double outcome_number(const std::string& yaml, const std::string& key) {
-  const std::size_t at = yaml.find("  " + key + ": ", yaml.find("\noutcome:"));
-  return std::stod(yaml.substr(at + key.size() + 4));
-}
-
-TEST(Live, AStopOverHttpEndsARunAsASignalDoes) {
+void stop_over_http() {
   const TemporaryFolder folder;
   const fs::path out = folder.path() / "runs";
   Process program(run_command(out));
@@ -74,24 +63,28 @@ TEST(Live, AStopOverHttpEndsARunAsASignalDoes) {
   std::smatch token;
   ASSERT_TRUE(std::regex_search(text, token, std::regex("'X-Upright-Token': '([0-9a-f]{32})'")));
   std::this_thread::sleep_for(1500ms);
-  const double pressed_s = monotonic_s();
+  const test::Since pressed;
   const auto answer = page.Post("/stop", {{"X-Upright-Token", token[1].str()}}, "", "text/plain");
-  ASSERT_TRUE(answer);
-  EXPECT_EQ(answer->status, 200);
   const std::string said = program.rest();
   EXPECT_EQ(program.wait(), 3) << said;
-  EXPECT_NE(said.find("stopped from the live page"), std::string::npos) << said;
   const fs::path run = only_run_in(out);
-  const std::string yaml = read_text(run / "run.yaml");
-  EXPECT_NE(yaml.find("reason: stop_button"), std::string::npos);
+  const test::RunEnd end = test::run_end(read_text(run / "run.yaml")).value();
+  EXPECT_END(end, end.reason == "stop_button");
+  ASSERT_TRUE(answer);
+  EXPECT_EQ(answer->status, 200);
+  EXPECT_NE(said.find("stopped from the live page"), std::string::npos) << said;
   const std::string samples = read_text(run / "samples.csv");
   const std::string last = samples.substr(samples.rfind('\n', samples.size() - 2) + 1);
   EXPECT_TRUE(std::regex_search(last, std::regex("^([^,]*,){9}0,([^,]*,){4}513,"))) << last;  // 0 V, stopped
   // The loop ended in the period after the button; the rest is what a busy machine takes to bring it there.
-  const double ended_s = outcome_number(yaml, "started_monotonic_s") + outcome_number(yaml, "time_s");
-  EXPECT_LT(ended_s - pressed_s, 0.5);
+  EXPECT_TIMING((test::Interval{pressed.begin_s(), end.stopped_s}), end.stopped_s - pressed.begin_s() < 0.5,
+                "the button is heard in time");
   EXPECT_EQ(run_upright("replay " + run.string()).exit_code, 0);
   EXPECT_EQ(run_upright("report " + run.string()).exit_code, 0);
+}
+
+TEST(Live, AStopOverHttpEndsARunAsASignalDoes) {
+  test::in_real_time(stop_over_http);
 }
 
 TEST(Live, IsRefusedBeforeAnythingMoves) {
@@ -155,15 +148,18 @@ class LivePage : public ::testing::Test {
       GTEST_SKIP() << "NOT TESTED: the live page in a browser. Install chromium and chromium-driver "
                       "(scripts/install-deps.sh --test)";
   }
-  TemporaryFolder folder_;
 };
 
-TEST_F(LivePage, ShowsARunThatMovesAndStopsIt) {
-  Process program(run_command(folder_.path() / "runs"));
+void stop_on_page() {
+  const TemporaryFolder folder;
+  const fs::path runs = folder.path() / "runs";
+  Process program(run_command(runs));
   const int port = port_said_by(program);
-  Browser browser(folder_.path() / "profile");
+  Browser browser(folder.path() / "profile");
   browser.open("http://127.0.0.1:" + std::to_string(port) + "/");
-  ASSERT_TRUE(comes_true([&] { return browser.text_of("state") == "balancing"; }));
+  const bool balances = comes_true([&] { return browser.text_of("state") == "balancing"; });
+  test::expect_no_late_end(runs);
+  ASSERT_TRUE(balances);
   const std::string drawn = "document.getElementById('pendulum').hasAttribute('transform')";
   ASSERT_TRUE(comes_true([&] { return browser.value_of(drawn).get<bool>(); }));
   std::set<std::string> carts, pendulums, clocks;
@@ -173,6 +169,7 @@ TEST_F(LivePage, ShowsARunThatMovesAndStopsIt) {
     clocks.insert(browser.text_of("clock"));
     std::this_thread::sleep_for(100ms);
   }
+  test::expect_no_late_end(runs);
   // A busy machine may show fewer pictures.
   EXPECT_GT(carts.size(), 5u);
   EXPECT_GT(pendulums.size(), 5u);
@@ -192,7 +189,9 @@ TEST_F(LivePage, ShowsARunThatMovesAndStopsIt) {
   keep_picture(browser, "running.png");
 
   browser.click("stop");
-  EXPECT_TRUE(comes_true([&] { return browser.text_of("state") == "stopped"; }));
+  const bool stopped = comes_true([&] { return browser.text_of("state") == "stopped"; });
+  test::expect_no_late_end(runs);
+  EXPECT_TRUE(stopped);
   EXPECT_NE(browser.text_of("message").find("Stopped from the live page"), std::string::npos)
       << browser.text_of("message");
   keep_picture(browser, "stopped.png");
@@ -200,25 +199,38 @@ TEST_F(LivePage, ShowsARunThatMovesAndStopsIt) {
   EXPECT_EQ(program.wait(), 3) << said;
 }
 
-TEST_F(LivePage, ShowsEachPieceOfAnExperiment) {
-  const fs::path file = folder_.write(
+TEST_F(LivePage, ShowsARunThatMovesAndStopsIt) {
+  test::in_real_time(stop_on_page);
+}
+
+void show_experiment() {
+  const TemporaryFolder folder;
+  const fs::path file = folder.write(
       "test.yaml", "experiment:\n  name: class\n  why: a test\n  plant: " + config +
                        "plants/exponential.yaml\n  travel_m: 0.3\n  voltage_limit_v: 10\n  pieces:\n"
                        "    - {kind: observe, label: first, duration_s: 1}\n"
                        "    - {kind: multisine, label: second, amplitude_v: 4, lowest_hz: 0.3, "
                        "highest_hz: 4, lines: 8, duration_s: 6, fit_to_travel: true}\n");
   Process program({UPRIGHT_BINARY, "experiment", file.string(), "--rig", rig, "--live=0", "--out",
-                   (folder_.path() / "out").string()});
+                   (folder.path() / "out").string()});
   const int port = port_said_by(program);
-  Browser browser(folder_.path() / "profile");
+  Browser browser(folder.path() / "profile");
   browser.open("http://127.0.0.1:" + std::to_string(port) + "/");
-  EXPECT_TRUE(comes_true([&] { return browser.text_of("state").starts_with("second: "); }));
-  EXPECT_TRUE(comes_true([&] { return browser.text_of("state") == "second: measuring"; }));
+  const bool begins = comes_true([&] { return browser.text_of("state").starts_with("second: "); });
+  const bool measures = comes_true([&] { return browser.text_of("state") == "second: measuring"; });
   std::this_thread::sleep_for(3s);
   keep_picture(browser, "experiment.png");
-  EXPECT_TRUE(comes_true([&] { return browser.text_of("state") == "completed"; }));
+  const bool completes = comes_true([&] { return browser.text_of("state") == "completed"; });
+  test::expect_no_late_end(folder.path() / "out");
+  EXPECT_TRUE(begins);
+  EXPECT_TRUE(measures);
+  EXPECT_TRUE(completes);
   const std::string said = program.rest();
   EXPECT_EQ(program.wait(), 0) << said;
+}
+
+TEST_F(LivePage, ShowsEachPieceOfAnExperiment) {
+  test::in_real_time(show_experiment);
 }
 
 }  // namespace

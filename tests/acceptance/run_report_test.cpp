@@ -81,9 +81,9 @@ TEST(Report, NeverTurnsWhatARunSaysIntoMarkup) {
 
 TEST(Report, OfAKilledRunStillWorks) {
   const TemporaryFolder folder;
-  const CommandResult killed = run_shell(shell_quoted(UPRIGHT_BINARY) + " run " + run_flags +
-                                         "--duration 60 --out " + shell_quoted(folder.path().string()) +
-                                         " >/dev/null 2>&1 & child=$!; sleep 2; kill -9 $child; wait $child");
+  const CommandResult killed = run_shell(shell_quoted(UPRIGHT_BINARY) + " run --fast " + run_flags +
+                                         "--duration 86400 --out " + shell_quoted(folder.path().string()) +
+                                         " >/dev/null 2>&1 & child=$!; sleep 1; kill -9 $child; wait $child");
   EXPECT_EQ(killed.exit_code, 128 + SIGKILL);
   const std::filesystem::path run = std::filesystem::directory_iterator(folder.path())->path();
   const std::string html = report_of(run);

@@ -5,22 +5,23 @@
 
 #include "../fault/evidence.hpp"
 #include "board_setting.hpp"
+#include "tests/support/run_end.hpp"
 #include "upright/record/run_reader.hpp"
 
 namespace upright::test {
 namespace {
 
-TEST(BoardRun, Balances) {
+void balance() {
   BoardSetting setting;
   Process controller(setting.command(5.0));
   const std::string said = controller.rest();
-  ASSERT_EQ(controller.wait(), 0) << said;
+  const int exit_code = controller.wait();
+  const std::filesystem::path directory = only_entry(setting.runs());
+  EXPECT_END(run_end(text_of(directory / "run.yaml")).value(), exit_code == 0);
   const std::vector<TraceRow> trace = setting.board().record();
-  const RunRecord run = read_run(only_entry(setting.runs()));
-  ASSERT_TRUE(run.outcome.has_value());
-  EXPECT_EQ(run.outcome->text("reason"), "duration");
+  EXPECT_EQ(read_run(directory).outcome->text("reason"), "duration") << said;
   ASSERT_FALSE(trace.empty());
-  const double end_s = log_end_s(only_entry(setting.runs()));
+  const double end_s = log_end_s(directory);
   for (const TraceRow& row : trace) {
     if (row.time_s < end_s - 2.0 || row.time_s > end_s) continue;
     EXPECT_LT(std::abs(row.theta_rad), 0.05);
@@ -28,6 +29,10 @@ TEST(BoardRun, Balances) {
   }
   EXPECT_EQ(trace.back().voltage_v, 0.0);
   EXPECT_TRUE(setting.board().at_rest());
+}
+
+TEST(BoardRun, Balances) {
+  in_real_time(balance);
 }
 
 }  // namespace

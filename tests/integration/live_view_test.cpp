@@ -19,6 +19,7 @@
 #include <thread>
 #include <vector>
 
+#include "tests/support/real_time.hpp"
 #include "upright/base/error.hpp"
 
 namespace upright {
@@ -35,9 +36,10 @@ LogRecord row(std::uint64_t tick) {
   return r;
 }
 
-class LiveServed : public ::testing::Test {
- protected:
-  LiveServed() {
+/// A server, on a port of its own.
+class Served {
+ public:
+  Served() {
     LiveScene scene;
     scene.title = "a test";
     view_ = std::make_unique<LiveView>(scene, LiveOptions{0, -1, [this] { ++stops_; }});
@@ -88,6 +90,8 @@ class LiveServed : public ::testing::Test {
   int port_ = 0;
 };
 
+class LiveServed : public ::testing::Test, public Served {};
+
 TEST_F(LiveServed, ThePageIsWholeAndAsksForNothingElsewhere) {
   const auto answer = client().Get("/");
   ASSERT_TRUE(answer);
@@ -104,16 +108,19 @@ TEST_F(LiveServed, ThePageIsWholeAndAsksForNothingElsewhere) {
   EXPECT_FALSE(answer->has_header("Access-Control-Allow-Origin"));
 }
 
-TEST_F(LiveServed, AStreamBeginsWithSceneAndHistoryAndGoesOn) {
-  view_->say({LiveState::Kind::running, "balancing"});
-  write_rows(0, 1000);
+void read_stream() {
+  Served served;
+  served.view_->say({LiveState::Kind::running, "balancing"});
+  const test::Since written;
+  served.write_rows(0, 1000);
   std::this_thread::sleep_for(200ms);
+  const test::Interval taking = written.until_now();
   std::atomic<bool> more{false};
   std::thread writer([&] {
     while (!more) std::this_thread::sleep_for(5ms);
-    write_rows(1000, 500);
+    served.write_rows(1000, 500);
   });
-  const std::string text = stream([&](const std::string& so_far) {
+  const std::string text = served.stream([&](const std::string& so_far) {
     more = true;
     return so_far.find("\"rows\":1500") != std::string::npos && so_far.ends_with("\n\n");
   });
@@ -124,26 +131,36 @@ TEST_F(LiveServed, AStreamBeginsWithSceneAndHistoryAndGoesOn) {
   ASSERT_NE(history, std::string::npos);
   const std::size_t begin = history + std::string("event: frame\ndata: ").size();
   const Json first = Json::parse(text.substr(begin, text.find('\n', begin) - begin));
-  EXPECT_EQ(first.at("rows"), 1000);
+  EXPECT_TIMING(taking, first.at("rows") == 1000, "the rows are taken in time");
   EXPECT_EQ(first.at("points").size(), 200u);
   EXPECT_EQ(first.at("state").at("text"), "balancing");
   EXPECT_EQ(first.at("unseen"), 0);
 }
 
-TEST_F(LiveServed, TheEndReachesEveryOpenPageAndClosesIt) {
+TEST(LiveStream, BeginsWithSceneAndHistoryAndGoesOn) {
+  test::in_real_time(read_stream);
+}
+
+void end_pages() {
+  Served served;
   std::vector<std::thread> pages;
   std::vector<std::string> texts(3);
   for (std::string& text : texts)
-    pages.emplace_back([&] { text = stream([](const std::string&) { return false; }); });
+    pages.emplace_back([&] { text = served.stream([](const std::string&) { return false; }); });
   std::this_thread::sleep_for(300ms);
-  const auto before = std::chrono::steady_clock::now();
-  view_->end({LiveState::Kind::stopped, "it was enough"});
-  EXPECT_LT(std::chrono::steady_clock::now() - before, 900ms);
+  const test::Since begin;
+  served.view_->end({LiveState::Kind::stopped, "it was enough"});
+  const test::Interval ending = begin.until_now();
   for (std::thread& page : pages) page.join();
+  EXPECT_TIMING(ending, ending.end_s - ending.begin_s < 0.9, "no page is waited for");
   for (const std::string& text : texts) {
-    EXPECT_EQ(count_of(text, "event: end\n"), 1u);
+    EXPECT_EQ(Served::count_of(text, "event: end\n"), 1u);
     EXPECT_NE(text.find("it was enough"), std::string::npos);
   }
+}
+
+TEST(LiveStream, EndReachesEveryOpenPageAndClosesIt) {
+  test::in_real_time(end_pages);
 }
 
 TEST_F(LiveServed, TheStopButtonNeedsThePagesToken) {
@@ -227,9 +244,8 @@ TEST_F(LiveServed, APortInUseIsRefusedWithTheRemedy) {
   }
 }
 
-TEST_F(LiveServed, PagesThatDoNotReadHoldUpNeitherTheLogNorTheStopButton) {
-  const std::string good = token();
-  // As many open streams as are allowed and more, none of which is read.
+// As many open streams as are allowed and more, none of which is read.
+std::vector<int> open_unread_streams(int port) {
   std::vector<int> idle;
   for (int i = 0; i < 8; ++i) {
     const int fd = ::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
@@ -237,25 +253,37 @@ TEST_F(LiveServed, PagesThatDoNotReadHoldUpNeitherTheLogNorTheStopButton) {
     setsockopt(fd, SOL_SOCKET, SO_RCVBUF, &small, sizeof small);
     sockaddr_in to{};
     to.sin_family = AF_INET;
-    to.sin_port = htons(static_cast<std::uint16_t>(port_));
+    to.sin_port = htons(static_cast<std::uint16_t>(port));
     to.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    ASSERT_EQ(::connect(fd, reinterpret_cast<const sockaddr*>(&to), sizeof to), 0);
+    EXPECT_EQ(::connect(fd, reinterpret_cast<const sockaddr*>(&to), sizeof to), 0);
     const std::string request =
-        "GET /events HTTP/1.1\r\nHost: 127.0.0.1:" + std::to_string(port_) + "\r\n\r\n";
-    ASSERT_EQ(::write(fd, request.data(), request.size()), static_cast<ssize_t>(request.size()));
+        "GET /events HTTP/1.1\r\nHost: 127.0.0.1:" + std::to_string(port) + "\r\n\r\n";
+    EXPECT_EQ(::write(fd, request.data(), request.size()), static_cast<ssize_t>(request.size()));
     idle.push_back(fd);
   }
-  std::chrono::steady_clock::duration longest{};
+  return idle;
+}
+
+void write_beside_unread_streams() {
+  Served served;
+  const std::string good = served.token();
+  const std::vector<int> idle = open_unread_streams(served.port_);
+  test::Interval longest;
   for (std::uint64_t tick = 0; tick < 1000; tick += 20) {
-    const auto before = std::chrono::steady_clock::now();
-    write_rows(tick, 20);
-    longest = std::max(longest, std::chrono::steady_clock::now() - before);
+    const test::Since begin;
+    served.write_rows(tick, 20);
+    const test::Interval took = begin.until_now();
+    if (took.end_s - took.begin_s > longest.end_s - longest.begin_s) longest = took;
     std::this_thread::sleep_for(20ms);
   }
-  // A lock held while a page is written to would show as the server's write timeout, two seconds.
-  EXPECT_LT(longest, 500ms);
-  EXPECT_EQ(status_of_stop({{"X-Upright-Token", good}}), 200);
+  EXPECT_EQ(served.status_of_stop({{"X-Upright-Token", good}}), 200);
   for (const int fd : idle) ::close(fd);
+  // A lock held while a page is written to would show as the server's write timeout, two seconds.
+  EXPECT_TIMING(longest, longest.end_s - longest.begin_s < 0.5, "the log is not held up");
+}
+
+TEST(LiveStream, UnreadHoldsUpNeitherTheLogNorTheStopButton) {
+  test::in_real_time(write_beside_unread_streams);
 }
 
 }  // namespace

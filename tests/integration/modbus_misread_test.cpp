@@ -105,9 +105,10 @@ class ModbusMisread : public testing::Test {
     std::string text = replaced(text_of(UPRIGHT_SOURCE_DIR "/config/rigs/modbus-tcp.yaml"), "port: 1502",
                                 "port: " + std::to_string(device.port()));
     // The machine may be busy: what is tested here is what is done, not how fast.
-    text = replaced(text, "response_timeout_s: 0.0008", "response_timeout_s: 0.09");
+    text = replaced(text, "response_timeout_s: 0.0008", "response_timeout_s: 0.9");
+    text = replaced(text, "watchdog_s: 0.1", "watchdog_s: 1.0");
     std::ofstream(folder / "rig.yaml") << text;
-    rig = make_rig(read_rig_file(folder / "rig.yaml"), {0.2});
+    rig = make_rig(read_rig_file(folder / "rig.yaml"), {2.0});
     rig->open();
     fresh_reading(*rig);
   }

@@ -9,6 +9,7 @@
 #include <thread>
 
 #include "fresh_reading.hpp"
+#include "tests/support/real_time.hpp"
 #include "upright/base/error.hpp"
 #include "upright/hal/rig_factory.hpp"
 #include "virtual_rig_process.hpp"
@@ -52,49 +53,54 @@ class ModbusMap : public testing::TestWithParam<Map> {
 };
 
 TEST_P(ModbusMap, CountsComeBackAndVoltagesArrive) {
-  VirtualRigProcess server(folder, text, serial, {"--theta0-deg", "-2.5"});
-  auto rig = connect(folder, text, server, serial);
-  rig->open();
-  const RigReading at_rest = fresh_reading(*rig);
-  EXPECT_EQ(at_rest.cart_counts, 0);
-  EXPECT_EQ(at_rest.pendulum_counts, -28);  // -2.5 degrees of 4096 counts a turn, to the nearest
-  const std::uint64_t first = at_rest.sequence;
-  EXPECT_GT(fresh_reading(*rig).sequence, first);
-  rig->write(1.5);
-  std::this_thread::sleep_for(60ms);
-  for (int i = 0; i < 5; ++i) {
-    rig->read();
-    rig->write(-3.25);
-    std::this_thread::sleep_for(10ms);
-  }
-  rig.reset();
-  EXPECT_EQ(server.end(), 0);
-  bool saw_first = false, saw_second = false;
-  for (const TraceRow& row : server.trace()) {
-    saw_first = saw_first || std::abs(row.voltage_v - 1.5) < 1e-3;
-    saw_second = saw_second || std::abs(row.voltage_v + 3.25) < 1e-3;
-  }
-  EXPECT_TRUE(saw_first);
-  EXPECT_TRUE(saw_second);
-  EXPECT_EQ(server.trace().back().voltage_v, 0.0);
+  in_real_time([this] {
+    VirtualRigProcess server(folder, text, serial, {"--theta0-deg", "-2.5"});
+    auto rig = connect(folder, text, server, serial);
+    rig->open();
+    const RigReading at_rest = fresh_reading(*rig);
+    EXPECT_EQ(at_rest.cart_counts, 0);
+    EXPECT_EQ(at_rest.pendulum_counts, -28);  // -2.5 degrees of 4096 counts a turn, to the nearest
+    const std::uint64_t first = at_rest.sequence;
+    EXPECT_GT(fresh_reading(*rig).sequence, first);
+    const Since driven;
+    rig->write(1.5);
+    std::this_thread::sleep_for(60ms);
+    for (int i = 0; i < 5; ++i) {
+      rig->read();
+      rig->write(-3.25);
+      std::this_thread::sleep_for(10ms);
+    }
+    const Interval driving = driven.until_now();
+    rig.reset();
+    EXPECT_EQ(server.end(), 0);
+    bool saw_first = false, saw_second = false;
+    for (const TraceRow& row : server.trace()) {
+      saw_first = saw_first || std::abs(row.voltage_v - 1.5) < 1e-3;
+      saw_second = saw_second || std::abs(row.voltage_v + 3.25) < 1e-3;
+    }
+    EXPECT_TIMING(driving, saw_first && saw_second, "voltages arrive before they are old");
+    EXPECT_EQ(server.trace().back().voltage_v, 0.0);
+  });
 }
 
 TEST_P(ModbusMap, SilenceEndsInZeroVoltsByTheDevicesWatchdog) {
-  VirtualRigProcess server(folder, text, serial);
-  auto rig = connect(folder, text, server, serial);
-  rig->open();
-  rig->write(2.0);
-  std::this_thread::sleep_for(400ms);
-  server.end();
-  double on_s = 0, off_s = 0;
-  for (const TraceRow& row : server.trace()) {
-    if (row.voltage_v != 0.0 && on_s == 0.0) on_s = row.time_s;
-    if (row.voltage_v == 0.0 && on_s != 0.0 && off_s == 0.0) off_s = row.time_s;
-  }
-  ASSERT_GT(on_s, 0.0);
-  // With the amplifier's enable register the last valid request is one exchange later than the voltage.
-  EXPECT_GE(off_s - on_s, watchdog_s - 1e-6);
-  EXPECT_LT(off_s - on_s, watchdog_s + 0.05);
+  in_real_time([this] {
+    VirtualRigProcess server(folder, text, serial);
+    auto rig = connect(folder, text, server, serial);
+    rig->open();
+    rig->write(2.0);
+    std::this_thread::sleep_for(400ms);
+    server.end();
+    double on_s = 0, off_s = 0;
+    for (const TraceRow& row : server.trace()) {
+      if (row.voltage_v != 0.0 && on_s == 0.0) on_s = row.time_s;
+      if (row.voltage_v == 0.0 && on_s != 0.0 && off_s == 0.0) off_s = row.time_s;
+    }
+    ASSERT_GT(on_s, 0.0);
+    // With the amplifier's enable register the last valid request is one exchange later than the voltage.
+    EXPECT_GE(off_s - on_s, watchdog_s - 1e-6);
+    EXPECT_TIMING((Interval{on_s, off_s}), off_s - on_s < watchdog_s + 0.05, "the watchdog is in time");
+  });
 }
 
 INSTANTIATE_TEST_SUITE_P(
@@ -131,58 +137,66 @@ struct Faults {
 
 class ModbusFaults : public testing::TestWithParam<Faults> {};
 
-/// Swings the cart to and fro for three seconds and holds every fresh reading against what the plant did
-/// while that exchange was under way.
-TEST_P(ModbusFaults, NoOldCountIsEverFresh) {
-  const bool serial = GetParam().serial;
-  const std::string text =
-      replaced(rig_text_of({"", serial, {}}), "response_timeout_s: 0.01", "response_timeout_s: 0.003");
-  Folder folder;
-  VirtualRigProcess server(folder, text, serial, GetParam().flags);
-  auto rig = connect(folder, text, server, serial, 0.005);
-  rig->open();
-  struct Taken {
-    double from_s, to_s;
-    std::int64_t cart, pendulum;
-  };
+struct Taken {
+  double from_s, to_s;
+  std::int64_t cart;
+};
+
+/// Swings the cart to and fro for three seconds; the fresh readings. The others are counted.
+std::vector<Taken> swing(Rig& rig, int& not_fresh) {
   std::vector<Taken> taken;
-  int not_fresh = 0;
   std::uint64_t sequence = 0;
   const double start_s = monotonic_s();
   for (int k = 0; k < 500; ++k) {
     const double from_s = monotonic_s();
-    const RigReading reading = rig->read();
+    const RigReading reading = rig.read();
     const double to_s = monotonic_s();
     if (reading.status == RigStatus::fresh) {
       EXPECT_EQ(reading.fault, RigFault::none);
       EXPECT_GT(reading.sequence, sequence);
       sequence = reading.sequence;
-      taken.push_back({from_s, to_s, reading.cart_counts, reading.pendulum_counts});
+      taken.push_back({from_s, to_s, reading.cart_counts});
     } else {
       EXPECT_TRUE(reading.fault == RigFault::link_timeout || reading.fault == RigFault::link_lost ||
                   reading.fault == RigFault::corrupt_reply || reading.fault == RigFault::device_refused);
       ++not_fresh;
     }
-    rig->write(3.0 * std::cos(2.0 * std::numbers::pi * 1.5 * 0.005 * k));
+    rig.write(3.0 * std::cos(2.0 * std::numbers::pi * 1.5 * 0.005 * k));
     std::this_thread::sleep_for(std::chrono::duration<double>(start_s + 0.005 * (k + 1) - monotonic_s()));
   }
-  rig.reset();
-  server.end();
-  const bool faulty = !GetParam().flags.empty();
-  EXPECT_GE(not_fresh, faulty ? 5 : 0);
-  EXPECT_GT(taken.size(), 200u);
-  const std::vector<TraceRow> trace = server.trace();
-  std::size_t wrong = 0, compared = 0;
-  for (const Taken& t : taken) {
-    constexpr double line_s = 0.001;  // apart, in the trace
-    const CartRange range = cart_between(trace, t.from_s - line_s, t.to_s + line_s);
-    ++compared;
-    if (!range.holds(2.27485e-5 * static_cast<double>(t.cart))) ++wrong;
-  }
-  // A wrong bit in a TCP reply has no check sum to betray it; what no motion explains is refused.
-  const bool undetectable = !serial && faulty && GetParam().flags.front() == "--inject-corrupt-every";
-  EXPECT_GT(compared, 200u);
-  EXPECT_LE(wrong, undetectable ? compared : 0u);
+  return taken;
+}
+
+/// Holds every fresh reading against what the plant did while that exchange was under way.
+TEST_P(ModbusFaults, NoOldCountIsEverFresh) {
+  in_real_time([] {
+    const bool serial = GetParam().serial;
+    const std::string text =
+        replaced(rig_text_of({"", serial, {}}), "response_timeout_s: 0.01", "response_timeout_s: 0.003");
+    const Folder folder;
+    VirtualRigProcess server(folder, text, serial, GetParam().flags);
+    auto rig = connect(folder, text, server, serial, 0.005);
+    rig->open();
+    int not_fresh = 0;
+    const Since begin;
+    const std::vector<Taken> taken = swing(*rig, not_fresh);
+    const Interval swinging = begin.until_now();
+    rig.reset();
+    server.end();
+    const bool faulty = !GetParam().flags.empty();
+    EXPECT_GE(not_fresh, faulty ? 5 : 0);
+    const std::vector<TraceRow> trace = server.trace();
+    std::size_t wrong = 0;
+    for (const Taken& t : taken) {
+      constexpr double line_s = 0.001;  // apart, in the trace
+      const CartRange range = cart_between(trace, t.from_s - line_s, t.to_s + line_s);
+      if (!range.holds(2.27485e-5 * static_cast<double>(t.cart))) ++wrong;
+    }
+    // A wrong bit in a TCP reply has no check sum to betray it; what no motion explains is refused.
+    const bool undetectable = !serial && faulty && GetParam().flags.front() == "--inject-corrupt-every";
+    EXPECT_LE(wrong, undetectable ? taken.size() : 0u);
+    EXPECT_TIMING(swinging, taken.size() > 200u, "most replies come in time");
+  });
 }
 
 INSTANTIATE_TEST_SUITE_P(
@@ -242,23 +256,28 @@ TEST(ModbusRig, ServerKilledAndStartedAgainIsARestart) {
 }
 
 TEST(ModbusRig, RefusesWhatIsNotFiniteAndStopsForGood) {
-  const std::string text = rig_text_of({"", false, {}});
-  Folder folder;
-  VirtualRigProcess server(folder, text, false);
-  auto rig = connect(folder, text, server, false);
-  rig->open();
-  rig->write(1.0);
-  std::this_thread::sleep_for(20ms);
-  EXPECT_EQ(rig->write(std::nan("")), RigFault::not_finite);
-  std::this_thread::sleep_for(20ms);
-  rig->stop();
-  rig->write(5.0);
-  std::this_thread::sleep_for(50ms);
-  server.end();
-  double highest_v = 0.0;
-  for (const TraceRow& row : server.trace()) highest_v = std::max(highest_v, std::abs(row.voltage_v));
-  EXPECT_DOUBLE_EQ(highest_v, 1.0);
-  EXPECT_EQ(server.trace().back().voltage_v, 0.0);
+  in_real_time([] {
+    const std::string text = rig_text_of({"", false, {}});
+    Folder folder;
+    VirtualRigProcess server(folder, text, false);
+    auto rig = connect(folder, text, server, false);
+    rig->open();
+    const Since driven;
+    rig->write(1.0);
+    std::this_thread::sleep_for(20ms);
+    const Interval driving = driven.until_now();
+    EXPECT_EQ(rig->write(std::nan("")), RigFault::not_finite);
+    std::this_thread::sleep_for(20ms);
+    rig->stop();
+    rig->write(5.0);
+    std::this_thread::sleep_for(50ms);
+    server.end();
+    double highest_v = 0.0;
+    for (const TraceRow& row : server.trace()) highest_v = std::max(highest_v, std::abs(row.voltage_v));
+    EXPECT_LE(highest_v, 1.0);
+    EXPECT_TIMING(driving, highest_v > 0.0, "the first voltage arrives before it is old");
+    EXPECT_EQ(server.trace().back().voltage_v, 0.0);
+  });
 }
 
 TEST(ModbusRig, NothingThereIsADeviceError) {

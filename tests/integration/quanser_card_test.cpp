@@ -12,6 +12,7 @@
 
 #include "../fault/fake_hil/card_process.hpp"
 #include "hal/quanser_proof.hpp"
+#include "tests/support/run_end.hpp"
 #include "upright/base/error.hpp"
 #include "upright/hal/rig_factory.hpp"
 #include "upright/record/run_reader.hpp"
@@ -20,6 +21,8 @@ namespace upright::test {
 namespace {
 
 constexpr double period_s = 0.05;
+/// Of the card: what is tested here is what it does, not how fast.
+constexpr double watchdog_s = 1.0;
 
 void sleep_s(double seconds) {
   std::this_thread::sleep_for(std::chrono::duration<double>(seconds));
@@ -28,7 +31,7 @@ void sleep_s(double seconds) {
 /// The card, and a rig on it.
 struct Bench {
   explicit Bench(const std::string& wired = fake_card_rig(), const std::vector<std::string>& flags = {})
-      : card(folder, wired, flags),
+      : card(folder, replaced(wired, "  watchdog_s: 0.1", "  watchdog_s: 1.0"), flags),
         file(read_rig(YamlMap::from_text(card.rig_text(), "rig.yaml"))),
         rig(make_rig(file, {period_s})) {}
 
@@ -79,7 +82,7 @@ TEST(QuanserCard, AnExpiredWatchdogIsAConfirmedZeroThatLocksTheCardUntilItIsOpen
   Bench bench;
   bench.rig->open();
   ASSERT_EQ(bench.rig->write(2.0), RigFault::none);
-  sleep_s(0.25);
+  sleep_s(1.5 * watchdog_s);
   EXPECT_TRUE(bench.last().locked);
   EXPECT_EQ(bench.last().analog_v, 0.0);
   EXPECT_EQ(bench.rig->read().fault, RigFault::watchdog_expired);
@@ -141,20 +144,23 @@ TEST(QuanserCard, IsProvedStepByStep) {
 }
 
 TEST(QuanserCard, ARunRecordsWhichCardAndLibraryItWas) {
-  Folder folder;
-  const CardProcess card(folder, fake_card_rig());
-  std::ofstream(folder / "rig.yaml") << card.rig_text();
-  std::ofstream(folder / "gains.yaml")
-      << replaced(text_of(UPRIGHT_SOURCE_DIR "/config/gains/exponential.yaml"), "sample_rate_hz: 1000",
-                  "sample_rate_hz: 200");
-  Process run({UPRIGHT_BINARY, "run", "--rig", folder / "rig.yaml", "--gains", folder / "gains.yaml",
-               "--duration", "0.5", "--out", folder / "runs", "--json", "--unchecked"});
-  const nlohmann::json document = nlohmann::json::parse(run.rest());
-  EXPECT_EQ(run.wait(), 0) << document;
-  const std::string text = text_of(only_entry(folder / "runs") / "run.yaml");
-  for (const char* fact : {"serial_number: '12345'", "library_version: '9.8.7'", "product: 'Fake Q2-USB'"})
-    EXPECT_NE(text.find(fact), std::string::npos) << fact;
-  EXPECT_TRUE(read_run(only_entry(folder / "runs")).outcome.has_value());
+  in_real_time([] {
+    Folder folder;
+    const CardProcess card(folder, fake_card_rig());
+    std::ofstream(folder / "rig.yaml") << card.rig_text();
+    std::ofstream(folder / "gains.yaml")
+        << replaced(text_of(UPRIGHT_SOURCE_DIR "/config/gains/exponential.yaml"), "sample_rate_hz: 1000",
+                    "sample_rate_hz: 200");
+    Process run({UPRIGHT_BINARY, "run", "--rig", folder / "rig.yaml", "--gains", folder / "gains.yaml",
+                 "--duration", "0.5", "--out", folder / "runs", "--json", "--unchecked"});
+    const nlohmann::json document = nlohmann::json::parse(run.rest());
+    const int exit_code = run.wait();
+    const std::string text = text_of(only_entry(folder / "runs") / "run.yaml");
+    EXPECT_END(run_end(text).value(), exit_code == 0);
+    for (const char* fact : {"serial_number: '12345'", "library_version: '9.8.7'", "product: 'Fake Q2-USB'"})
+      EXPECT_NE(text.find(fact), std::string::npos) << fact;
+    EXPECT_TRUE(read_run(only_entry(folder / "runs")).outcome.has_value());
+  });
 }
 
 }  // namespace

@@ -13,6 +13,7 @@
 #include "fresh_reading.hpp"
 #include "record/stop_report.hpp"
 #include "stopped_device.hpp"
+#include "tests/support/real_time.hpp"
 #include "upright/base/error.hpp"
 
 namespace upright::test {
@@ -85,15 +86,18 @@ TEST(Stop, IsNeverConfirmedByADeviceThatKeepsItsVoltage) {
 }
 
 TEST(Stop, TriesForTenSecondsAndNamesTheDevicesOwnWatchdog) {
-  const StopCase silent{false, true, Trouble::silent, 60.0};
-  const Stopped result = stopped(silent);
-  EXPECT_FALSE(result.report.zero_confirmed) << "nobody has said so";
-  EXPECT_EQ(result.later_v, 0.0) << "though the watchdog did it";
-  EXPECT_LT(result.on_for_s, 0.2);
-  EXPECT_GT(result.took_s, 0.9 * stop_patience_s);
-  EXPECT_LT(result.took_s, stop_patience_s + 1.0);
-  EXPECT_NE(sentence_of(result.report).find("takes the voltage away 0.1 s after"), std::string::npos)
-      << sentence_of(result.report);
+  in_real_time([] {
+    const StopCase silent{false, true, Trouble::silent, 60.0};
+    const Stopped result = stopped(silent);
+    EXPECT_FALSE(result.report.zero_confirmed) << "nobody has said so";
+    EXPECT_EQ(result.later_v, 0.0) << "though the watchdog did it";
+    EXPECT_TIMING((Interval{result.begun_s, result.begun_s + result.on_for_s}), result.on_for_s < 0.2,
+                  "zero volts in time");
+    EXPECT_GT(result.took_s, 0.9 * stop_patience_s);
+    EXPECT_LT(result.took_s, stop_patience_s + 1.0);
+    EXPECT_NE(sentence_of(result.report).find("takes the voltage away 0.1 s after"), std::string::npos)
+        << sentence_of(result.report);
+  });
 }
 
 TEST(Stop, UsesAnotherFunctionWhere0x17IsRefusedAndDisablesTheAmplifierToo) {
@@ -116,16 +120,17 @@ TEST(Stop, BelievesAnAcknowledgementWhereTheOutputCannotBeRead) {
 }
 
 TEST(Stop, DoesNotHoldUpTheLoop) {
-  Driven driven({false, false, Trouble::silent, 60.0});
-  driven.device.begin(Trouble::silent, 60.0);
-  double longest_s = 0.0;
-  for (int i = 0; i < 50; ++i) {
-    const double begun_s = monotonic_s();
-    driven.rig->stop();
-    longest_s = std::max(longest_s, monotonic_s() - begun_s);
-    std::this_thread::sleep_for(2ms);
-  }
-  EXPECT_LT(longest_s, 0.02) << "no time-out is waited for";
+  in_real_time([] {
+    Driven driven({false, false, Trouble::silent, 60.0});
+    driven.device.begin(Trouble::silent, 60.0);
+    for (int i = 0; i < 50; ++i) {
+      const Since begin;
+      driven.rig->stop();
+      const Interval took = begin.until_now();
+      EXPECT_TIMING(took, took.end_s - took.begin_s < 0.02, "no time-out is waited for");
+      std::this_thread::sleep_for(2ms);
+    }
+  });
 }
 
 TEST(Open, RefusesADeviceThatAcknowledgesZeroVoltsAndKeepsAnother) {
@@ -172,35 +177,42 @@ TEST(Reading, IsNeverFreshByAReplyThatDoesNotFitItsRequest) {
     }
 }
 
+void read_busy_device(bool serial, Trouble trouble, int number) {
+  Driven driven({serial, false, trouble, 0.0});
+  driven.device.begin(trouble, 60.0);
+  for (int i = 0; i < 10; ++i) {
+    const Since begin;
+    const RigReading reading = driven.rig->read();
+    const bool says_busy = reading.status == RigStatus::fault && reading.fault == RigFault::device_busy;
+    EXPECT_TIMING(begin.until_now(), says_busy, "the device answers in time");
+    EXPECT_EQ(driven.rig->last_exception(), number);
+  }
+  driven.device.end_trouble();
+  EXPECT_EQ(fresh_reading(*driven.rig).fault, RigFault::none) << "the first after that";
+}
+
 TEST(Reading, CallsABusyDeviceBusyHoweverOftenItSaysSo) {
   for (const bool serial : {false, true})
-    for (const auto& [trouble, number] : {std::pair{Trouble::busy, 6}, {Trouble::gateway_silent, 11}}) {
-      Driven driven({serial, false, trouble, 0.0});
-      driven.device.begin(trouble, 60.0);
-      for (int i = 0; i < 10; ++i) {
-        const RigReading reading = driven.rig->read();
-        EXPECT_EQ(reading.status, RigStatus::fault);
-        EXPECT_EQ(reading.fault, RigFault::device_busy);
-        EXPECT_EQ(driven.rig->last_exception(), number);
-      }
-      driven.device.end_trouble();
-      EXPECT_EQ(fresh_reading(*driven.rig).fault, RigFault::none) << "the first after that";
-    }
+    for (const auto& [trouble, number] : {std::pair{Trouble::busy, 6}, {Trouble::gateway_silent, 11}})
+      if (!IsSkipped()) in_real_time([&, t = trouble, n = number] { read_busy_device(serial, t, n); });
+}
+
+void write_after_stall(bool serial) {
+  Driven driven({serial, false, Trouble::none, 0.0});
+  EXPECT_DOUBLE_EQ(driven.device.voltage_v(), run_v);
+  std::this_thread::sleep_for(250ms);
+  const Since resumed;
+  EXPECT_EQ(fresh_reading(*driven.rig).fault, RigFault::none);
+  driven.rig->write(1.0);
+  std::this_thread::sleep_for(50ms);
+  for (const FakeDevice::Held& held : driven.device.record())
+    EXPECT_FALSE(held.time_s > resumed.begin_s() && held.voltage_v == run_v) << "sent again";
+  EXPECT_TIMING(resumed.until_now(), driven.device.voltage_v() == 1.0, "the new voltage arrives in time");
 }
 
 TEST(Reading, SendsNoOldVoltageAfterAStall) {
-  for (const bool serial : {false, true}) {
-    Driven driven({serial, false, Trouble::none, 0.0});
-    EXPECT_DOUBLE_EQ(driven.device.voltage_v(), run_v);
-    std::this_thread::sleep_for(250ms);
-    const double resumed_s = monotonic_s();
-    EXPECT_EQ(fresh_reading(*driven.rig).fault, RigFault::none);
-    driven.rig->write(1.0);
-    std::this_thread::sleep_for(50ms);
-    for (const FakeDevice::Held& held : driven.device.record())
-      EXPECT_FALSE(held.time_s > resumed_s && held.voltage_v == run_v) << "sent again";
-    EXPECT_DOUBLE_EQ(driven.device.voltage_v(), 1.0);
-  }
+  for (const bool serial : {false, true})
+    if (!IsSkipped()) in_real_time([=] { write_after_stall(serial); });
 }
 
 TEST(Reading, SendsNoOldVoltageWhenTheLinkComesBack) {
