@@ -46,11 +46,12 @@ function(upright_library name)
   endif()
 endfunction()
 
-# upright_own_object(NAME INTO LIBRARY SOURCES... [ARCH -march] [OPTIONS COMPILE-OPTIONS...] LINK TARGETS...): sources of a
-# library with compile options of their own, as one object file. An inline function that these and other files use would be
-# linked from either; so what is inline stays inside the object file (keep_inside.sh), which offers only its own functions.
+# upright_own_object(NAME INTO LIBRARY SOURCES... [ARCH -march] [OPTIONS COMPILE-OPTIONS...] LINK TARGETS... [UNSANITIZED
+# SOURCES...]): sources of a library with compile options of their own, as one object file. An inline function that these and
+# other files use would be linked from either; so what is inline stays inside the object file (keep_inside.sh), which offers
+# only its own functions. UNSANITIZED are those that the sanitizers leave out: say why at the call.
 function(upright_own_object name)
-  cmake_parse_arguments(arg "" "INTO;ARCH" "SOURCES;OPTIONS;LINK" ${ARGN})
+  cmake_parse_arguments(arg "" "INTO;ARCH" "SOURCES;OPTIONS;LINK;UNSANITIZED" ${ARGN})
   add_library(${name} OBJECT ${arg_SOURCES})
   target_include_directories(${name} PRIVATE ${PROJECT_SOURCE_DIR}/include ${PROJECT_SOURCE_DIR}/src ${PROJECT_SOURCE_DIR})
   # A target of its own, and the last one: then these options win over those before.
@@ -63,17 +64,16 @@ function(upright_own_object name)
   if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
     target_compile_options(${name}_options INTERFACE -fno-gnu-unique)
   endif()
-  # Nothing near the motor, and with the sanitizers' checks lanes and dual numbers would take longer to compile than all
-  # else together.
-  if(UPRIGHT_SANITIZE)
-    target_compile_options(${name}_options INTERFACE -fno-sanitize=all)
+  if(UPRIGHT_SANITIZE AND arg_UNSANITIZED)
+    set_source_files_properties(${arg_UNSANITIZED} PROPERTIES COMPILE_OPTIONS -fno-sanitize=all)
   endif()
   target_link_libraries(${name} PRIVATE ${arg_LINK} upright_options ${name}_options)
   set(script ${PROJECT_SOURCE_DIR}/cmake/keep_inside.sh)
   set(object ${CMAKE_CURRENT_BINARY_DIR}/${name}.o)
+  set(objects $<FILTER:$<TARGET_OBJECTS:${name}>,EXCLUDE,[.]gch$>)  # CMake counts a precompiled header too
   add_custom_command(OUTPUT ${object}
-    COMMAND ${script} ${CMAKE_LINKER} ${CMAKE_NM} ${CMAKE_OBJCOPY} ${object} $<TARGET_OBJECTS:${name}>
-    DEPENDS ${script} ${name} $<TARGET_OBJECTS:${name}> COMMAND_EXPAND_LISTS VERBATIM)
+    COMMAND ${script} ${CMAKE_LINKER} ${CMAKE_NM} ${CMAKE_OBJCOPY} ${object} ${objects}
+    DEPENDS ${script} ${name} ${objects} COMMAND_EXPAND_LISTS VERBATIM)
   set_source_files_properties(${object} PROPERTIES EXTERNAL_OBJECT TRUE GENERATED TRUE)
   target_sources(${arg_INTO} PRIVATE ${object})
   set_property(GLOBAL APPEND PROPERTY UPRIGHT_OWN_OBJECTS ${object})

@@ -9,10 +9,10 @@
 #include "adequacy.hpp"
 #include "base/parallel.hpp"
 #include "estimation/held_out.hpp"
+#include "estimation/smoother.hpp"
 #include "indistinguishable.hpp"
 #include "next_experiment.hpp"
 #include "plausibility.hpp"
-#include "residual.hpp"
 #include "search.hpp"
 #include "stepwise_selection.hpp"
 #include "upright/base/error.hpp"
@@ -263,10 +263,10 @@ class Diagnostician {
   void trace_residuals() {
     if (data_.held.segments.empty()) return;
     const Noise noise = final_.train.point.noise;
-    result_.residual_after = smooth_residuals(data_.held, final_.held.point, policy_.location);
+    result_.residual_after = smooth_residuals(data_.held, final_.held.point, policy_.location.walk);
     Hypothesis as_given = search_.only({}, final_, &noise);
     search_.judge(as_given, noise);
-    result_.residual_before = smooth_residuals(data_.held, as_given.held.point, policy_.location);
+    result_.residual_before = smooth_residuals(data_.held, as_given.held.point, policy_.location.walk);
   }
 
   /// A scale at the end of what it may be stands for something else.

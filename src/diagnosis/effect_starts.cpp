@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "residual.hpp"
+#include "estimation/smoother.hpp"
 
 namespace upright {
 
@@ -12,7 +12,7 @@ namespace {
 std::vector<std::pair<double, double>> force_residual(const FitData& data, const FitPoint& point,
                                                       const SelectionPolicy& policy, std::size_t most) {
   std::vector<std::pair<double, double>> pairs;
-  for (const ResidualTrace& trace : smooth_residuals(data, point, policy.location))
+  for (const ResidualTrace& trace : smooth_residuals(data, point, policy.location.walk))
     for (std::size_t k = 0; k < trace.time_s.size(); ++k)
       if (std::abs(trace.cart_mps[k]) > policy.location.moving_cart_mps)
         pairs.emplace_back(trace.cart_m[k], trace.force_n[k]);

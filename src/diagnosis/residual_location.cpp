@@ -1,10 +1,11 @@
 #include "residual_location.hpp"
 
+#include <Eigen/Cholesky>
 #include <array>
 #include <cmath>
 #include <numeric>
 
-#include "residual.hpp"
+#include "estimation/smoother.hpp"
 #include "reversal.hpp"
 
 namespace upright {
@@ -156,7 +157,7 @@ std::pair<double, std::size_t> explained_share(const Rows& rows, const std::vect
 }  // namespace
 
 ResidualPlace locate_residual(const FitData& data, const FitPoint& point, const SelectionPolicy& policy) {
-  const Rows rows = collect(data, smooth_residuals(data, point, policy.location), policy);
+  const Rows rows = collect(data, smooth_residuals(data, point, policy.location.walk), policy);
   const auto [force_share, force_feature] = explained_share(rows, rows.force, policy.location);
   const auto [torque_share, torque_feature] = explained_share(rows, rows.torque, policy.location);
   if (force_share >= torque_share) return {false, std::max(force_share, 0.0), feature_names[force_feature]};

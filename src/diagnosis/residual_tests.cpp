@@ -146,8 +146,8 @@ class BlockSums {
     for (std::size_t i = 0; i < probes.size(); ++i) responses_[i].advance(step, probes[i].on, acting[i]);
     for (int i = 0; i < 2; ++i) pulses_[i].advance(step, i == 1 ? ActsOn::pendulum : ActsOn::cart, 1.0);
   }
-  void add(const LinearStep& step, int channel, double innovation, const ProbeValues& acting) {
-    const double e = innovation;
+  void add(const LinearStep& step, int channel, const ProbeValues& acting) {
+    const double e = step.innovation[channel];
     sum_ += step.weight[channel] * e * e / step.variance[channel];
     count_ += step.weight[channel];
     const ActsOn sensor = channel == 0 ? ActsOn::position : ActsOn::angle;
@@ -192,13 +192,8 @@ void examine_segment(const Measurement& run, const Segment& segment, const FitPo
   for (std::size_t k = 0; k < steps.size(); ++k) {
     const LinearStep& step = steps[k];
     if (k > 0) sums.advance(step, acting);
-    double update[states] = {};
-    for (int channel = 0; channel < 2; ++channel) {
-      if (!present[channel]) continue;
-      const double e = step.residual[channel] - step.gain[channel] * update[channel];
-      for (int i = 0; i < states; ++i) update[i] += step.update[channel][i] * e;
-      sums.add(step, channel, e, acting);
-    }
+    for (int channel = 0; channel < 2; ++channel)
+      if (present[channel]) sums.add(step, channel, acting);
     acting = state.at(run.time_s[segment.first + k], step.period_s, step.rate[0], step.rate[1],
                       run.voltage_v[segment.first + k]);
     if ((k + 1) % length == 0)

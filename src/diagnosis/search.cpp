@@ -1,5 +1,7 @@
 #include "search.hpp"
 
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <functional>
@@ -8,7 +10,6 @@
 
 #include "effect_starts.hpp"
 #include "plausibility.hpp"
-#include "residual.hpp"
 
 namespace upright {
 

@@ -11,6 +11,8 @@
 #include <array>
 #include <cstddef>
 
+#include "estimation/smoother.hpp"
+
 namespace upright {
 
 /// When an effect belongs to the model.
@@ -216,14 +218,7 @@ struct LocationPolicy {
   /// Rows for each feature, below which nothing is said. Chosen.
   std::size_t rows_per_feature = 4;
 
-  // How fast the residual may wander: across its whole size within a few hundredths of a second. Of a small
-  // cart. Chosen.
-  double wander_force_n_per_sqrt_s = 3.0;
-  double wander_torque_nm_per_sqrt_s = 0.3;
-  /// Variances at the beginning of a segment: of position, angle, their rates and the bristles' deflection
-  /// [m2, rad2, (m/s)2, (rad/s)2, m2], and of the residual force and torque [N2, (N m)2]. Of a small cart
-  /// too. Chosen.
-  std::array<double, 7> start_variances = {1e-6, 1e-4, 1e-2, 1e-1, 1e-6, 4.0, 0.04};
+  ResidualWalk walk;  ///< of the smoother
 };
 
 /// What is believed of parameters before the data are looked at.

@@ -1,5 +1,6 @@
 #include "noise_floor.hpp"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <array>
 #include <cmath>

@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "upright/estimation/fit.hpp"
+#include "upright/estimation/segments.hpp"
 
 namespace upright {
 

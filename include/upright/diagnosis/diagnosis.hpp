@@ -9,6 +9,8 @@
 #include <vector>
 
 #include "upright/estimation/fit.hpp"
+#include "upright/estimation/parameter_estimate.hpp"
+#include "upright/estimation/residual_trace.hpp"
 
 namespace upright {
 
@@ -17,13 +19,6 @@ std::string kind_of(std::size_t effect);
 
 enum class Verdict { explained, no_discrepancy, unexplained, not_excited };
 std::string_view name_of(Verdict verdict);
-
-struct ParameterEstimate {
-  std::string name;
-  std::string unit;
-  double value = 0.0;
-  double low = 0.0, high = 0.0;  ///< 95 percent interval
-};
 
 /// An effect the data ask for.
 struct FoundEffect {
@@ -62,12 +57,6 @@ struct Step {
     std::vector<ParameterEstimate> parameters;
   };
   std::vector<Effect> effects;
-};
-
-/// Residual force and torque along a run, smoothed, with what they are seen against. For the report.
-struct ResidualTrace {
-  std::size_t run = 0;
-  std::vector<double> time_s, force_n, torque_nm, cart_m, cart_mps, voltage_v;
 };
 
 struct NextExperiment {

@@ -9,14 +9,14 @@
 // likelihood in turn.
 #pragma once
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <cstddef>
 #include <optional>
-#include <string>
 #include <vector>
 
-#include "upright/estimation/work_bound.hpp"
-#include "upright/measurement/measurement.hpp"
+#include "upright/estimation/linear_step.hpp"
+#include "upright/estimation/noise.hpp"
+#include "upright/estimation/segments.hpp"
 #include "upright/model/dynamics.hpp"
 #include "upright/model/plant.hpp"
 
@@ -33,69 +33,12 @@ struct FreeParameter {
   double prior_sigma = 0.0;  ///< 0: nothing is believed
 };
 
-/// Intensities of the noise; quantisation comes with each measurement.
-struct Noise {
-  double force = 0.0;     ///< white force on the cart [N sqrt(s)]
-  double torque = 0.0;    ///< white torque on the pendulum [N m sqrt(s)]
-  double sensors = 1.0;   ///< sensor noise over what the steps and fourth differences of the data show
-  double jitter_s = 0.0;  ///< standard deviation of the time at which encoders are read
-};
-
-/// Samples first..last (inclusive) of a run, simulated from one initial state.
-struct Segment {
-  std::size_t run = 0;
-  std::size_t first = 0;
-  std::size_t last = 0;
-};
-
-/// Cuts runs into segments: at gaps in the record, and so short that a small error does not grow out of
-/// proportion where the pendulum stands upright.
-std::vector<Segment> cut_segments(const std::vector<Measurement>& runs, double longest_s = 2.0);
-
 /// A state at the start of each segment, from the data alone.
 std::vector<PlantState<double>> guess_starts(const std::vector<Measurement>& runs,
                                              const std::vector<Segment>& segments, const Plant& plant);
 
 /// Moves starts with the sensors, where one plant shows the same motion otherwise than another.
 void follow_sensors(std::vector<PlantState<double>>& starts, const Plant& from, const Plant& to);
-
-/// One sample of a followed segment, linearised along the filtered trajectory. State order: x, theta, v,
-/// omega, bristle.
-struct LinearStep {
-  static constexpr int states = 5;
-  double transition[states][states];  ///< from the sample before, after its update; identity at the first
-  double by_force[2], by_torque[2];   ///< accelerations of cart and pendulum per unit force and torque
-  double residual[2];                 ///< measured minus predicted from the samples before: cart, pendulum
-  double update[2][states];           ///< Kalman gain of each channel, taken in turn
-  double variance[2];                 ///< of each innovation
-  double weight[2];                   ///< how much of a measurement each is
-  double gain[2];                     ///< d output / d state of the sensors
-  double rate[2];                     ///< velocities, for jitter
-  double holds[2];  ///< level [N, N m] at which cart and pendulum rest in the end; 0: they move
-  double period_s;
-};
-
-/// A tenth of the force and torque noise. Much noise and a poor fit hold each other up: a second descent
-/// begins with little noise.
-inline Noise reduced_process_noise(Noise noise) {
-  noise.force *= 0.1;
-  noise.torque *= 0.1;
-  return noise;
-}
-
-/// That of the sensors alone, for a plain simulation.
-inline Noise sensors_only(Noise noise) {
-  noise.force = noise.torque = 0.0;
-  noise.sensors = 1.0;
-  return noise;
-}
-
-/// What a fit works on.
-struct FitData {
-  const std::vector<Measurement>* runs = nullptr;
-  std::vector<Segment> segments;
-  WorkBound* bound = nullptr;  ///< of the search that the fit is a part of; null: none
-};
 
 struct FitPoint {
   Plant plant;

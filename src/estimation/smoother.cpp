@@ -1,5 +1,6 @@
-#include "residual.hpp"
+#include "smoother.hpp"
 
+#include <Eigen/Cholesky>
 #include <array>
 #include <cmath>
 
@@ -15,7 +16,7 @@ using Vector = Eigen::Matrix<double, extended, 1>;
 using Matrix = Eigen::Matrix<double, extended, extended>;
 
 struct Filtered {
-  Vector mean, predicted_mean, corrected;
+  Vector mean, predicted_mean;
   Matrix covariance, predicted_covariance, transition;
 };
 
@@ -42,13 +43,12 @@ struct Channels {
 
 /// The filter forwards along the steps of a segment.
 std::vector<Filtered> filter(const std::vector<LinearStep>& steps, const Channels& channels,
-                             const LocationPolicy& policy) {
-  const double wander_force = policy.wander_force_n_per_sqrt_s;
-  const double wander_torque = policy.wander_torque_nm_per_sqrt_s;
+                             const ResidualWalk& walk) {
+  const double wander_force = walk.force_n_per_sqrt_s, wander_torque = walk.torque_nm_per_sqrt_s;
   std::vector<Filtered> passes(steps.size());
   Vector mean = Vector::Zero(), corrected = Vector::Zero();
   Matrix p = Matrix::Zero();
-  p.diagonal() = Eigen::Map<const Vector>(policy.start_variances.data());
+  p.diagonal() = Eigen::Map<const Vector>(walk.start_variances.data());
   for (std::size_t k = 0; k < steps.size(); ++k) {
     Filtered& f = passes[k];
     f.transition = k == 0 ? Matrix::Identity() : transition_of(steps[k]);
@@ -60,14 +60,7 @@ std::vector<Filtered> filter(const std::vector<LinearStep>& steps, const Channel
     }
     // The trajectory that the steps are linearised along was itself corrected by a filter: errors are
     // counted from there.
-    corrected.setZero();
-    for (std::size_t channel = 0; channel < 2; ++channel) {
-      if (!channels.present[channel]) continue;
-      const double e =
-          steps[k].residual[channel] - steps[k].gain[channel] * corrected[static_cast<Eigen::Index>(channel)];
-      for (int i = 0; i < states; ++i) corrected[i] += steps[k].update[channel][i] * e;
-    }
-    f.corrected = corrected;
+    for (int i = 0; i < states; ++i) corrected[i] = steps[k].correction[i];
     f.predicted_mean = mean;
     f.predicted_covariance = p;
     for (std::size_t channel = 0; channel < 2; ++channel) {
@@ -106,7 +99,7 @@ std::vector<Vector> smooth(const std::vector<Filtered>& passes) {
 }  // namespace
 
 std::vector<ResidualTrace> smooth_residuals(const FitData& data, const FitPoint& point,
-                                            const LocationPolicy& policy) {
+                                            const ResidualWalk& walk) {
   const std::vector<std::vector<LinearStep>> all = linearise(data, point);
   std::vector<ResidualTrace> traces(all.size());
   parallel_for(all.size(), [&](std::size_t s) {
@@ -117,7 +110,7 @@ std::vector<ResidualTrace> smooth_residuals(const FitData& data, const FitPoint&
     const Channels channels{present,
                             {present[0] ? std::pow(run.cart_noise_m(), 2) : 1.0,
                              present[1] ? std::pow(run.theta_noise_rad(), 2) : 1.0}};
-    const std::vector<Vector> smoothed = smooth(filter(steps, channels, policy));
+    const std::vector<Vector> smoothed = smooth(filter(steps, channels, walk));
     ResidualTrace& trace = traces[s];
     trace.run = segment.run;
     for (std::size_t k = 0; k < steps.size(); ++k) {

@@ -1,0 +1,15 @@
+// A parameter of an effect as the data have it.
+#pragma once
+
+#include <string>
+
+namespace upright {
+
+struct ParameterEstimate {
+  std::string name;
+  std::string unit;
+  double value = 0.0;
+  double low = 0.0, high = 0.0;  ///< 95 percent interval
+};
+
+}  // namespace upright

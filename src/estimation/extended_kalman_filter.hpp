@@ -1,0 +1,79 @@
+// The extended Kalman filter along a segment: its covariance and gains. The trajectory itself is that of the
+// event engine (linearisation.cpp).
+#pragma once
+
+#include <cmath>
+#include <limits>
+
+#include "upright/estimation/linear_step.hpp"
+#include "upright/estimation/noise.hpp"
+#include "upright/measurement/measurement.hpp"
+#include "upright/model/plant.hpp"
+
+namespace upright {
+
+/// Covariance, gains and innovation variances of the filter, whose innovations are white under the right
+/// model.
+class EkfCovariance {
+ public:
+  EkfCovariance(const Measurement& run, const Plant& plant, const Noise& noise);
+
+  /// Carries the covariance to the next sample.
+  void predict(const LinearStep& step);
+
+  /// Whether a channel is measured, and of something that the plant has.
+  bool present(int channel) const { return present_[channel]; }
+
+  /// Updates with one channel: its gain and innovation variance. What is only a part of a measurement
+  /// corrects by as much less.
+  void update(const LinearStep& step, int channel);
+
+  double variance() const { return variance_; }
+  const double* gain() const { return gain_; }
+
+ private:
+  static constexpr int states = LinearStep::states;
+
+  /// Dry friction under white force: a contact that rests in the model creeps at random in truth.
+  struct Creep {
+    double speed = 0.0;  ///< standard deviation; 0: it rests
+    double keeps = 0.0;  ///< share of a speed that is left a sample later
+    double moves_s = 0.0;
+    double rate_variance = 0.0, covariance = 0.0, place_variance = 0.0;
+  };
+
+  template <int Moving>
+  void correct(double c, int channel, double variance);
+  template <int Moving>
+  void propagate(const LinearStep& step);
+  void propagate(const LinearStep& step);
+  void propagate_creeping(LinearStep step);
+  Creep creep_of(const LinearStep& step, int contact, double push) const;
+
+  Noise noise_;
+  bool present_[2];
+  double sensor_variance_[2];
+  bool bristles_;
+  bool active_ = false;
+  double p_[states][states] = {};
+  double gain_[states] = {}, variance_ = 1.0;
+};
+
+/// Minus twice the log likelihood of innovations.
+struct Likelihood {
+  double chi_square = 0.0;
+  double log_variance = 0.0;
+  double samples = 0.0;
+
+  double objective() const { return chi_square + log_variance; }
+
+  /// Adds one innovation. A value that is not finite makes it infinite.
+  void add(double innovation, double variance, double weight) {
+    constexpr double infinity = std::numeric_limits<double>::infinity();
+    chi_square += std::isfinite(innovation) ? weight * innovation * innovation / variance : infinity;
+    log_variance += weight * std::log(variance);
+    samples += weight;
+  }
+};
+
+}  // namespace upright

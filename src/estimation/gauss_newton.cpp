@@ -1,0 +1,326 @@
+#include "gauss_newton.hpp"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <cmath>
+#include <iterator>
+#include <limits>
+#include <numeric>
+#include <utility>
+
+#include "base/parallel.hpp"
+#include "state_vector.hpp"
+
+namespace upright {
+
+namespace {
+
+constexpr int states = state_count;
+constexpr double infinity = std::numeric_limits<double>::infinity();
+using Matrix = Eigen::MatrixXd;
+
+/// Information on the initial state beyond the data: nearly none, enough to keep unmeasured states in place.
+constexpr double start_information[states] = {1.0, 1.0, 0.1, 0.01, 1e4};
+
+/// By how much a quadratic objective falls along a way.
+double promise(const Matrix& information, const Eigen::VectorXd& slope, const Eigen::VectorXd& way) {
+  return 2.0 * slope.dot(way) - way.dot(information * way);
+}
+
+/// Sizes enter nearly linearly and may go far at once; shapes, places and times may not.
+double longest_step(const FreeParameter& p, double value) {
+  const bool size = effect_registry()[p.effect].parameters[p.index].neutral == 0.0;
+  return size ? std::max(std::abs(value), 4.0 * p.scale) : 0.5 * std::max(std::abs(value), p.scale);
+}
+
+}  // namespace
+
+Prior::Prior(const std::vector<FreeParameter>& free, const std::optional<Belief>& belief) : free_(free) {
+  const auto np = static_cast<Eigen::Index>(free.size());
+  mean_.setZero(np);
+  information_.setZero(np, np);
+  if (belief) {
+    information_ = belief->information;
+    mean_ = belief->mean;
+    return;
+  }
+  for (Eigen::Index j = 0; j < np; ++j) {
+    const FreeParameter& p = free[static_cast<std::size_t>(j)];
+    mean_[j] = p.prior_mean;
+    if (p.prior_sigma > 0.0) information_(j, j) = 1.0 / (p.prior_sigma * p.prior_sigma);
+  }
+}
+
+Eigen::VectorXd Prior::deviation(const Plant& plant) const {
+  Eigen::VectorXd off(static_cast<Eigen::Index>(free_.size()));
+  for (std::size_t j = 0; j < free_.size(); ++j) {
+    const auto at = static_cast<Eigen::Index>(j);
+    off[at] = plant.find(free_[j].effect)->values[free_[j].index] - mean_[at];
+  }
+  return off;
+}
+
+double Prior::objective(const Plant& plant) const {
+  if (free_.empty()) return 0.0;
+  const Eigen::VectorXd off = deviation(plant);
+  return off.dot(information_ * off);
+}
+
+/// The normal equations of the parameters, with the initial states eliminated (Schur complement). The initial
+/// state of segment s moves by base[s] - back[s] * (step of the parameters).
+struct GaussNewton::ReducedEquations {
+  Matrix information;
+  Eigen::VectorXd score;
+  std::vector<Eigen::Matrix<double, states, Eigen::Dynamic>> back;
+  std::vector<Eigen::Matrix<double, states, 1>> base;
+};
+
+GaussNewton::GaussNewton(const FitData& data, const FitPoint& start, const std::vector<FreeParameter>& free,
+                         const FitOptions& options)
+    : data_(data),
+      free_(free),
+      options_(options),
+      point_(start),
+      prior_(free, options.belief),
+      linearised_(data.segments.size()),
+      former_(data.segments.size()),
+      order_(data.segments.size()) {
+  std::iota(order_.begin(), order_.end(), std::size_t{0});
+}
+
+void GaussNewton::linearise(std::size_t s) {
+  linearise_segment(data_, s, point_, free_, linearised_[s].steps, &linearised_[s].normal);
+}
+
+/// All samples once, whether or not all were looked at: which are may depend on the number of cores.
+void GaussNewton::count_work() {
+  for (const Segment& s : data_.segments) work_samples_ += static_cast<double>(s.last - s.first + 1);
+}
+
+double GaussNewton::evaluate() {
+  count_work();
+  parallel_for(order_.size(), [&](std::size_t i) { linearise(order_[i]); });
+  return objective_of_normals() + prior_.objective(point_.plant);
+}
+
+/// The same after a step. Infinity where one segment, in which the cart sticks or slides for all the others
+/// say, is further off than the others can make up for: the rest are not looked at, and it is looked at first
+/// from then on.
+double GaussNewton::evaluate_step(double promised_fall) {
+  constexpr double out_of_reach = 3.0;
+  count_work();
+  const std::size_t none = order_.size();
+  std::atomic<std::size_t> rejecting_segment = none;
+  parallel_for(order_.size(), [&](std::size_t i) {
+    if (rejecting_segment != none) return;
+    const std::size_t s = order_[i];
+    linearise(s);
+    const double rise =
+        linearised_[s].normal.likelihood.objective() - former_[s].normal.likelihood.objective();
+    if (!(rise < out_of_reach * promised_fall)) rejecting_segment = i;
+  });
+  if (rejecting_segment == none) return objective_of_normals() + prior_.objective(point_.plant);
+  const auto place = order_.begin() + static_cast<std::ptrdiff_t>(rejecting_segment.load());
+  std::rotate(order_.begin(), place, std::next(place));
+  return infinity;
+}
+
+double GaussNewton::objective_of_normals() const {
+  double sum = 0.0;
+  for (const LinearisedSegment& segment : linearised_) sum += segment.normal.likelihood.objective();
+  return sum;
+}
+
+double GaussNewton::sample_count() const {
+  double count = 0.0;
+  for (const LinearisedSegment& segment : linearised_) count += segment.normal.likelihood.samples;
+  return count;
+}
+
+void GaussNewton::descend(double& objective) {
+  double damping = least_damping;
+  converged_ = false;
+  for (int iteration = 0; iteration < options_.most_iterations && std::isfinite(objective) && may_go_on();
+       ++iteration) {
+    const double least_fall = options_.tolerance * sample_count() * 0.1 + 0.02;
+    const double next_objective = try_steps(objective, least_fall, damping);
+    if (!(next_objective < objective)) {
+      converged_ = true;
+      break;
+    }
+    const double fall = objective - next_objective;
+    objective = next_objective;
+    if (fall < least_fall) {
+      converged_ = true;
+      break;
+    }
+  }
+}
+
+/// Goes the first of several steps, each damped more, after which the objective is less: which it is then.
+/// Where none is, the point stays.
+double GaussNewton::try_steps(double objective, double least_fall, double& damping) {
+  const FitPoint former = point_;
+  double next_objective = infinity, rejected = infinity;
+  for (int attempt = 0; attempt < 4; ++attempt) {
+    Step next = step(damping);
+    if (next.promised_fall < least_fall && attempt == 0) next = step(damping = hardly_damped);
+    const bool promises = next.promised_fall >= least_fall;
+    if (!promises && !next.cut_short) break;
+    // A step that hardly differs from one that was rejected is not worth looking at, nor is one that does
+    // not even promise to fall.
+    constexpr double alike = 0.9;
+    if (promises && next.promised_fall < alike * rejected) {
+      point_ = std::move(next.point);
+      linearised_.swap(former_);
+      next_objective = evaluate_step(std::max(next.promised_fall, least_fall));
+      if (next_objective < objective) break;
+      point_ = former;
+      linearised_.swap(former_);
+      rejected = next.promised_fall;
+    }
+    damping = std::max(damping, least_damping) * 30.0;
+  }
+  // Where a step had to be damped, the next one has to be too.
+  if (next_objective < objective && !std::isfinite(rejected))
+    damping = std::max(damping * 0.1, hardly_damped);
+  return next_objective;
+}
+
+GaussNewton::ReducedEquations GaussNewton::eliminate_initial_states(double damping) const {
+  const auto np = static_cast<Eigen::Index>(free_.size());
+  ReducedEquations reduced;
+  reduced.information = prior_.information();
+  reduced.score = -prior_.information() * prior_.deviation(point_.plant);
+  reduced.back.resize(linearised_.size());
+  reduced.base.resize(linearised_.size());
+  for (std::size_t s = 0; s < linearised_.size(); ++s) {
+    const NormalEquations& n = linearised_[s].normal;
+    Eigen::Matrix<double, states, states> hii = n.information.topLeftCorner<states, states>();
+    for (int i = 0; i < states; ++i) hii(i, i) += start_information[i] + damping * hii(i, i);
+    const Eigen::LDLT<Eigen::Matrix<double, states, states>> solver(hii);
+    reduced.back[s] = solver.solve(n.information.topRightCorner(states, np));
+    reduced.base[s] = solver.solve(n.score.head<states>());
+    reduced.information += n.information.bottomRightCorner(np, np) -
+                           n.information.bottomLeftCorner(np, states) * reduced.back[s];
+    reduced.score += n.score.tail(np) - n.information.bottomLeftCorner(np, states) * reduced.base[s];
+  }
+  return reduced;
+}
+
+GaussNewton::Information GaussNewton::information() const {
+  const auto np = static_cast<Eigen::Index>(free_.size());
+  Matrix h = prior_.information(), spread = Matrix::Zero(np, np);
+  for (const LinearisedSegment& segment : linearised_) {
+    const NormalEquations& n = segment.normal;
+    Matrix hii = n.information.topLeftCorner(states, states);
+    for (int i = 0; i < states; ++i) hii(i, i) += start_information[i];
+    const Eigen::LDLT<Matrix> solver(hii);
+    const Matrix back = solver.solve(n.information.topRightCorner(states, np));
+    h += n.information.bottomRightCorner(np, np) - n.information.bottomLeftCorner(np, states) * back;
+    const Eigen::VectorXd score = n.score.tail(np) - back.transpose() * n.score.head(states);
+    spread += score * score.transpose();
+  }
+  const auto segments = static_cast<double>(linearised_.size());
+  const double small_sample = segments > np + 1.0 ? segments / (segments - 1.0) : 2.0;
+  return {h, spread * small_sample};
+}
+
+/// The Gauss-Newton step of all segments: parameters first (initial states eliminated), then each initial
+/// state.
+GaussNewton::Step GaussNewton::step(double damping) const {
+  const ReducedEquations reduced = eliminate_initial_states(damping);
+  Step result{point_};
+  Eigen::VectorXd delta = bounded_step(reduced, damping, result.cut_short);
+  move_parameters(delta, result);
+  const Eigen::VectorXd to_belief = -prior_.information() * prior_.deviation(point_.plant);
+  result.promised_fall = promise(prior_.information(), to_belief, delta);
+  follow_sensors(result.point.starts, point_.plant, result.point.plant);
+  move_initial_states(reduced, delta, result);
+  return result;
+}
+
+/// Moves the parameters, each as far as its bounds let it: `delta` is by how much then.
+void GaussNewton::move_parameters(Eigen::VectorXd& delta, Step& result) const {
+  Plant& plant = result.point.plant;
+  for (Eigen::Index j = 0; j < delta.size(); ++j) {
+    const FreeParameter& p = free_[static_cast<std::size_t>(j)];
+    PlantEffect effect = *plant.find(p.effect);
+    const double wanted = effect.values[p.index] + delta[j], moved = std::clamp(wanted, p.low, p.high);
+    result.cut_short = result.cut_short || moved != wanted;
+    delta[j] = moved - effect.values[p.index];
+    effect.values[p.index] = moved;
+    plant.set(p.effect, effect.values);
+  }
+}
+
+/// Moves the initial states after the parameters, none further than makes sense.
+void GaussNewton::move_initial_states(const ReducedEquations& reduced, const Eigen::VectorXd& delta,
+                                      Step& result) const {
+  constexpr double longest[states] = {0.01, 0.3, 0.5, 3.0, 0.01};
+  Eigen::VectorXd way(states + delta.size());
+  way.tail(delta.size()) = delta;
+  for (std::size_t s = 0; s < linearised_.size(); ++s) {
+    const auto values = as_array(result.point.starts[s]);
+    way.head(states) = reduced.base[s] - reduced.back[s] * delta;
+    for (int i = 0; i < states; ++i) {
+      result.cut_short = result.cut_short || std::abs(way[i]) > longest[i];
+      way[i] = std::clamp(way[i], -longest[i], longest[i]);
+      *values[static_cast<std::size_t>(i)] += way[i];
+    }
+    result.promised_fall += promise(linearised_[s].normal.information, linearised_[s].normal.score, way);
+  }
+}
+
+/// Solves for the parameters; those held at a bound by the data stay there, and no step is longer than makes
+/// sense.
+Eigen::VectorXd GaussNewton::bounded_step(const ReducedEquations& reduced, double damping,
+                                          bool& cut_short) const {
+  const Eigen::Index np = reduced.score.size();
+  std::vector<bool> held(static_cast<std::size_t>(np), false);
+  Eigen::VectorXd delta = Eigen::VectorXd::Zero(np);
+  for (int pass = 0; pass < 3; ++pass) {
+    std::vector<Eigen::Index> moving;
+    for (Eigen::Index j = 0; j < np; ++j)
+      if (!held[static_cast<std::size_t>(j)]) moving.push_back(j);
+    if (moving.empty()) break;
+    const Eigen::VectorXd solved = solve_for(moving, reduced, damping);
+    delta.setZero();
+    bool again = false;
+    for (std::size_t a = 0; a < moving.size(); ++a) {
+      const Eigen::Index j = moving[a];
+      const FreeParameter& p = free_[static_cast<std::size_t>(j)];
+      const double value = point_.plant.find(p.effect)->values[p.index];
+      const double limit = longest_step(p, value), at = solved[static_cast<Eigen::Index>(a)];
+      const double wanted = std::isfinite(at) ? at * p.scale : 0.0;
+      delta[j] = std::clamp(wanted, -limit, limit);
+      cut_short = cut_short || delta[j] != wanted;
+      const bool below = value <= p.low && delta[j] < 0.0;
+      const bool above = value >= p.high && delta[j] > 0.0;
+      if (below || above) held[static_cast<std::size_t>(j)] = again = true;
+    }
+    if (!again) break;
+  }
+  return delta;
+}
+
+/// The damped step of those parameters that move, each in units of its scale.
+Eigen::VectorXd GaussNewton::solve_for(const std::vector<Eigen::Index>& moving,
+                                       const ReducedEquations& reduced, double damping) const {
+  const auto n = static_cast<Eigen::Index>(moving.size());
+  const auto number = [&](Eigen::Index a) { return moving[static_cast<std::size_t>(a)]; };
+  const auto scale = [&](Eigen::Index a) { return free_[static_cast<std::size_t>(number(a))].scale; };
+  Matrix small(n, n);
+  Eigen::VectorXd right(n);
+  for (Eigen::Index a = 0; a < n; ++a) {
+    right[a] = reduced.score[number(a)] * scale(a);
+    for (Eigen::Index b = 0; b < n; ++b)
+      small(a, b) = reduced.information(number(a), number(b)) * scale(a) * scale(b);
+  }
+  for (Eigen::Index a = 0; a < n; ++a) small(a, a) += damping * small(a, a) + 1e-6;
+  return small.ldlt().solve(right);
+}
+
+}  // namespace upright

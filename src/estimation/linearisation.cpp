@@ -1,0 +1,379 @@
+// The dual-number instantiations of plant and engine. They take longer to compile than all else together and
+// are therefore alone in this file.
+#include "linearisation.hpp"
+
+#include <ceres/jet.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include "sensor_gains.hpp"
+#include "state_vector.hpp"
+#include "upright/model/elementary.hpp"
+#include "upright/sim/simulator.hpp"
+
+namespace upright {
+
+namespace {
+
+constexpr int states = state_count;
+
+EngineOptions engine_options() {
+  EngineOptions options;
+  options.max_step_s = 4e-3;
+  options.step_fraction = 0.5;
+  options.resolve_bristles = false;
+  options.quick_derivatives = true;
+  options.event_tolerance_s = 1e-9;
+  return options;
+}
+
+/// The voltage after a motor lag at the start of a segment, from the commands since sample k. The lag is
+/// linear: it is followed exactly over the part of the record that it still remembers.
+template <class S>
+S lagged_voltage(const Dynamics<S>& dynamics, const Measurement& run, std::size_t k, std::size_t first) {
+  const double start = run.time_s[first];
+  S lagged = dynamics.actuate(S(k == 0 ? 0.0 : run.voltage_v[k]));
+  S acting = lagged;
+  S now = S(run.time_s[k]);
+  const auto relax = [&](const S& until) {
+    lagged =
+        acting + (lagged - acting) * elementary::exp(S(-(until - now) / dynamics.motor_time_constant_s()));
+    now = until;
+  };
+  for (std::size_t j = k; j < first; ++j) {
+    const S acts = S(run.time_s[j]) + dynamics.input_delay_s();
+    if (value_of(acts) >= start) break;
+    relax(acts);
+    acting = dynamics.actuate(S(run.voltage_v[j]));
+  }
+  relax(S(start));
+  return lagged;
+}
+
+/// Brings a simulator to the start of a segment with the commands that can still be acting there. Before the
+/// record the motor had no voltage.
+template <class S>
+void start_segment(Simulator<S>& simulator, const Measurement& run, const Segment& segment,
+                   PlantState<S> state) {
+  const Dynamics<S>& dynamics = simulator.engine().dynamics();
+  const double delay = value_of(dynamics.input_delay_s());
+  const double start = run.time_s[segment.first];
+  double history = delay;
+  if (dynamics.has_motor_lag()) history += 12.0 * value_of(dynamics.motor_time_constant_s());
+  std::size_t k = segment.first;
+  while (k > 0 && run.time_s[k] >= start - history) --k;
+  if (dynamics.has_motor_lag()) state.motor_v = lagged_voltage(dynamics, run, k, segment.first);
+  double acting_v = k == 0 ? 0.0 : run.voltage_v[k];
+  std::size_t next = k;
+  while (next < segment.first && run.time_s[next] + delay < start) acting_v = run.voltage_v[next++];
+  simulator.start(state, start, acting_v);
+  for (; next < segment.first; ++next) simulator.command(run.time_s[next], run.voltage_v[next]);
+}
+
+double measured(const Measurement& run, int channel, std::size_t k) {
+  return channel == 0 ? run.cart_m[k] : run.theta_rad[k];
+}
+
+double weight_of(const Measurement& run, int channel, std::size_t k) {
+  const std::vector<double>& weights = channel == 0 ? run.cart_weight : run.theta_weight;
+  return weights.empty() ? 1.0 : weights[k];
+}
+
+/// Adds a filter's correction to the state of an engine.
+template <class S>
+void correct_state(EventEngine<S>& engine, const double (&correction)[states]) {
+  if (std::all_of(correction, correction + states, [](double u) { return u == 0.0; })) return;
+  PlantState<S> state = engine.state();
+  const auto values = as_array(state);
+  for (int i = 0; i < states; ++i) *values[static_cast<std::size_t>(i)] += S(correction[i]);
+  engine.correct(state);
+}
+
+/// At which a cart at rest begins to slide, in the direction in which it does so sooner.
+template <class S>
+double least_dry_level(const Dynamics<S>& dynamics, const S& cart_m) {
+  return std::min(value_of(dynamics.cart_dry_level(cart_m, S(0.0), S(1.0))),
+                  value_of(dynamics.cart_dry_level(cart_m, S(0.0), S(-1.0))));
+}
+
+/// What the cart's sensor shows of a unit of its speed: through back-EMF a drive that gives way is set back.
+/// Too little to count in a filter's gain, but derivatives are of all that is shown.
+template <class S>
+double shown_of_cart_speed_s(const Dynamics<S>& dynamics) {
+  PlantState<S> unit;
+  unit.cart_mps = S(1.0);
+  return value_of(dynamics.measure(unit).cart_m) - value_of(dynamics.measure(PlantState<S>{}).cart_m);
+}
+
+/// Adds weight * row * row', of which the lower triangle counts: whole columns are of a length that SIMD
+/// likes.
+template <int N>
+void add_square(const Eigen::Matrix<double, N, 1>& row, double weight, int columns,
+                Eigen::Matrix<double, N, N>& sum) {
+  for (int j = 0; j < columns; ++j) sum.col(j) += (weight * row[j]) * row;
+}
+
+/// How a white force and torque enter the velocities. They are pushed through the plant file's own masses:
+/// were they the fitted ones, the fit could shrink its noise by making the plant heavier.
+class NoiseInput {
+ public:
+  NoiseInput(const Plant& plant, bool cart_locked)
+      : cart_locked_(cart_locked),
+        has_pendulum_(plant.pendulum.has_value()),
+        total_mass_(plant.cart_mass_kg + (plant.pendulum ? plant.pendulum->mass_kg : 0.0)),
+        coupling_(plant.pendulum ? plant.pendulum->mass_kg * plant.pendulum->length_to_com_m : 0.0),
+        inertia_(plant.pendulum ? plant.pendulum->inertia_about_pivot_kgm2() : 1.0) {}
+
+  void set(LinearStep& step, double theta_rad) const {
+    const double off = coupling_ * std::cos(theta_rad);
+    if (cart_locked_) {
+      step.by_force[0] = step.by_force[1] = step.by_torque[0] = 0.0;
+      step.by_torque[1] = 1.0 / inertia_;
+    } else if (!has_pendulum_) {
+      step.by_force[0] = 1.0 / total_mass_;
+      step.by_force[1] = step.by_torque[0] = step.by_torque[1] = 0.0;
+    } else {
+      const double determinant = total_mass_ * inertia_ - off * off;
+      step.by_force[0] = inertia_ / determinant;
+      step.by_force[1] = step.by_torque[0] = -off / determinant;
+      step.by_torque[1] = total_mass_ / determinant;
+    }
+  }
+
+ private:
+  bool cart_locked_, has_pendulum_;
+  double total_mass_, coupling_, inertia_;
+};
+
+/// Sums the objective of a segment by blocks of time.
+class BlockSums {
+ public:
+  explicit BlockSums(std::vector<double>& blocks) : blocks_(blocks) { blocks_.clear(); }
+
+  /// The objective of all samples up to one at `time_s`.
+  void reach(double time_s, double objective) {
+    constexpr double block_s = 0.25;
+    if (time_s >= block_end_s_) {
+      blocks_.push_back(0.0);
+      block_end_s_ = time_s + block_s;
+    }
+    blocks_.back() += objective - counted_;
+    counted_ = objective;
+  }
+
+ private:
+  std::vector<double>& blocks_;
+  double block_end_s_ = -std::numeric_limits<double>::infinity(), counted_ = 0.0;
+};
+
+/// Follows a segment with dual numbers of N derivatives, a sample at a time; chains the derivatives and
+/// whitens them on the way. As in the dual numbers stands in every row: initial state first, then parameters,
+/// then nothing.
+template <int N>
+class SegmentLineariser {
+ public:
+  SegmentLineariser(const Measurement& run, const Segment& segment, const FitPoint& point,
+                    const PlantState<double>& start, const std::vector<FreeParameter>& free)
+      : run_(run),
+        segment_(segment),
+        columns_(states + static_cast<int>(free.size())),
+        simulator_(model_of(run, point.plant, free), engine_options(), 64 + segment.last - segment.first),
+        sensors_(sensor_gains(dynamics())),
+        shown_of_speed_s_(shown_of_cart_speed_s(dynamics())),
+        noise_input_(point.plant, run.cart_locked),
+        covariance_(run, point.plant, point.noise) {
+    PlantState<Jet> state = without_bristles(start);
+    state.bristle_m = Jet(start.bristle_m);
+    start_segment(simulator_, run, segment, state);
+    // A correction is in the sensors' units: to a state it is worth as much less as they show more of it.
+    for (std::size_t channel = 0; channel < 2; ++channel)
+      worth_less_[channel] = sensors_[channel].v / sensors_[channel].a;
+    start_sensitivity(start);
+  }
+
+  /// With the normal equations, or for a null pointer without.
+  void run(std::vector<LinearStep>& steps, NormalEquations* normal) {
+    steps.resize(segment_.last - segment_.first + 1);
+    NormalEquations unused;
+    NormalEquations& sums = normal != nullptr ? *normal : unused;
+    sums.information.setZero(columns_, columns_);
+    sums.score.setZero(columns_);
+    sums.likelihood = {};
+    BlockSums blocks(sums.blocks);
+    for (std::size_t k = segment_.first; k <= segment_.last; ++k) {
+      LinearStep& step = steps[k - segment_.first];
+      const Outputs<Jet> outputs = simulate_to(k, step);
+      if (k != segment_.first) {
+        covariance_.predict(step);
+        if (normal != nullptr) carry_sensitivity(step);
+      }
+      if (!update(step, outputs, normal)) return;
+      correct_state(simulator_.engine(), step.correction);
+      if (normal != nullptr) blocks.reach(run_.time_s[k], sums.likelihood.objective());
+    }
+    if (normal == nullptr) return;
+    const Eigen::Matrix<double, N, N> whole = information_.template selfadjointView<Eigen::Lower>();
+    sums.information = whole.topLeftCorner(columns_, columns_);
+    sums.score = score_.head(columns_);
+  }
+
+ private:
+  using Jet = ceres::Jet<double, N>;
+  using Row = Eigen::Matrix<double, N, 1>;
+
+  static PlantModel<Jet> model_of(const Measurement& run, const Plant& plant,
+                                  const std::vector<FreeParameter>& free) {
+    PlantModel<Jet> model = make_model<Jet>(plant, run.cart_locked);
+    for (std::size_t j = 0; j < free.size(); ++j)
+      model.parameters[effect_parameter_offset(free[j].effect) + free[j].index]
+          .v[states + static_cast<int>(j)] = 1.0;
+    return model;
+  }
+
+  static PlantState<Jet> without_bristles(const PlantState<double>& state) {
+    return {Jet(state.cart_m), Jet(state.theta_rad), Jet(state.cart_mps), Jet(state.theta_radps)};
+  }
+
+  const Dynamics<Jet>& dynamics() const { return simulator_.engine().dynamics(); }
+
+  std::array<const Jet*, states> reached_state() const {
+    const PlantState<Jet>& reached = simulator_.engine().state();
+    return {&reached.cart_m, &reached.theta_rad, &reached.cart_mps, &reached.theta_radps, &reached.bristle_m};
+  }
+
+  void start_sensitivity(const PlantState<double>& start) {
+    for (int i = 0; i < states; ++i) sensitivity_[static_cast<std::size_t>(i)] = Row::Unit(i);
+    // Parameters of the sensors change what is meant by what they show at the start, not what they show.
+    const Outputs<Jet> shown = dynamics().measure(without_bristles(start));
+    sensitivity_[0] -= shown.cart_m.v / sensors_[0].a;
+    sensitivity_[1] -= shown.theta_rad.v / sensors_[1].a;
+    sensitivity_[2] -= start.cart_mps * worth_less_[0];
+    sensitivity_[3] -= start.theta_radps * worth_less_[1];
+  }
+
+  /// Simulates to sample k, and fills what of its step does not depend on the filter.
+  Outputs<Jet> simulate_to(std::size_t k, LinearStep& step) {
+    const bool first = k == segment_.first;
+    step.period_s = first ? 0.0 : run_.time_s[k] - run_.time_s[k - 1];
+    // Each sample starts with fresh unit derivatives.
+    simulator_.engine().seed();
+    if (!first) {
+      simulator_.command(run_.time_s[k - 1], run_.voltage_v[k - 1]);
+      simulator_.advance_to(run_.time_s[k]);
+    }
+    const PlantState<Jet>& reached = simulator_.engine().state();
+    const std::array<const Jet*, states> end = reached_state();
+    for (int i = 0; i < states; ++i)
+      for (int j = 0; j < states; ++j)
+        step.transition[i][j] = first ? (i == j ? 1.0 : 0.0) : end[static_cast<std::size_t>(i)]->v[j];
+    set_holds(step);
+    const Outputs<Jet> outputs = simulator_.engine().outputs();
+    const double simulated[2] = {value_of(outputs.cart_m), value_of(outputs.theta_rad)};
+    for (int channel = 0; channel < 2; ++channel) {
+      step.gain[channel] = value_of(sensors_[static_cast<std::size_t>(channel)]);
+      step.weight[channel] = weight_of(run_, channel, k);
+      step.residual[channel] =
+          covariance_.present(channel) ? measured(run_, channel, k) - simulated[channel] : 0.0;
+    }
+    step.rate[0] = value_of(reached.cart_mps);
+    step.rate[1] = value_of(reached.theta_radps);
+    noise_input_.set(step, value_of(reached.theta_rad));
+    return outputs;
+  }
+
+  void set_holds(LinearStep& step) const {
+    const EventEngine<Jet>& engine = simulator_.engine();
+    step.holds[0] = step.holds[1] = 0.0;
+    if (!run_.cart_locked && !dynamics().has_bristle_state() && engine.cart_at_rest())
+      step.holds[0] = least_dry_level(dynamics(), engine.state().cart_m);
+    if (dynamics().has_pendulum() && engine.pivot_at_rest())
+      step.holds[1] = value_of(dynamics().pivot_dry_level());
+  }
+
+  void carry_sensitivity(const LinearStep& step) {
+    const std::array<const Jet*, states> end = reached_state();
+    const std::array<Row, states> former = sensitivity_;
+    for (std::size_t i = 0; i < states; ++i) {
+      Row moved = end[i]->v;
+      moved.template head<states>().setZero();
+      for (std::size_t j = 0; j < states; ++j)
+        if (step.transition[i][j] != 0.0) moved += step.transition[i][j] * former[j];
+      sensitivity_[i] = moved;
+    }
+  }
+
+  /// Updates the filter with each channel in turn. False for a value that is not finite.
+  bool update(LinearStep& step, const Outputs<Jet>& outputs, NormalEquations* normal) {
+    std::fill(step.correction, step.correction + states, 0.0);
+    for (int channel = 0; channel < 2; ++channel) {
+      if (!covariance_.present(channel)) continue;
+      covariance_.update(step, channel);
+      step.variance[channel] = covariance_.variance();
+      std::copy(covariance_.gain(), covariance_.gain() + states, step.update[channel]);
+      const double e = step.residual[channel] - step.gain[channel] * step.correction[channel];
+      step.innovation[channel] = e;
+      for (int i = 0; i < states; ++i) step.correction[i] += covariance_.gain()[i] * e;
+      if (normal == nullptr) continue;
+      normal->likelihood.add(e, covariance_.variance(), step.weight[channel]);
+      if (!std::isfinite(e)) return false;
+      add_innovation(step, channel, outputs);
+    }
+    return true;
+  }
+
+  /// Adds an innovation to the normal equations, and corrects the sensitivities as the filter does the state.
+  void add_innovation(const LinearStep& step, int channel, const Outputs<Jet>& outputs) {
+    const PlantState<Jet>& reached = simulator_.engine().state();
+    const double e = step.innovation[channel];
+    // Of what the sensor shows, what is its own, and what comes with the state.
+    Row row = channel == 0 ? outputs.cart_m.v : outputs.theta_rad.v;
+    row -= step.gain[channel] * reached_state()[static_cast<std::size_t>(channel)]->v;
+    if (channel == 0) row -= shown_of_speed_s_ * reached.cart_mps.v;
+    row.template head<states>().setZero();
+    row += step.gain[channel] * sensitivity_[static_cast<std::size_t>(channel)];
+    if (channel == 0) row += shown_of_speed_s_ * sensitivity_[2];
+    const double weight = step.weight[channel] / covariance_.variance();
+    add_square(row, weight, columns_, information_);
+    score_ += (weight * e) * row;
+    for (std::size_t i = 0; i < states; ++i) {
+      if (covariance_.gain()[i] == 0.0) continue;
+      sensitivity_[i] -= covariance_.gain()[i] * row;
+      const std::size_t sensor = i % 2 == 0 ? 0 : 1;  // x, v and the bristles; theta and omega
+      sensitivity_[i] -= covariance_.gain()[i] * e * worth_less_[sensor];
+    }
+  }
+
+  const Measurement& run_;
+  const Segment& segment_;
+  int columns_;
+  Simulator<Jet> simulator_;
+  std::array<Jet, 2> sensors_;
+  std::array<Row, 2> worth_less_;
+  double shown_of_speed_s_;
+  NoiseInput noise_input_;
+  EkfCovariance covariance_;
+  std::array<Row, states> sensitivity_;  ///< of the state that the filter estimates
+  Eigen::Matrix<double, N, N> information_ = Eigen::Matrix<double, N, N>::Zero();
+  Row score_ = Row::Zero();
+};
+
+}  // namespace
+
+void linearise_segment(const FitData& data, std::size_t s, const FitPoint& point,
+                       const std::vector<FreeParameter>& free, std::vector<LinearStep>& steps,
+                       NormalEquations* normal) {
+  const Segment& segment = data.segments[s];
+  const auto with = [&]<int N>() {
+    SegmentLineariser<N>((*data.runs)[segment.run], segment, point, point.starts[s], free).run(steps, normal);
+  };
+  const std::size_t slots = free.size() + states;
+  if (slots <= 8) return with.template operator()<8>();
+  if (slots <= 16) return with.template operator()<16>();
+  if (slots <= 24) return with.template operator()<24>();
+  return with.template operator()<32>();
+}
+
+}  // namespace upright

@@ -1,0 +1,32 @@
+// A segment followed by the extended Kalman filter and linearised along its trajectory, with the normal
+// equations of its initial state and of the free parameters.
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "extended_kalman_filter.hpp"
+#include "upright/estimation/fit.hpp"
+
+namespace upright {
+
+/// Of one segment: initial state (first) and parameters, whitened.
+struct NormalEquations {
+  Eigen::MatrixXd information;
+  Eigen::VectorXd score;
+  Likelihood likelihood;
+  std::vector<double> blocks;  ///< its objective, a stretch of time at a time
+};
+
+struct LinearisedSegment {
+  std::vector<LinearStep> steps;
+  NormalEquations normal;
+};
+
+/// Linearises segment number `s` of the data. Without free parameters `normal` may be null: then there are
+/// steps alone. A residual that is not finite ends it, with an infinite likelihood.
+void linearise_segment(const FitData& data, std::size_t s, const FitPoint& point,
+                       const std::vector<FreeParameter>& free, std::vector<LinearStep>& steps,
+                       NormalEquations* normal);
+
+}  // namespace upright

@@ -1,0 +1,154 @@
+#include "noise_estimation.hpp"
+
+#include <algorithm>
+#include <array>
+
+#include "base/parallel.hpp"
+#include "extended_kalman_filter.hpp"
+
+namespace upright {
+
+namespace {
+
+constexpr int states = LinearStep::states;
+
+/// Likelihood of a segment that is linearised, had the noise been another: to first order the filtered
+/// trajectory moves by what the other gains would have corrected.
+Likelihood likelihood_with_noise(const std::vector<LinearStep>& steps, const Measurement& run,
+                                 const Plant& plant, const Noise& noise) {
+  EkfCovariance covariance(run, plant, noise);
+  Likelihood sum;
+  double shift[states] = {}, moved[states];
+  for (std::size_t k = 0; k < steps.size(); ++k) {
+    const LinearStep& step = steps[k];
+    if (k > 0) {
+      covariance.predict(step);
+      for (int i = 0; i < states; ++i) {
+        moved[i] = 0.0;
+        for (int j = 0; j < states; ++j) moved[i] += step.transition[i][j] * shift[j];
+      }
+      std::copy(moved, moved + states, shift);
+    }
+    double update[states] = {};
+    for (int channel = 0; channel < 2; ++channel) {
+      if (!covariance.present(channel)) continue;
+      covariance.update(step, channel);
+      const double c = step.gain[channel];
+      const double e = step.residual[channel] - c * (shift[channel] + update[channel]);
+      sum.add(e, covariance.variance(), step.weight[channel]);
+      for (int i = 0; i < states; ++i) update[i] += covariance.gain()[i] * e;
+    }
+    for (int i = 0; i < states; ++i) shift[i] += update[i] - step.correction[i];
+  }
+  return sum;
+}
+
+/// One number of the noise, of which the likelihood's maximum is sought.
+struct NoiseParameter {
+  double Noise::*value;
+  double smallest, largest;  ///< below the smallest it is `least`
+  double least;
+  bool used;
+  int tried_at = -1;  ///< after so many changes of the noise neither way was better
+  bool off = false;   ///< nothing, and better so then: the step from there is the same whatever the factor
+
+  double moved(double now, double move) const {
+    const double to = now == 0.0 ? (move > 1.0 ? smallest * 10.0 : 0.0) : now * move;
+    return to < smallest ? least : std::min(to, largest);
+  }
+};
+
+std::array<NoiseParameter, 4> noise_parameters(const FitData& data, const Plant& plant) {
+  bool cart = false, pendulum = false;
+  for (const Measurement& run : *data.runs) {
+    cart = cart || run.has_cart();
+    pendulum = pendulum || (run.has_theta() && plant.pendulum);
+  }
+  return {NoiseParameter{&Noise::force, 1e-5, 10.0, 0.0, cart},
+          NoiseParameter{&Noise::torque, 1e-7, 1.0, 0.0, pendulum},
+          NoiseParameter{&Noise::jitter_s, 1e-6, 1e-2, 0.0, true},
+          NoiseParameter{&Noise::sensors, 1.0, 1e3, 1.0, true}};
+}
+
+/// A pattern search for the noise of a point.
+class PatternSearch {
+ public:
+  PatternSearch(const FitData& data, const std::vector<LinearisedSegment>& linearised, FitPoint& point)
+      : data_(data),
+        linearised_(linearised),
+        point_(point),
+        parameters_(noise_parameters(data, point.plant)),
+        objective_(objective_of(point.noise)) {}
+
+  double objective() const { return objective_; }
+
+  /// Multiplies and divides each parameter by a factor until neither is better, three times round at most.
+  void search(double factor) {
+    for (NoiseParameter& parameter : parameters_)
+      if (!parameter.off) parameter.tried_at = -1;
+    int so_far = -1;
+    for (int sweep = 0; sweep < 3 && changes_ != so_far; ++sweep) {
+      so_far = changes_;
+      for (NoiseParameter& parameter : parameters_) {
+        if (!parameter.used || parameter.tried_at == changes_) continue;
+        int moves = line_search(parameter, factor);
+        if (moves == 0) moves = line_search(parameter, 1.0 / factor);
+        parameter.tried_at = changes_ += moves;
+      }
+    }
+  }
+
+ private:
+  double objective_of(const Noise& noise) const {
+    return noise_objective(data_, point_.plant, linearised_, noise);
+  }
+
+  /// Moves a parameter of the noise one way for as long as the objective falls; returns how often it did.
+  int line_search(NoiseParameter& parameter, double move) {
+    constexpr double falls = 1e-3;
+    for (int moves = 0;; ++moves) {
+      Noise next = point_.noise;
+      const double now = next.*parameter.value;
+      next.*parameter.value = parameter.moved(now, move);
+      if (next.*parameter.value == now) return moves;
+      const double reached = objective_of(next);
+      if (!(reached < objective_ - falls)) {
+        parameter.off = now == 0.0;
+        return moves;
+      }
+      objective_ = reached;
+      point_.noise = next;
+    }
+  }
+
+  const FitData& data_;
+  const std::vector<LinearisedSegment>& linearised_;
+  FitPoint& point_;
+  std::array<NoiseParameter, 4> parameters_;
+  double objective_;
+  int changes_ = 0;
+};
+
+}  // namespace
+
+double noise_objective(const FitData& data, const Plant& plant,
+                       const std::vector<LinearisedSegment>& linearised, const Noise& noise) {
+  std::vector<double> parts(data.segments.size());
+  parallel_for(parts.size(), [&](std::size_t s) {
+    parts[s] = likelihood_with_noise(linearised[s].steps, (*data.runs)[data.segments[s].run], plant, noise)
+                   .objective();
+  });
+  double sum = 0.0;
+  for (const double part : parts) sum += part;
+  return sum;
+}
+
+double estimate_noise(const FitData& data, const std::vector<LinearisedSegment>& linearised,
+                      const std::vector<double>& factors, FitPoint& point) {
+  PatternSearch pattern(data, linearised, point);
+  const double before = pattern.objective();
+  for (const double factor : factors) pattern.search(factor);
+  return before - pattern.objective();
+}
+
+}  // namespace upright

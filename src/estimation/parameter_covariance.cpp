@@ -1,0 +1,59 @@
+#include "parameter_covariance.hpp"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <cmath>
+namespace upright {
+
+namespace {
+
+using Matrix = Eigen::MatrixXd;
+
+/// Inverse of an information matrix. What holds no information at all is left out (zeros); combinations of
+/// the others that hold none are as good as unknown.
+Matrix inverse_of(const Matrix& h) {
+  const Eigen::VectorXd scale =
+      h.diagonal().unaryExpr([](double v) { return v > 1e-200 ? 1.0 / std::sqrt(v) : 0.0; });
+  const Eigen::SelfAdjointEigenSolver<Matrix> solver(scale.asDiagonal() * h * scale.asDiagonal());
+  constexpr double least = 1e-13;
+  const Eigen::VectorXd inverse = solver.eigenvalues().cwiseMax(least).cwiseInverse();
+  return scale.asDiagonal() * solver.eigenvectors() * inverse.asDiagonal() *
+         solver.eigenvectors().transpose() * scale.asDiagonal();
+}
+
+/// The scatter of the scores over segments, but in no direction less than the likelihood itself says: noise
+/// that is whiter than it looks must not shrink an interval.
+Matrix robust_spread(const Matrix& information, const Matrix& spread) {
+  const Eigen::VectorXd scale = information.diagonal().cwiseMax(1e-300).cwiseSqrt();
+  const Eigen::VectorXd unscale = scale.cwiseInverse();
+  Matrix unit = unscale.asDiagonal() * information * unscale.asDiagonal();
+  unit.diagonal().array() += 1e-12;
+  const Eigen::LLT<Matrix> root(unit);
+  if (root.info() != Eigen::Success) return information;
+  Matrix relative = root.matrixL().solve(Matrix(unscale.asDiagonal() * spread * unscale.asDiagonal()));
+  relative = root.matrixL().solve(Matrix(relative.transpose()));
+  const Eigen::SelfAdjointEigenSolver<Matrix> solver(0.5 * (relative + relative.transpose()));
+  const Eigen::VectorXd raised = solver.eigenvalues().cwiseMax(1.0);
+  const Matrix half = scale.asDiagonal() * Matrix(root.matrixL()) * solver.eigenvectors();
+  return half * raised.asDiagonal() * half.transpose();
+}
+
+Matrix without_held(Matrix h, const std::vector<bool>& held) {
+  for (std::size_t j = 0; j < held.size(); ++j) {
+    if (!held[j]) continue;
+    const auto at = static_cast<Eigen::Index>(j);
+    h.row(at).setZero();
+    h.col(at).setZero();
+  }
+  return h;
+}
+
+}  // namespace
+
+Matrix sandwich_covariance(const Matrix& information, const Matrix& spread, const Matrix& prior,
+                           const std::vector<bool>& held) {
+  const Matrix inverse = inverse_of(without_held(information, held));
+  return inverse * (robust_spread(information - prior, spread) + prior) * inverse;
+}
+
+}  // namespace upright

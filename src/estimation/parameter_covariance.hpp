@@ -1,0 +1,16 @@
+// How well the data determine the free parameters.
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+namespace upright {
+
+/// Covariance of the parameters, robust to noise that is not white (sandwich estimator): from the information
+/// of likelihood and prior together, the scatter of the scores over segments, and the information of the
+/// prior. `held`: of each parameter whether it stands at a bound. Such a one is not estimated but held there,
+/// and lends the others no doubt.
+Eigen::MatrixXd sandwich_covariance(const Eigen::MatrixXd& information, const Eigen::MatrixXd& spread,
+                                    const Eigen::MatrixXd& prior, const std::vector<bool>& held);
+
+}  // namespace upright

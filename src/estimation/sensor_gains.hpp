@@ -1,0 +1,19 @@
+// What the sensors show of the state, to which they are linear.
+#pragma once
+
+#include <array>
+
+#include "upright/model/dynamics.hpp"
+
+namespace upright {
+
+/// Of a unit of cart and pendulum.
+template <class S>
+std::array<S, 2> sensor_gains(const Dynamics<S>& dynamics) {
+  PlantState<S> unit;
+  unit.cart_m = unit.theta_rad = S(1.0);
+  const Outputs<S> at_0 = dynamics.measure(PlantState<S>{}), at_1 = dynamics.measure(unit);
+  return {at_1.cart_m - at_0.cart_m, at_1.theta_rad - at_0.theta_rad};
+}
+
+}  // namespace upright
