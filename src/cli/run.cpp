@@ -93,6 +93,7 @@ RunSetup make_setup(const Arguments& arguments) {
   const Calibration& encoders = setup.rig.calibration;
   setup.control = with_encoders(setup.control, encoders.cart.per_count, encoders.pendulum.per_count);
   require_link_fits(setup.rig, setup.control.period_s());
+  require_spin_fits(arguments.realtime.spin_us.value_or(setup.rig.spin_us), setup.control.period_s());
   if (arguments.theta0_deg) setup.theta0_rad = *arguments.theta0_deg / degrees_per_rad;
   setup.limits = rig_limits(setup.rig, model_of(arguments, setup));
   setup.limits.periods =

@@ -9,6 +9,7 @@
 #include "runtime/overrun_limit.hpp"
 #include "upright/base/error.hpp"
 #include "upright/hal/rig_factory.hpp"
+#include "upright/runtime/session.hpp"
 
 namespace upright {
 
@@ -150,6 +151,7 @@ Agreement agreement_of(const RunFiles& files) {
   if (files.rig && files.control) {
     try {
       require_link_fits(*files.rig, files.control->period_s());
+      require_spin_fits(files.rig->spin_us, files.control->period_s());
     } catch (const ConfigError& error) {
       agreement.errors.emplace_back(error.what());
     }

@@ -60,6 +60,16 @@ std::uint64_t default_periods_late(double period_s) {
   return std::max(at_least, static_cast<std::uint64_t>(std::ceil(tolerated_s / period_s)));
 }
 
+void require_spin_fits(double spin_us, double period_s) {
+  // A loop of real-time priority leaves the other half of its processor to the kernel and to everybody else.
+  constexpr double largest_share = 0.5;
+  if (1e-6 * spin_us <= largest_share * period_s) return;
+  throw ConfigError("the loop would spend " + exact_text(spin_us) + " us of each period of " +
+                    exact_text(period_s) +
+                    " s awake: give spin_us in the rig file, or --spin, at most half a period, or lower "
+                    "sample_rate_hz in the gain file");
+}
+
 LoopLimits rig_limits(const RigFile& rig, const std::optional<Plant>& plant) {
   LoopLimits limits;
   limits.track_limit_m = rig.track_limit_m;
@@ -109,14 +119,8 @@ namespace {
 
 /// The spin asked for, or the rig file's, into the rig and the limits that the run is logged with.
 void set_spin(RunSetup& setup, const RealtimeRequest& request) {
-  // A loop of real-time priority leaves the other half of its processor to the kernel and to everybody else.
-  constexpr double largest_share = 0.5;
   setup.rig.spin_us = request.spin_us.value_or(setup.rig.spin_us);
-  const double most_us = largest_share * 1e6 * setup.control.period_s();
-  if (setup.rig.spin_us > most_us)
-    throw ConfigError("the loop would spin for " + exact_text(setup.rig.spin_us) + " us of a period of " +
-                      exact_text(1e6 * setup.control.period_s()) +
-                      " us: give --spin, or spin_us in the rig file, at most half a period");
+  require_spin_fits(setup.rig.spin_us, setup.control.period_s());
   setup.limits.spin_ns = std::llround(1e3 * setup.rig.spin_us);
 }
 

@@ -19,6 +19,9 @@ namespace upright {
 /// hiccups of a kernel without real-time scheduling, well below the time in which the pendulum falls.
 std::uint64_t default_periods_late(double period_s);
 
+/// Throws ConfigError where the loop would spend more of each period awake than it may.
+void require_spin_fits(double spin_us, double period_s);
+
 /// What a rig file limits of a run: track, coast, fall, watchdog, and what the watch on the encoders assumes
 /// (the file's section `encoder_watch`, and what a plant of the rig implies where one is known; the widest of
 /// both); and whether somebody checked its signs. `periods`, `most_periods_late` and `delay_exceeded` are
