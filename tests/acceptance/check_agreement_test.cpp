@@ -64,6 +64,16 @@ TEST(CheckTogether, RefusesALineWhoseBytesTakeLongerThanThePeriod) {
   EXPECT_EQ(run_upright("run --unchecked --rig " + slow.string() + " --gains " + serial_gains).exit_code, 2);
 }
 
+TEST(CheckTogether, RefusesASpinOfMostOfThePeriodAsRunDoes) {
+  const Change spin{"", simulated, "watchdog_s:", "spin_us: 600\nwatchdog_s:", serial_gains, ""};
+  EXPECT_EQ(check(spin).exit_code, 0) << "600 us of 5 ms";
+  Change most = spin;
+  most.beside = fast_gains;
+  EXPECT_EQ(check(most).exit_code, 2);
+  EXPECT_NE(check(most).err.find("spin_us"), std::string::npos);
+  EXPECT_EQ(run_upright("run --rig " + simulated + " --gains " + fast_gains + " --spin 600").exit_code, 2);
+}
+
 TEST(CheckTogether, RefusesGainsThatCannotHoldThePlantAsRunDoes) {
   const Change reversed{"", fast_gains, "rad: 304.9273", "rad: -304.9273", "", ""};
   for (const std::string& beside : {simulated, plant, simulated + " " + plant}) {
