@@ -33,7 +33,7 @@ class Counts:
         stalled = {entry.split(":")[0] for entry in self.stalled}
         for case in xml.etree.ElementTree.parse(file).getroot().iter("testcase"):
             output = case.findtext("system-out") or ""
-            inside = set(re.findall(r"\[  SKIPPED \] (\S+) \(", output))
+            inside = set(re.findall(r"\[  SKIPPED \] ([^\s,]+)(?:, where .*)? \(\d+ ms\)", output))
             self.other += sorted(f"{case.get('name')}: {name}" for name in inside - stalled)
             if case.find("skipped") is not None and not inside:
                 self.other.append(case.get("name"))

@@ -18,6 +18,7 @@ CTEST = """<?xml version="1.0"?><testsuite>
 [  SKIPPED ] Fault.A
 </system-out></testcase>
 <testcase name="page_test" status="run"><system-out>[  SKIPPED ] Page.B (0 ms)
+[  SKIPPED ] Links/Page.C/rtu, where GetParam() = over RTU (0 ms)
 </system-out></testcase>
 <testcase name="environment" status="notrun"><skipped message="SKIP_RETURN_CODE=77"/></testcase>
 </testsuite>"""
@@ -49,8 +50,8 @@ class CountRetries(unittest.TestCase):
         self.assertEqual(code, 0)
         self.assertIn("2 retries", out)
         self.assertIn("1 tests skipped, each attempt hit by a stall", out)
-        self.assertIn("3 tests skipped for what is not here", out)
-        for entry in ("page_test: Page.B", "environment", "kernel_tests: packages"):
+        self.assertIn("4 tests skipped for what is not here", out)
+        for entry in ("page_test: Page.B", "page_test: Links/Page.C/rtu", "environment", "kernel_tests: packages"):
             self.assertIn(entry, out)
         self.assertNotIn("fault_test: Fault.A", out)
 
