@@ -1,10 +1,10 @@
 #include "parallel.hpp"
 
-#include <atomic>
+#include <algorithm>
 #include <cstdlib>
-#include <exception>
 #include <thread>
-#include <vector>
+
+#include "work_queue.hpp"
 
 namespace upright {
 
@@ -37,25 +37,12 @@ unsigned thread_count() {
 }
 
 void parallel_for(std::size_t count, const std::function<void(std::size_t)>& work) {
-  const std::size_t threads = std::min<std::size_t>(thread_count(), count);
-  std::vector<std::exception_ptr> problems(count);
-  std::atomic<std::size_t> next{0};
-  const auto run = [&] {
-    for (std::size_t i = next++; i < count && !is_interrupted(); i = next++) {
-      try {
-        work(i);
-      } catch (...) {
-        problems[i] = std::current_exception();
-      }
-    }
-  };
-  std::vector<std::thread> helpers;
-  for (std::size_t t = 1; t < threads; ++t) helpers.emplace_back(run);
-  run();
-  for (std::thread& helper : helpers) helper.join();
+  WorkQueue queue(count, is_interrupted);
+  on_threads(std::min<std::size_t>(thread_count(), count), [&] {
+    while (const std::optional<std::size_t> i = queue.next()) queue.guard(*i, [&] { work(*i); });
+  });
   if (is_interrupted()) throw Interrupted();
-  for (const std::exception_ptr& problem : problems)
-    if (problem) std::rethrow_exception(problem);
+  queue.rethrow();
 }
 
 }  // namespace upright

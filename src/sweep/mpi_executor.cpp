@@ -9,9 +9,11 @@
 
 #include <algorithm>
 #include <chrono>
-#include <exception>
 #include <mutex>
+#include <optional>
 #include <thread>
+
+#include "base/work_queue.hpp"
 #endif
 
 namespace upright {
@@ -84,38 +86,24 @@ class RankTeam final : public SweepExecutor {
   }
 
   void run(const std::vector<Group>& groups, const Done& done, const std::atomic<bool>* stop) override {
-    std::atomic<std::size_t> next{0};
+    WorkQueue queue(groups.size(), [stop] { return stop && *stop; });
     std::mutex one_at_a_time;
-    std::exception_ptr failure;
-    std::atomic<bool> failed{false};
     std::size_t away = 0;
-    const auto stopping = [&] { return failed || (stop != nullptr && *stop); };
-    const auto guarded = [&](auto&& work) {
-      try {
-        work();
-      } catch (...) {
-        const std::lock_guard lock(one_at_a_time);
-        if (!failed.exchange(true)) failure = std::current_exception();
-      }
-    };
     const auto compute_here = [&] {
-      guarded([&] {
-        while (!stopping()) {
-          const std::size_t mine = next++;
-          if (mine >= groups.size()) return;
-          const std::vector<SweepRun> runs = run_sweep_group(config_, groups[mine]);
+      while (const std::optional<std::size_t> mine = queue.next())
+        queue.guard(*mine, [&] {
+          const std::vector<SweepRun> runs = run_sweep_group(config_, groups[*mine]);
           const std::lock_guard lock(one_at_a_time);
-          done(mine, runs);
-        }
-      });
+          done(*mine, runs);
+        });
     };
     {
       std::vector<std::jthread> here;
       for (unsigned i = 0; i < threads_; ++i) here.emplace_back(compute_here);
       // MPI is called from this thread only.
-      while (away > 0 || (!stopping() && next < groups.size())) {
-        for (std::size_t rank = 1; rank < idle_.size() && !stopping(); ++rank)
-          if (idle_[rank] && hand_out(rank, groups, next)) ++away;
+      while (away > 0 || !queue.is_over()) {
+        for (std::size_t rank = 1; rank < idle_.size(); ++rank)
+          if (idle_[rank] && hand_out(rank, groups, queue)) ++away;
         std::vector<double> message;
         MPI_Status status;
         if (!receive(MPI_ANY_SOURCE, message, status)) {
@@ -124,20 +112,20 @@ class RankTeam final : public SweepExecutor {
         }
         idle_[static_cast<std::size_t>(status.MPI_SOURCE)] = true;
         --away;
-        guarded([&] { take(message, one_at_a_time, done); });
+        queue.guard(groups.size(), [&] { take(message, one_at_a_time, done); });
       }
     }
-    if (failure) std::rethrow_exception(failure);
+    queue.rethrow();
   }
 
  private:
   /// Gives a rank as many groups as it has threads. False: none are left.
-  bool hand_out(std::size_t rank, const std::vector<Group>& groups, std::atomic<std::size_t>& next) {
+  bool hand_out(std::size_t rank, const std::vector<Group>& groups, WorkQueue& queue) {
     std::vector<double> message;
     for (unsigned i = 0; i < threads_; ++i) {
-      const std::size_t number = next++;
-      if (number >= groups.size()) break;
-      append(message, number, groups[number]);
+      const std::optional<std::size_t> number = queue.next();
+      if (!number) break;
+      append(message, *number, groups[*number]);
     }
     if (message.empty()) return false;
     send(static_cast<int>(rank), work_tag, message);

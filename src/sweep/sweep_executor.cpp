@@ -1,7 +1,8 @@
-#include <exception>
+#include <algorithm>
 #include <mutex>
 #include <thread>
 
+#include "base/work_queue.hpp"
 #include "sim/loop/fast_loop.hpp"
 #include "sweep.hpp"
 
@@ -51,30 +52,17 @@ class ThreadTeam final : public SweepExecutor {
         threads_(threads != 0 ? threads : std::max(1u, std::thread::hardware_concurrency())) {}
 
   void run(const std::vector<Group>& groups, const Done& done, const std::atomic<bool>* stop) override {
-    std::atomic<std::size_t> next{0};
-    std::atomic<bool> failed{false};
-    std::exception_ptr failure;
+    WorkQueue queue(groups.size(), [stop] { return stop && *stop; });
     std::mutex one_at_a_time;
-    const auto work = [&] {
-      try {
-        while (!failed && !(stop && *stop)) {
-          const std::size_t mine = next++;
-          if (mine >= groups.size()) return;
-          const std::vector<SweepRun> runs = run_sweep_group(config_, groups[mine]);
+    on_threads(std::min<std::size_t>(threads_, groups.size()), [&] {
+      while (const std::optional<std::size_t> mine = queue.next())
+        queue.guard(*mine, [&] {
+          const std::vector<SweepRun> runs = run_sweep_group(config_, groups[*mine]);
           const std::lock_guard lock(one_at_a_time);
-          done(mine, runs);
-        }
-      } catch (...) {
-        const std::lock_guard lock(one_at_a_time);
-        if (!failed.exchange(true)) failure = std::current_exception();
-      }
-    };
-    {
-      std::vector<std::jthread> others;
-      for (unsigned i = 1; i < threads_ && i < groups.size(); ++i) others.emplace_back(work);
-      work();
-    }
-    if (failure) std::rethrow_exception(failure);
+          done(*mine, runs);
+        });
+    });
+    queue.rethrow();
   }
 
  private:
