@@ -20,6 +20,10 @@ class GuardedRig final : public Rig {
   }
   RigFault write(double voltage_v) noexcept override { return rig_->write(voltage_v); }
   StopReport stop() noexcept override { return rig_->stop(); }
+  void moved_by_hand() noexcept override {
+    have_last_ = false;
+    rig_->moved_by_hand();
+  }
   int last_exception() const noexcept override { return rig_->last_exception(); }
   SafetyInputs safety_inputs() const noexcept override { return rig_->safety_inputs(); }
   DeviceFacts device_facts() const override { return rig_->device_facts(); }

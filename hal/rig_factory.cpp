@@ -57,6 +57,10 @@ void require_link_fits(const RigFile& rig, double period_s) {
                       " is no longer: lower sample_rate_hz in the gain file, or raise modbus.baud");
 }
 
+std::unique_ptr<Rig> assembled(std::unique_ptr<Rig> parts, const RigFile& rig) {
+  return with_gpio_lines(guarded(std::move(parts), calibration_in_use(rig)), rig);
+}
+
 std::unique_ptr<Rig> make_rig(const RigFile& rig, const RigOptions& options) {
   require_link_fits(rig, options.period_s);
   std::vector<Backend> backends;
@@ -71,7 +75,7 @@ std::unique_ptr<Rig> make_rig(const RigFile& rig, const RigOptions& options) {
   }
   std::unique_ptr<Rig> whole =
       parts.size() == 1 ? std::move(parts.front().rig) : joined(std::move(parts), options.period_s);
-  return with_gpio_lines(guarded(std::move(whole), rig.calibration), rig);
+  return assembled(std::move(whole), rig);
 }
 
 }  // namespace upright

@@ -160,6 +160,7 @@ class GpioLinesRig final : public Rig {
     return report;
   }
 
+  void moved_by_hand() noexcept override { rig_->moved_by_hand(); }
   int last_exception() const noexcept override { return rig_->last_exception(); }
   DeviceFacts device_facts() const override { return rig_->device_facts(); }
 

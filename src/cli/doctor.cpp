@@ -14,7 +14,6 @@
 #include "commissioning/machine_check.hpp"
 #include "commissioning/rig_check.hpp"
 #include "commissioning/wake_probe.hpp"
-#include "hal/gpio_rig.hpp"
 #include "hal/quanser_proof.hpp"
 #include "histogram_json.hpp"
 #include "progress.hpp"
@@ -111,7 +110,7 @@ void examine_simulated(const Arguments& arguments, const RigFile& file, Page& pa
   if (!file.gpio) return;
   const SignalFlag& signal = catch_signals();
   MonotonicClock clock;
-  const std::unique_ptr<Rig> rig = with_gpio_lines(make_simulated_rig(file, clock, {}), file);
+  const std::unique_ptr<Rig> rig = assembled(make_simulated_rig(file, clock, {}), file);
   try {
     rig->open();
   } catch (const DeviceError& error) {

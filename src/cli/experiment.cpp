@@ -23,7 +23,6 @@
 #include "commands.hpp"
 #include "commissioning/sign_check.hpp"
 #include "experiment/pieces/sign_check.hpp"
-#include "hal/gpio_rig.hpp"
 #include "live.hpp"
 #include "options.hpp"
 #include "progress.hpp"
@@ -252,7 +251,7 @@ ExperimentResult perform(const Arguments& arguments, const ExperimentSetup& setu
   if (simulated) {
     auto plant = make_simulated_rig(setup.rig, clock, {arguments.seed.value_or(1), {}});
     hand = plant.get();
-    rig = with_gpio_lines(std::move(plant), setup.rig);
+    rig = assembled(std::move(plant), setup.rig);
   } else {
     rig = make_rig(setup.rig, {setup.control.period_s()});
   }

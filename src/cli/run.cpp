@@ -12,8 +12,6 @@
 
 #include "commands.hpp"
 #include "control/filter_model.hpp"
-#include "hal/gpio_rig.hpp"
-#include "hal/guarded_rig.hpp"
 #include "histogram_json.hpp"
 #include "live.hpp"
 #include "options.hpp"
@@ -112,9 +110,7 @@ std::string delay_line(const ControlConfig& control) {
 
 std::unique_ptr<Rig> make(const RunSetup& setup, Clock& clock) {
   if (is_simulated(setup.rig))
-    return with_gpio_lines(guarded(make_simulated_rig(setup.rig, clock, {setup.seed, setup.theta0_rad}),
-                                   calibration_in_use(setup.rig)),
-                           setup.rig);
+    return assembled(make_simulated_rig(setup.rig, clock, {setup.seed, setup.theta0_rad}), setup.rig);
   return make_rig(setup.rig, {setup.control.period_s()});
 }
 
@@ -171,59 +167,40 @@ Json json_of(const std::optional<OverrunTolerance>& tolerance) {
           {"sentence", tolerance->sentence}};
 }
 
-Json json_of(const LinkCounts& link) {
+/// Of what for_each_count lists.
+template <class Counts>
+Json json_of_counts(const Counts& counts) {
   Json document;
-  for (std::size_t i = 0; i < LinkCounts::kinds; ++i)
-    document[name_of(static_cast<LinkTrouble>(i))] = link.cycles[i];
-  document["longest"] = link.longest;
-  document["recoveries"] = link.recoveries;
+  for_each_count(counts, [&](const char* name, auto count) { document[name] = count; });
   return document;
 }
 
 Json json_of(const SessionResult& result, const LoopLimits& limits, const OverrunLimit& overrun) {
   const LoopOutcome& o = result.outcome;
-  const LoopCounts& c = o.counts;
-  return {{"run_directory", result.directory.string()},
-          {"outcome", result_of(o)},
-          {"reason", name_of(o.reason)},
-          {"sentence", sentence_of(o, limits, result.log)},
-          {"stayed_up", o.reason == StopReason::duration},
-          {"zero_volts", name_of_zero(o.stop)},
-          {"zero_volts_read_back", o.stop.read_back},
-          {"amplifier_disabled", o.stop.disabled},
-          {"zero_volts_sentence", sentence_of(o.stop)},
-          {"time_s", o.time_s},
-          {"tick", o.first_bad_tick},
-          {"worst_theta_rad", o.worst_theta_rad},
-          {"worst_cart_m", o.worst_cart_m},
-          {"rows_written", result.log.rows_written},
-          {"rows_dropped", result.log.rows_dropped},
-          {"counts",
-           {{"periods", c.periods},
-            {"fresh", c.fresh},
-            {"stale", c.stale},
-            {"faults", c.faults},
-            {"missed", c.missed},
-            {"overruns_wake", c.overruns_wake},
-            {"overruns_read", c.overruns_read},
-            {"overruns_compute", c.overruns_compute},
-            {"overruns_write", c.overruns_write},
-            {"saturated", c.saturated},
-            {"writes_failed", c.writes_failed},
-            {"page_faults", c.page_faults}}},
-          {"link", json_of(c.link)},
-          {"timing",
-           {{"wake_late", histogram_json(o.wake_late)},
-            {"read", histogram_json(o.read)},
-            {"compute", histogram_json(o.compute)},
-            {"write", histogram_json(o.write)},
-            {"cycle", histogram_json(o.cycle)}}},
-          {"delay_margin", json_of(overrun.tolerance)},
-          {"most_periods_late", limits.most_periods_late},
-          {"overrun_limit", overrun.sentence},
-          {"warning", overrun.warning.empty() ? Json(nullptr) : Json(overrun.warning)},
-          {"scheduling", result.scheduling.note},
-          {"elapsed_s", result.elapsed_s}};
+  Json document = {{"run_directory", result.directory.string()},
+                   {"outcome", result_of(o)},
+                   {"reason", name_of(o.reason)},
+                   {"sentence", sentence_of(o, limits, result.log)},
+                   {"stayed_up", o.reason == StopReason::duration}};
+  for_each_fact(o.stop, [&](const char* name, const auto& fact) { document[name] = fact; });
+  document["time_s"] = o.time_s;
+  document["tick"] = o.first_bad_tick;
+  document["worst_theta_rad"] = o.worst_theta_rad;
+  document["worst_cart_m"] = o.worst_cart_m;
+  document["rows_written"] = result.log.rows_written;
+  document["rows_dropped"] = result.log.rows_dropped;
+  document["counts"] = json_of_counts(o.counts);
+  document["link"] = json_of_counts(o.counts.link);
+  for_each_timing(o, [&](const char* name, const DurationHistogram& durations) {
+    document["timing"][name] = histogram_json(durations);
+  });
+  document["delay_margin"] = json_of(overrun.tolerance);
+  document["most_periods_late"] = limits.most_periods_late;
+  document["overrun_limit"] = overrun.sentence;
+  document["warning"] = overrun.warning.empty() ? Json(nullptr) : Json(overrun.warning);
+  document["scheduling"] = result.scheduling.note;
+  document["elapsed_s"] = result.elapsed_s;
+  return document;
 }
 
 void print_link(const LoopOutcome& o) {

@@ -112,7 +112,10 @@ class TrialMaker {
       const bool hands_on =
           next.cart_held || next.holds_s > 0.0 || next.amplifier_off || next.turned || next.push_mps != 0.0;
       const bool changes = last_hand_.cart_held || last_hand_.amplifier_off || last_hand_.turned;
-      if (!is_open_ || hands_on || changes) hand_->handle(next);
+      if (!is_open_ || hands_on || changes) {
+        hand_->handle(next);
+        rig_.moved_by_hand();
+      }
       last_hand_ = next;
     }
     is_open_ = true;

@@ -130,16 +130,27 @@ std::string histogram_text(const char* name, const DurationHistogram& h) {
   return text + "]\n      histogram_count: [" + counts + "]\n";
 }
 
-std::string link_text(const LinkCounts& link) {
-  std::string text = "  link: {";
-  for (std::size_t i = 0; i < LinkCounts::kinds; ++i)
-    text += name_of(static_cast<LinkTrouble>(i)) + std::string(": ") + std::to_string(link.cycles[i]) + ", ";
-  return text + "longest: " + std::to_string(link.longest) +
-         ", recoveries: " + std::to_string(link.recoveries) + "}\n";
+/// Of what for_each_count lists.
+template <class Counts>
+std::string counts_text(const Counts& counts) {
+  std::string text;
+  for_each_count(counts, [&](const char* name, auto count) {
+    text += (text.empty() ? "{" : ", ") + std::string(name) + ": " + std::to_string(count);
+  });
+  return text + "}";
+}
+
+std::string yaml_of(bool value) {
+  return yes(value);
+}
+std::string yaml_of(const char* word) {
+  return word;
+}
+std::string yaml_of(const std::string& sentence) {
+  return yaml_quoted(sentence);
 }
 
 std::string outcome_text(const LoopOutcome& o, const LoopLimits& limits, const LogSummary& log) {
-  const LoopCounts& c = o.counts;
   std::string text = "outcome:\n  result: " + std::string(result_of(o)) + "\n  reason: " + name_of(o.reason) +
                      "\n  sentence: " + yaml_quoted(sentence_of(o, limits, log)) +
                      "\n  time_s: " + exact_text(o.time_s) +
@@ -147,25 +158,15 @@ std::string outcome_text(const LoopOutcome& o, const LoopLimits& limits, const L
                      "\n  tick: " + std::to_string(o.first_bad_tick) +
                      "\n  worst_theta_rad: " + exact_text(o.worst_theta_rad) +
                      "\n  worst_cart_m: " + exact_text(o.worst_cart_m) + "\n";
-  text += std::string("  zero_volts: ") + name_of_zero(o.stop) +
-          "\n  zero_volts_read_back: " + yes(o.stop.read_back) +
-          "\n  amplifier_disabled: " + yes(o.stop.disabled) +
-          "\n  zero_volts_sentence: " + yaml_quoted(sentence_of(o.stop)) + "\n";
+  for_each_fact(o.stop, [&](const char* name, const auto& fact) {
+    text += std::string("  ") + name + ": " + yaml_of(fact) + "\n";
+  });
   text += "  rows_written: " + std::to_string(log.rows_written) +
           "\n  rows_dropped: " + std::to_string(log.rows_dropped) + "\n";
   if (!log.failure.empty()) text += "  log_failure: " + yaml_quoted(log.failure) + "\n";
-  text += "  counts: {periods: " + std::to_string(c.periods) + ", fresh: " + std::to_string(c.fresh) +
-          ", stale: " + std::to_string(c.stale) + ", faults: " + std::to_string(c.faults) +
-          ", missed: " + std::to_string(c.missed) + ", overruns_wake: " + std::to_string(c.overruns_wake) +
-          ", overruns_read: " + std::to_string(c.overruns_read) +
-          ", overruns_compute: " + std::to_string(c.overruns_compute) +
-          ", overruns_write: " + std::to_string(c.overruns_write) +
-          ", saturated: " + std::to_string(c.saturated) +
-          ", writes_failed: " + std::to_string(c.writes_failed) +
-          ", page_faults: " + std::to_string(c.page_faults) + "}\n" + link_text(c.link);
-  text += "  timing:\n" + histogram_text("wake_late", o.wake_late) + histogram_text("read", o.read) +
-          histogram_text("compute", o.compute) + histogram_text("write", o.write) +
-          histogram_text("cycle", o.cycle);
+  text += "  counts: " + counts_text(o.counts) + "\n  link: " + counts_text(o.counts.link) + "\n  timing:\n";
+  for_each_timing(o,
+                  [&](const char* name, const auto& histogram) { text += histogram_text(name, histogram); });
   return text;
 }
 

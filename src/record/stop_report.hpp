@@ -16,4 +16,13 @@ std::string sentence_of(const StopReport& report);
 /// Why zero volts is not confirmed yet: "no reply in time", "exception 06 (device busy)", ...
 std::string reason_of(const StopReport& report);
 
+/// Calls see(name, fact) for what is known of a stop, as run.yaml and --json list it.
+template <class See>
+void for_each_fact(const StopReport& report, See&& see) {
+  see("zero_volts", name_of_zero(report));
+  see("zero_volts_read_back", report.read_back);
+  see("amplifier_disabled", report.disabled);
+  see("zero_volts_sentence", sentence_of(report));
+}
+
 }  // namespace upright

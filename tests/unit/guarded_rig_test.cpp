@@ -72,5 +72,13 @@ TEST(GuardedRig, GivesUpCountsThatStayWhereTheyJumpedUntilItIsOpenedAgain) {
   EXPECT_EQ(rig->read().status, RigStatus::fresh);
 }
 
+TEST(GuardedRig, LetsAHandMoveTheRigWhileItIsOpen) {
+  const auto rig = guarded(std::make_unique<ListedRig>(std::vector<std::int64_t>{0, 5000, 5010}), ip02());
+  rig->open();
+  EXPECT_EQ(rig->read().status, RigStatus::fresh);
+  rig->moved_by_hand();
+  for (int i = 0; i < 2; ++i) EXPECT_EQ(rig->read().status, RigStatus::fresh);
+}
+
 }  // namespace
 }  // namespace upright

@@ -114,6 +114,9 @@ class Rig {
   /// is known of it so far. It never waits for an answer: call it again until the report is done. A backend
   /// that has to wait goes on trying by itself, until the rig is opened again or destroyed.
   virtual StopReport stop() noexcept = 0;
+  /// Outside the loop: somebody has moved cart or pendulum of an open rig, its counts go on from elsewhere. A
+  /// rig around another one passes it on.
+  virtual void moved_by_hand() noexcept {}
   /// The number of the exception that the device answered with last; 0: none. A rig around another one passes
   /// on that one's.
   virtual int last_exception() const noexcept { return 0; }

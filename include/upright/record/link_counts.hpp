@@ -41,4 +41,13 @@ const char* name_of(LinkTrouble trouble) noexcept;
 /// there was no trouble.
 std::string sentence_of(const LinkCounts& counts);
 
+/// Calls see(name, count) for every count, as run.yaml and --json list them.
+template <class See>
+void for_each_count(const LinkCounts& link, See&& see) {
+  for (std::size_t i = 0; i < LinkCounts::kinds; ++i)
+    see(name_of(static_cast<LinkTrouble>(i)), link.cycles[i]);
+  see("longest", link.longest);
+  see("recoveries", link.recoveries);
+}
+
 }  // namespace upright

@@ -59,6 +59,23 @@ struct LoopCounts {
   LinkCounts link;                ///< why readings were stale or faults
 };
 
+/// Calls see(name, count) for every count but those of the link, as run.yaml and --json list them.
+template <class See>
+void for_each_count(const LoopCounts& c, See&& see) {
+  see("periods", c.periods);
+  see("fresh", c.fresh);
+  see("stale", c.stale);
+  see("faults", c.faults);
+  see("missed", c.missed);
+  see("overruns_wake", c.overruns_wake);
+  see("overruns_read", c.overruns_read);
+  see("overruns_compute", c.overruns_compute);
+  see("overruns_write", c.overruns_write);
+  see("saturated", c.saturated);
+  see("writes_failed", c.writes_failed);
+  see("page_faults", c.page_faults);
+}
+
 struct LoopOutcome {
   StopReason reason = StopReason::duration;
   RigFault fault = RigFault::none;          ///< behind a stop by the rig or the link
@@ -77,6 +94,16 @@ struct LoopOutcome {
   LoopCounts counts;
   DurationHistogram wake_late, read, compute, write, cycle;
 };
+
+/// Calls see(name, histogram) for every part of a cycle.
+template <class See>
+void for_each_timing(const LoopOutcome& o, See&& see) {
+  see("wake_late", o.wake_late);
+  see("read", o.read);
+  see("compute", o.compute);
+  see("write", o.write);
+  see("cycle", o.cycle);
+}
 
 /// One sentence: what ended the run with its first bad cycle, and then what to do.
 std::string sentence_of(const LoopOutcome& outcome, const LoopLimits& limits);
