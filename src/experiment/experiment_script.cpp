@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "upright/model/elementary.hpp"
+#include "upright/model/rigid_body.hpp"
 
 namespace upright {
 
@@ -223,9 +224,9 @@ Demand ExperimentScript::swing_up(const ControlState& now) noexcept {
   // A hanging pendulum at rest gives no direction: any will do.
   if (std::abs(w) < 0.05 && c < -0.99) pump = most_pump_mps2;
   const double wanted = pump - centring_per_s2 * now.cart_m - centring_per_s * now.cart_velocity_mps;
-  const double turning = (m.gravity_mps2 * s - c * wanted) / m.pendulum_m;
+  const double turning = pendulum_radps2(s, c, wanted, m.gravity_mps2, m.pendulum_m);
   const double force =
-      m.mass_kg * (wanted + m.reaction_m * (c * turning - s * w * w)) +
+      m.mass_kg * (wanted + m.reaction_m * pendulum_reaction(s, c, w, turning)) +
       m.damping_n_per_mps * now.cart_velocity_mps +
       m.sliding_n * sign(std::abs(now.cart_velocity_mps) > standing_mps ? now.cart_velocity_mps : wanted);
   return put(force / m.force_per_volt_n);

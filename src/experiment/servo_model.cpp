@@ -1,18 +1,19 @@
 #include "servo_model.hpp"
 
+#include "upright/model/rigid_body.hpp"
+
 namespace upright {
 
 ServoModel servo_model(const Plant& plant) {
   ServoModel model;
-  model.mass_kg = plant.cart_mass_kg;
+  const RigidBody body = rigid_body(plant);
+  model.mass_kg = body.mass_kg;
   model.gravity_mps2 = plant.gravity_mps2;
   model.force_per_volt_n = plant.motor.force_per_volt_n;
   model.damping_n_per_mps = plant.motor.back_emf_n_per_mps;
   if (plant.pendulum) {
-    const double moment = plant.pendulum->mass_kg * plant.pendulum->length_to_com_m;
-    model.mass_kg += plant.pendulum->mass_kg;
-    model.pendulum_m = plant.pendulum->inertia_about_pivot_kgm2() / moment;
-    model.reaction_m = moment / model.mass_kg;
+    model.pendulum_m = body.equivalent_length_m();
+    model.reaction_m = body.moment_kgm / body.mass_kg;
   }
   if (const PlantEffect* viscous = plant.find("viscous_friction"))
     model.damping_n_per_mps += viscous->values[0];

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "upright/model/rigid_body.hpp"
+
 namespace upright {
 
 namespace {
@@ -50,16 +52,6 @@ std::vector<double> derivative(const std::vector<double>& values, const std::vec
   return result;
 }
 
-/// Mass times length of the pendulum's own coupling, and its inertia over that.
-struct Coupling {
-  double moment = 0.0, length_m = 1.0, mass_kg = 0.0;
-};
-Coupling coupling_of(const Plant& plant) {
-  if (!plant.pendulum) return {};
-  const double moment = plant.pendulum->mass_kg * plant.pendulum->length_to_com_m;
-  return {moment, plant.pendulum->inertia_about_pivot_kgm2() / moment, plant.pendulum->mass_kg};
-}
-
 /// Raw, unfiltered: the force a voltage that is held makes at each sample (the mean of before and after).
 std::vector<double> motor_force(const Measurement& run, const Plant& plant) {
   std::vector<double> force(run.size());
@@ -78,20 +70,19 @@ ForceTrace force_trace(const Measurement& run, const Plant& plant) {
   trace.cart_mps = derivative(x, run.time_s);
   trace.cart_mps2 = derivative(trace.cart_mps, run.time_s);
   trace.force_n = smooth(motor_force(run, plant), period);
-  const Coupling c = coupling_of(plant);
-  if (run.has_theta() && c.moment > 0.0) {
+  const RigidBody body = rigid_body(plant);
+  if (run.has_theta() && body.moment_kgm > 0.0) {
     const std::vector<double> theta = smooth(run.theta_rad, period);
     const std::vector<double> rate = derivative(theta, run.time_s);
     const std::vector<double> acceleration = derivative(rate, run.time_s);
     for (std::size_t k = 0; k < theta.size(); ++k)
-      trace.force_n[k] -=
-          c.moment * (std::cos(theta[k]) * acceleration[k] - std::sin(theta[k]) * rate[k] * rate[k]);
+      trace.force_n[k] -= body.moment_kgm *
+                          pendulum_reaction(std::sin(theta[k]), std::cos(theta[k]), rate[k], acceleration[k]);
   }
   trace.friction_n.resize(x.size());
-  const double mass = plant.cart_mass_kg + c.mass_kg;
   for (std::size_t k = 0; k < x.size(); ++k)
-    trace.friction_n[k] =
-        trace.force_n[k] - mass * trace.cart_mps2[k] - plant.motor.back_emf_n_per_mps * trace.cart_mps[k];
+    trace.friction_n[k] = trace.force_n[k] - body.mass_kg * trace.cart_mps2[k] -
+                          plant.motor.back_emf_n_per_mps * trace.cart_mps[k];
   return trace;
 }
 
@@ -150,7 +141,7 @@ std::optional<ForceBalance> balance_forces(const std::vector<Measurement>& runs,
   }
   const Eigen::Vector4d sigma = (inverse * spread * inverse).diagonal().cwiseMax(0.0).cwiseSqrt();
   ForceBalance balance;
-  balance.mass_kg = p[0] - coupling_of(plant).mass_kg;
+  balance.mass_kg = p[0] - (plant.pendulum ? plant.pendulum->mass_kg : 0.0);
   balance.damping_n_per_mps = p[1];
   balance.coulomb_n = p[2];
   balance.constant_n = p[3];
@@ -189,14 +180,15 @@ bool rests(const Measurement& run, std::size_t first, std::size_t last, double w
 
 /// The force on the cart at a sample, the pendulum's reaction included.
 double holding_force_n(const Measurement& run, const Plant& plant, std::size_t k, std::size_t rate_over) {
-  const Coupling c = coupling_of(plant);
+  const RigidBody body = rigid_body(plant);
   const double force = plant.motor.force_per_volt_n * run.voltage_v[k];
-  if (!run.has_theta() || !(c.moment > 0.0)) return force;
+  if (!run.has_theta() || !(body.moment_kgm > 0.0)) return force;
   const double theta = run.theta_rad[k];
   const double rate =
       (run.theta_rad[k] - run.theta_rad[k - rate_over]) / (run.time_s[k] - run.time_s[k - rate_over]);
-  return force - c.moment * (std::cos(theta) * plant.gravity_mps2 * std::sin(theta) / c.length_m -
-                             std::sin(theta) * rate * rate);
+  const double sine = std::sin(theta), cosine = std::cos(theta);
+  const double turning = pendulum_radps2(sine, cosine, 0.0, plant.gravity_mps2, body.equivalent_length_m());
+  return force - body.moment_kgm * pendulum_reaction(sine, cosine, rate, turning);
 }
 
 }  // namespace

@@ -1,0 +1,38 @@
+// Cart and pendulum of a plant file as one rigid body, as equation (1) of the paper has them: what a known
+// motion asks of the force on the cart.
+#pragma once
+
+#include "upright/model/plant.hpp"
+
+namespace upright {
+
+struct RigidBody {
+  double mass_kg = 0.0;       ///< of both
+  double moment_kgm = 0.0;    ///< m l; 0 without a pendulum
+  double inertia_kgm2 = 0.0;  ///< about the pivot; 0 without a pendulum
+
+  /// Of the simple pendulum that swings alike: 4/3 l for a rod.
+  double equivalent_length_m() const { return inertia_kgm2 / moment_kgm; }
+};
+
+inline RigidBody rigid_body(const Plant& plant) {
+  RigidBody body{plant.cart_mass_kg};
+  if (!plant.pendulum) return body;
+  body.mass_kg += plant.pendulum->mass_kg;
+  body.moment_kgm = plant.pendulum->mass_kg * plant.pendulum->length_to_com_m;
+  body.inertia_kgm2 = plant.pendulum->inertia_about_pivot_kgm2();
+  return body;
+}
+
+/// cos(th) th'' - sin(th) th'^2: the force of a moving pendulum on its cart is minus m l times it.
+inline double pendulum_reaction(double sine, double cosine, double theta_radps, double theta_radps2) {
+  return cosine * theta_radps2 - sine * theta_radps * theta_radps;
+}
+
+/// The angular acceleration of a pendulum without friction whose pivot accelerates.
+inline double pendulum_radps2(double sine, double cosine, double pivot_mps2, double gravity_mps2,
+                              double equivalent_length_m) {
+  return (gravity_mps2 * sine - cosine * pivot_mps2) / equivalent_length_m;
+}
+
+}  // namespace upright
