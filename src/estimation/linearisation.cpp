@@ -12,6 +12,7 @@
 #include "sensor_gains.hpp"
 #include "state_vector.hpp"
 #include "upright/model/elementary.hpp"
+#include "upright/model/rigid_body.hpp"
 #include "upright/sim/simulator.hpp"
 
 namespace upright {
@@ -120,32 +121,19 @@ void add_square(const Eigen::Matrix<double, N, 1>& row, double weight, int colum
 /// were they the fitted ones, the fit could shrink its noise by making the plant heavier.
 class NoiseInput {
  public:
-  NoiseInput(const Plant& plant, bool cart_locked)
-      : cart_locked_(cart_locked),
-        has_pendulum_(plant.pendulum.has_value()),
-        total_mass_(plant.cart_mass_kg + (plant.pendulum ? plant.pendulum->mass_kg : 0.0)),
-        coupling_(plant.pendulum ? plant.pendulum->mass_kg * plant.pendulum->length_to_com_m : 0.0),
-        inertia_(plant.pendulum ? plant.pendulum->inertia_about_pivot_kgm2() : 1.0) {}
+  NoiseInput(const Plant& plant, bool cart_locked) : cart_locked_(cart_locked), body_(rigid_body(plant)) {}
 
   void set(LinearStep& step, double theta_rad) const {
-    const double off = coupling_ * std::cos(theta_rad);
-    if (cart_locked_) {
-      step.by_force[0] = step.by_force[1] = step.by_torque[0] = 0.0;
-      step.by_torque[1] = 1.0 / inertia_;
-    } else if (!has_pendulum_) {
-      step.by_force[0] = 1.0 / total_mass_;
-      step.by_force[1] = step.by_torque[0] = step.by_torque[1] = 0.0;
-    } else {
-      const double determinant = total_mass_ * inertia_ - off * off;
-      step.by_force[0] = inertia_ / determinant;
-      step.by_force[1] = step.by_torque[0] = -off / determinant;
-      step.by_torque[1] = total_mass_ / determinant;
-    }
+    const InverseMass inverse =
+        cart_locked_ ? inverse_mass_at_held_cart(body_) : inverse_mass(body_, std::cos(theta_rad));
+    step.by_force[0] = inverse.cart_by_force;
+    step.by_force[1] = step.by_torque[0] = inverse.coupled;
+    step.by_torque[1] = inverse.pendulum_by_torque;
   }
 
  private:
-  bool cart_locked_, has_pendulum_;
-  double total_mass_, coupling_, inertia_;
+  bool cart_locked_;
+  RigidBody body_;
 };
 
 /// Sums the objective of a segment by blocks of time.

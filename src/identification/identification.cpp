@@ -4,8 +4,6 @@
 #include <cmath>
 #include <cstdio>
 #include <limits>
-#include <numeric>
-#include <tuple>
 #include <utility>
 
 #include "base/parallel.hpp"
@@ -14,15 +12,12 @@
 #include "diagnosis/score_test.hpp"
 #include "estimation/held_out.hpp"
 #include "estimation/thinning.hpp"
+#include "run_order.hpp"
 
 namespace upright {
 
 namespace {
 
-/// Minus twice the log likelihood that a transition effect must save before it is part of the model.
-constexpr double least_evidence = 25.0;
-/// And its size, in standard errors.
-constexpr double least_certainty = 4.0;
 constexpr double most_samples = 60000.0;
 constexpr double trial_samples = 10000.0;
 constexpr double few_samples = 2500.0;
@@ -50,46 +45,10 @@ constexpr std::string_view frictions[] = {"viscous_friction",
                                           "cart_mass",
                                           "pendulum_length"};
 
-std::size_t number_of(std::string_view kind) {
-  return effect_number(kind);
-}
-
 std::string text(const char* format, double a, double b = 0.0) {
   char buffer[160];
   std::snprintf(buffer, sizeof buffer, format, a, b);
   return buffer;
-}
-
-/// The runs in an order of their own, whatever order they were read in: which segments are left out, and how
-/// sums round, then do not depend on it.
-std::vector<std::size_t> own_order(const std::vector<Measurement>& runs) {
-  std::vector<std::size_t> order(runs.size());
-  std::iota(order.begin(), order.end(), std::size_t{0});
-  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
-    const auto key = [&](std::size_t i) {
-      const Measurement& run = runs[i];
-      return std::tie(run.cart_locked, run.voltage_v, run.cart_m, run.theta_rad, run.time_s);
-    };
-    return key(a) < key(b);
-  });
-  return order;
-}
-
-std::vector<Measurement> arranged(const std::vector<Measurement>& runs,
-                                  const std::vector<std::size_t>& order) {
-  std::vector<Measurement> sorted;
-  sorted.reserve(order.size());
-  for (const std::size_t i : order) sorted.push_back(runs[i]);
-  return sorted;
-}
-
-/// What was read in each run, in the order the runs were given.
-template <class Reading>
-std::vector<Reading> as_given(std::vector<Reading> readings, const std::vector<std::size_t>& order) {
-  for (Reading& reading : readings) reading.run = order[reading.run];
-  std::stable_sort(readings.begin(), readings.end(),
-                   [](const Reading& a, const Reading& b) { return a.run < b.run; });
-  return readings;
 }
 
 /// A model under way: the plant with its free effects, and the fit of it.
@@ -103,7 +62,7 @@ class Identifier {
  public:
   Identifier(const Plant& base, const std::vector<Measurement>& runs, const IdentificationOptions& options)
       : base_(base),
-        order_(own_order(runs)),
+        order_(canonical_order(runs)),
         runs_(arranged(runs, order_)),
         options_(options),
         range_(range_of(runs_, base, policy_.excitation)) {}
@@ -118,8 +77,8 @@ class Identifier {
       result_.parameters.clear();
       if (std::isfinite(so_far_.fit.objective) && so_far_.fit.covariance.size() > 0) report(so_far_);
     }
-    result_.breakaways = as_given(std::move(result_.breakaways), order_);
-    result_.steady_points = as_given(std::move(result_.steady_points), order_);
+    result_.breakaways = in_given_order(std::move(result_.breakaways), order_);
+    result_.steady_points = in_given_order(std::move(result_.steady_points), order_);
     return std::move(result_);
   }
 
@@ -235,10 +194,10 @@ class Identifier {
   Model start() const {
     Model model;
     model.plant = base_;
-    for (const std::string_view kind : frictions) model.plant.remove(number_of(kind));
+    for (const std::string_view kind : frictions) model.plant.remove(effect_number(kind));
     const auto add = [&](std::string_view kind, std::vector<double> values) {
-      model.plant.set(number_of(kind), values);
-      model.free.push_back(number_of(kind));
+      model.plant.set(effect_number(kind), values);
+      model.free.push_back(effect_number(kind));
     };
     if (range_.cart_moves) {
       ForceBalance b;
@@ -270,7 +229,7 @@ class Identifier {
       for (FreeParameter p : free_parameters(effect, range_, policy_.prior)) {
         // Nothing is believed beforehand, except that a shape without data stays near 2.
         if (p.prior_sigma > 0.0) p.prior_sigma *= 4.0;
-        if (mass_known_to > 0.0 && effect == number_of("cart_mass")) {
+        if (mass_known_to > 0.0 && effect == effect_number("cart_mass")) {
           p.prior_mean = model.plant.find(effect)->values[0];
           p.prior_sigma = mass_known_to * p.prior_mean;
         }
@@ -334,7 +293,7 @@ class Identifier {
   static Model richer(const Model& base, const Start& start) {
     Model model{base.plant, base.free, {}};
     for (const Addition& addition : start) {
-      const std::size_t effect = number_of(addition.kind);
+      const std::size_t effect = effect_number(addition.kind);
       model.plant.set(effect, addition.values);
       if (std::find(model.free.begin(), model.free.end(), effect) == model.free.end())
         model.free.push_back(effect);
@@ -379,11 +338,13 @@ class Identifier {
     std::string names;
     for (const std::string_view kind : kinds) {
       names += (names.empty() ? "" : " and ") + std::string(kind);
-      const std::size_t effect = number_of(kind);
-      sized = sized && best.plant.find(effect)->values[0] > least_certainty * sigma_of(best, effect, 0);
+      const std::size_t effect = effect_number(kind);
+      sized = sized && best.plant.find(effect)->values[0] >
+                           policy_.acceptance.least_certainty * sigma_of(best, effect, 0);
     }
-    const bool kept = evidence > least_evidence && sized;
-    const std::string size = text("(evidence %.0f, %.0f is asked for)", evidence, least_evidence);
+    const bool kept = evidence > policy_.acceptance.least_evidence && sized;
+    const std::string size =
+        text("(evidence %.0f, %.0f is asked for)", evidence, policy_.acceptance.least_evidence);
     const std::string why = evidence < 0.5 ? "with which the fit is no better"
                             : sized        ? "with which the fit is hardly better " + size
                                            : "whose size is not certain";
@@ -524,7 +485,7 @@ class Identifier {
 
   /// A scale of the plant file's own number becomes the number.
   void fold_scale(const Model& model, std::string_view kind, const char* name, double given) {
-    const std::size_t effect = number_of(kind);
+    const std::size_t effect = effect_number(kind);
     const PlantEffect* scale = result_.plant.find(effect);
     if (scale == nullptr) return;
     const double value = scale->values[0], sigma = sigma_of(model, effect, 0);
@@ -573,7 +534,7 @@ class Identifier {
 
   /// A bias whose interval holds zero is not in the plant.
   void drop_zero(const Model& model, std::string_view kind) {
-    const std::size_t effect = number_of(kind);
+    const std::size_t effect = effect_number(kind);
     const PlantEffect* have = result_.plant.find(effect);
     if (have != nullptr && std::abs(have->values[0]) < 1.96 * sigma_of(model, effect, 0))
       result_.plant.remove(effect);

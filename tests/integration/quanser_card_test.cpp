@@ -78,7 +78,7 @@ TEST(QuanserCard, PutsOutTheVoltageThroughTheAmplifiersGainAndSign) {
   EXPECT_EQ(bench.last().analog_v, 0.0);
 }
 
-TEST(QuanserCard, AnExpiredWatchdogIsAConfirmedZeroThatLocksTheCardUntilItIsOpenedAgain) {
+TEST(QuanserCard, AnExpiredWatchdogConfirmsZeroVoltsAndLocksTheCard) {
   Bench bench;
   bench.rig->open();
   ASSERT_EQ(bench.rig->write(2.0), RigFault::none);

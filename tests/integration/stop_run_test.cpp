@@ -167,7 +167,7 @@ void end_by(int number) {
   EXPECT_EQ(run.record().samples.rows.back().voltage_v, 0.0);
 }
 
-TEST(StopRun, EndsBySignalsThatWouldKillOrSuspendItAndIgnoresThoseOfTheBackground) {
+TEST(StopRun, EndsByKillAndSuspendSignalsIgnoresBackgroundOnes) {
   for (const int number : {SIGQUIT, SIGTSTP, SIGHUP}) {
     SCOPED_TRACE(number);
     if (!IsSkipped()) in_real_time([=] { end_by(number); });

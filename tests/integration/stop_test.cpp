@@ -44,7 +44,7 @@ std::vector<Stopped> all_stopped(const std::vector<StopCase>& cases, const StopW
   return results;
 }
 
-TEST(Stop, GetsToZeroVoltsOnceTheDeviceLetsItAndIsConfirmedThenAndNotBefore) {
+TEST(Stop, ReachesZeroVoltsOnceTheDeviceAcceptsAndConfirmsIt) {
   const std::vector<StopCase> cases = passing_troubles();
   const std::vector<Stopped> results = all_stopped(cases);
   for (std::size_t i = 0; i < cases.size(); ++i) {
@@ -100,7 +100,7 @@ TEST(Stop, TriesForTenSecondsAndNamesTheDevicesOwnWatchdog) {
   });
 }
 
-TEST(Stop, UsesAnotherFunctionWhere0x17IsRefusedAndDisablesTheAmplifierToo) {
+TEST(Stop, UsesAnotherFunctionWhere0x17IsRefusedAndDisables) {
   for (const bool serial : {false, true}) {
     const Stopped result = stopped({serial, false, Trouble::refuses_read_write, 60.0});
     EXPECT_TRUE(result.report.done());

@@ -38,7 +38,7 @@ TEST(Fit, TakesSlidingWhereTheModelRestsForAForceAndNotForSensorNoise) {
   EXPECT_LT(noise.force, 1.0);
 }
 
-TEST(Fit, BeginsAfterAGapWhenTheLagOfTheMotorHasForgottenWhatWasCommandedThere) {
+TEST(Fit, BeginsAfterAGapOnceTheMotorsLagHasForgottenIt) {
   Plant plant = cart_alone();
   plant.set("motor_lag", {0.036});
   const blind::Rig rig{.plant = plant};

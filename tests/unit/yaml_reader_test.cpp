@@ -56,7 +56,7 @@ TEST(YamlReader, RefusesDoubledKeysBrokenYamlAndDeepNesting) {
   EXPECT_THROW(YamlMap::from_text(std::string(100000, '['), "f.yaml"), ConfigError);
 }
 
-TEST(YamlReader, RefusesASecondDocumentAndTextInWhichYamlCppFindsDocumentsForEver) {
+TEST(YamlReader, RefusesASecondDocumentAndEndlessDocuments) {
   EXPECT_EQ(message_of([] { YamlMap::from_text("a: 1\n---\nb: 2\n", "f.yaml"); }),
             "f.yaml:2: a second document begins here: keep one YAML document");
   EXPECT_THROW(YamlMap::from_text("a:\n   , - b'\n", "f.yaml"), ConfigError);

@@ -35,4 +35,22 @@ inline double pendulum_radps2(double sine, double cosine, double pivot_mps2, dou
   return (gravity_mps2 * sine - cosine * pivot_mps2) / equivalent_length_m;
 }
 
+/// What a unit of force on the cart and of torque on the pendulum make of both accelerations: the inverse of
+/// the mass matrix. By symmetry a force turns the pendulum as a torque moves the cart.
+struct InverseMass {
+  double cart_by_force = 0.0, coupled = 0.0, pendulum_by_torque = 0.0;  ///< [1/kg], [1/(kg m)], [1/(kg m^2)]
+};
+
+inline InverseMass inverse_mass(const RigidBody& body, double cosine) {
+  if (body.inertia_kgm2 == 0.0) return {1.0 / body.mass_kg, 0.0, 0.0};
+  const double off = body.moment_kgm * cosine;
+  const double determinant = body.mass_kg * body.inertia_kgm2 - off * off;
+  return {body.inertia_kgm2 / determinant, -off / determinant, body.mass_kg / determinant};
+}
+
+/// The same with the cart held in its place.
+inline InverseMass inverse_mass_at_held_cart(const RigidBody& body) {
+  return {0.0, 0.0, body.inertia_kgm2 == 0.0 ? 0.0 : 1.0 / body.inertia_kgm2};
+}
+
 }  // namespace upright
