@@ -109,7 +109,10 @@ void ModbusLink::await_silence(double quiet_s) noexcept {
 /// TCP closes, so that the answer goes nowhere; a serial line resynchronises.
 RigFault ModbusLink::ask(const Pdu& request) noexcept {
   if (!connected_) return RigFault::link_lost;
+  const std::int64_t asked_ns = now_ns();
   channel_->flush();
+  // A process that stood still in here does not send what it carries: a voltage that has become old.
+  if (static_cast<double>(now_ns() - asked_ns) > 1e9 * patience_s_) return RigFault::link_timeout;
   RigFault fault = channel_->exchange(request, reply_, patience_s_);
   if (fault == RigFault::none) fault = check_reply(request, reply_, exception_);
   if (is_answer(fault)) return fault;

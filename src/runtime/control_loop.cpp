@@ -18,6 +18,10 @@ constexpr double return_roll_s = 0.3;       // a braked cart rolls on for less t
 constexpr double return_slack_m = 0.05;     // what a swinging pendulum moves the cart against the motor
 constexpr double estimates_settle_s = 0.1;  // several time constants of a velocity filter
 
+/// A voltage that is computed later than so many periods after its cycle was due is old. A cycle may begin up
+/// to a period late before it counts as missed.
+constexpr std::uint64_t freshness_periods = 2;
+
 /// What a fault means for the loop: nothing yet while it is one of the link, which may pass within the
 /// watchdog time.
 StopReason reason_for(RigFault fault) {
@@ -78,6 +82,17 @@ void ControlLoop::stop(LoopOutcome& outcome, StopReason reason, std::uint64_t fi
   stopped_ = true;
 }
 
+/// Nothing was read or written for longer than the watchdog's time. Where this cycle itself has taken more
+/// periods than may be late, it was held up here, and neither link nor encoders are to blame.
+void ControlLoop::stop_without_news(const Wake& wake, StopReason reason, std::uint64_t first_bad,
+                                    LoopOutcome& outcome) noexcept {
+  const std::int64_t taken_ns = std::max<std::int64_t>(0, read_done_ns_ - phase_.due_ns(wake.tick));
+  if (static_cast<std::uint64_t>(taken_ns / phase_.period_ns) > limits_.most_periods_late)
+    stop(outcome, StopReason::overrun, wake.tick);
+  else
+    stop(outcome, reason, first_bad);
+}
+
 /// Takes the counts of a reading, or notes that there are none to take. True: there is a pose to compute
 /// with.
 bool ControlLoop::accept(const RigReading& reading, const Wake& wake, LoopOutcome& outcome) noexcept {
@@ -101,7 +116,8 @@ bool ControlLoop::accept(const RigReading& reading, const Wake& wake, LoopOutcom
   if (fault && !may_pass(reading.fault)) {
     stop(outcome, reason_for(reading.fault), wake.tick);
   } else if (read_done_ns_ - last_fresh_ns_ > watchdog_ns_) {
-    stop(outcome, fault ? StopReason::link_lost : StopReason::stale_encoder, first_held_tick_);
+    stop_without_news(wake, fault ? StopReason::link_lost : StopReason::stale_encoder, first_held_tick_,
+                      outcome);
   }
   return false;
 }
@@ -183,9 +199,11 @@ void ControlLoop::watch_encoders(const Wake& wake, bool balancing, LoopOutcome& 
     stop(outcome, StopReason::stuck_encoder, watch_.silent_since(outcome.stuck));
 }
 
-void ControlLoop::write(const Wake& wake, LoopOutcome& outcome) noexcept {
-  // A voltage from before a gap is not sent again: it was meant for a pose that has passed.
-  const RigFault fault = after_gap_ ? RigFault::link_timeout : rig_.write(row_.voltage_v);
+void ControlLoop::write(const Wake& wake, std::int64_t computed_ns, LoopOutcome& outcome) noexcept {
+  // A voltage from before a gap, or from a cycle that stood still before it could write, is not sent: it was
+  // meant for a pose that has passed.
+  const bool is_old = after_gap_ || computed_ns > phase_.due_ns(wake.tick + freshness_periods);
+  const RigFault fault = is_old ? RigFault::link_timeout : rig_.write(row_.voltage_v);
   if (fault == RigFault::none) {
     last_write_ns_ = read_done_ns_;
     unwritten_ = false;
@@ -199,7 +217,7 @@ void ControlLoop::write(const Wake& wake, LoopOutcome& outcome) noexcept {
   if (!may_pass(fault))
     stop(outcome, reason_for(fault), wake.tick);
   else if (read_done_ns_ - last_write_ns_ > watchdog_ns_)
-    stop(outcome, StopReason::link_lost, first_unwritten_tick_);
+    stop_without_news(wake, StopReason::link_lost, first_unwritten_tick_, outcome);
 }
 
 /// Counts the periods that passed without a cycle. Too many of them stop the motor here, before this cycle
@@ -249,7 +267,7 @@ ControlLoop::Stamps ControlLoop::act(const Wake& wake, LoopOutcome& outcome) noe
   const bool computed = accept(reading, wake, outcome);
   if (computed) compute(wake, outcome);
   const std::int64_t computed_ns = clock_.now_ns();
-  if (!stopped_) write(wake, outcome);
+  if (!stopped_) write(wake, computed_ns, outcome);
   return {read_done_ns_, computed_ns, clock_.now_ns()};
 }
 

@@ -137,7 +137,7 @@ Expectation stops(std::vector<std::string> reasons, double within_s) {
 
 const std::vector<Fault>& faults() {
   static const std::vector<Fault> list = {
-      {"missed_cycles", "the controller stands still for 18 ms"},
+      {"missed_cycles", "the controller stands still for 12 ms"},
       {"overrun", "the controller stands still for 250 ms"},
       {"stuck_cart", "the cart's encoder stops counting"},
       {"stuck_pendulum", "the pendulum's encoder stops counting"},

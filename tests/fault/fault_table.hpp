@@ -43,9 +43,9 @@ struct Expectation {
 /// fallen.
 inline constexpr double stuck_noticed_s = 2.5;
 
-/// At 200 Hz three periods are missed then, as many as a run goes on after, and with 20 ms, of which a busy
-/// machine makes a little more, it could be four.
-inline constexpr double short_standstill_s = 0.018;
+/// At 200 Hz two or three periods are missed then, wherever in its cycle it begins; a run goes on after
+/// three. With 18 ms it could be four.
+inline constexpr double short_standstill_s = 0.012;
 
 Expectation goes_on();
 Expectation stops(std::vector<std::string> reasons, double within_s);

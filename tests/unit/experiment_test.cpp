@@ -9,6 +9,7 @@
 #include "commissioning/sign_check.hpp"
 #include "experiment/pieces/delay_sweep.hpp"
 #include "experiment/pieces/free_decay.hpp"
+#include "experiment/pieces/observe.hpp"
 #include "upright/base/error.hpp"
 #include "upright/model/plant_file.hpp"
 
@@ -230,7 +231,7 @@ TEST(DelaySweep, ARunThatNeverBalancedIsNoResult) {
   EXPECT_EQ(judge_trial({}, piece, rows, StopReason::track_limit).outcome, "");
   // Nor one that something else ended.
   EXPECT_EQ(judge_trial({}, piece, swinging(0.003, 2.0), StopReason::signal).outcome, "");
-  Piece observe;
+  const Piece observe{pieces::Observe{}};
   EXPECT_EQ(judge_trial({}, observe, rows, StopReason::duration).outcome, "done");
   EXPECT_EQ(judge_trial({}, observe, rows, StopReason::track_limit).outcome, "");
 }

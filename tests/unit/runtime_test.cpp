@@ -159,20 +159,43 @@ TEST(Session, WaitsForZeroVoltsAndSaysWhetherItIsConfirmed) {
   }
 }
 
-/// The voltage of a pose that has passed is not given again when periods were missed meanwhile.
+/// The voltage of a pose that has passed is not given again when periods were missed meanwhile, nor that of a
+/// cycle which stood still before it.
 TEST(Session, SendsNoOldVoltageAfterAGap) {
   TemporaryFolder folder;
   constexpr int gap = 200;
-  int writes_before = 0, writes_in_gap = -1;
+  int writes_before = 0, writes_held_up = -1, writes_in_gap = -1;
   run_tampered(folder, setup_for(simulated_file(), 1.0), [&](TamperedRig& rig, Clock& clock) {
     rig.on_read = [&](int i, RigReading& reading) {
-      if (i == gap) clock.sleep_until(clock.now_ns() + 4'200'000);
-      if (i == gap + 1) writes_before = rig.writes;
+      if (i == gap) {
+        writes_before = rig.writes;
+        clock.sleep_until(clock.now_ns() + 4'200'000);
+      }
+      if (i == gap + 1) writes_held_up = rig.writes - writes_before;
       if (i > gap && i <= gap + 3) reading.status = RigStatus::stale;
       if (i == gap + 4) writes_in_gap = rig.writes - writes_before;
     };
   });
+  EXPECT_EQ(writes_held_up, 0);
   EXPECT_EQ(writes_in_gap, 0);
+}
+
+/// A read that took more periods than may be late is slowness, not missing counts nor a lost link.
+TEST(Session, AReadThatStandsStillIsAnOverrun) {
+  constexpr int held_up = 200;
+  for (const RigStatus status : {RigStatus::fresh, RigStatus::stale, RigStatus::fault}) {
+    TemporaryFolder folder;
+    const auto run =
+        run_tampered(folder, setup_for(simulated_file(), 1.0), [&](TamperedRig& rig, Clock& clock) {
+          rig.on_read = [&](int i, RigReading& reading) {
+            if (i != held_up) return;
+            clock.sleep_until(clock.now_ns() + 250'000'000);
+            reading.status = status;
+            if (status == RigStatus::fault) reading.fault = RigFault::link_timeout;
+          };
+        });
+    EXPECT_EQ(run.result.outcome.reason, StopReason::overrun);
+  }
 }
 
 TEST(Session, SameSeedSameBytesAndAnotherSeedOthers) {

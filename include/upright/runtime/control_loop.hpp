@@ -42,6 +42,8 @@ class ControlLoop {
 
  private:
   void stop(LoopOutcome& outcome, StopReason reason, std::uint64_t first_bad) noexcept;
+  void stop_without_news(const Wake& wake, StopReason reason, std::uint64_t first_bad,
+                         LoopOutcome& outcome) noexcept;
   /// When the parts of a cycle were done, on the loop's clock.
   struct Stamps {
     std::int64_t read_ns, computed_ns, end_ns;
@@ -55,7 +57,7 @@ class ControlLoop {
   bool beyond_track(const Demand& demand) noexcept;
   bool strays_on_return() noexcept;
   void watch_encoders(const Wake& wake, bool balancing, LoopOutcome& outcome) noexcept;
-  void write(const Wake& wake, LoopOutcome& outcome) noexcept;
+  void write(const Wake& wake, std::int64_t computed_ns, LoopOutcome& outcome) noexcept;
   void count_missed(const Wake& wake, LoopOutcome& outcome) noexcept;
   void attribute_overrun(const Wake& wake, std::int64_t end_ns, LoopOutcome& outcome) noexcept;
   void show(const LoopOutcome& outcome) noexcept;
