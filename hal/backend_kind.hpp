@@ -5,7 +5,7 @@
 #include <memory>
 #include <string>
 
-#include "upright/base/yaml_reader.hpp"
+#include "base/yaml_keys.hpp"
 #include "upright/hal/rig.hpp"
 #include "upright/hal/rig_file.hpp"
 
@@ -13,12 +13,10 @@ namespace upright {
 
 struct BackendKind {
   const char* name;  ///< in rig files
-  /// Reads its section of a rig file in which it has a role, into `rig`, which has been read as far as
-  /// backends, calibration, amplifier and limits. Throws ConfigError. Null: `read_rig` reads it, for any rig
+  /// Visits its section of a rig file in which it has a role. `rig` has been visited as far as backends,
+  /// calibration, amplifier and limits. May throw ConfigError. Null: `rig_file.cpp` visits it, for any rig
   /// may have it.
-  void (*read)(const YamlMap& document, RigFile& rig);
-  /// The same section as text that reads back; empty where the rig has none. Null as `read`.
-  std::string (*text)(const RigFile& rig);
+  void (*keys)(YamlKeys& document, RigFile& rig);
   /// The rig, or its part that has the roles of this backend, for a loop of this period. Not open yet.
   std::unique_ptr<Rig> (*make)(const RigFile& rig, double period_s);
 };

@@ -7,10 +7,10 @@
 #include <vector>
 
 #include "backends.hpp"
+#include "base/yaml_keys.hpp"
 #include "gpio/gpio_section.hpp"
 #include "simulated/simulated_section.hpp"
 #include "upright/base/error.hpp"
-#include "yaml_words.hpp"
 
 namespace upright {
 
@@ -22,68 +22,91 @@ constexpr double longest_spin_us = 1e4;  // the loop also keeps it below half a 
 constexpr Words<2> poses = {"upright", "hanging"};
 constexpr Words<2> zeros = {"counts", "start"};
 
-int read_sign(const YamlMap& map) {
-  const int sign = small_integer(map, "sign", -1, 1);
-  if (sign == 0) map.fail("sign", "is 0", "give sign 1 or -1");
-  return sign;
+void sign_key(YamlKeys& keys, int& sign) {
+  keys.integer("sign", sign, -1, 1);
+  keys.check("sign", sign != 0, "is 0", "give sign 1 or -1");
 }
 
-EncoderCalibration read_encoder(const YamlMap& map, bool is_cart) {
-  EncoderCalibration encoder;
-  encoder.per_count = is_cart ? map.number("m_per_count", Range{1e-9, 1e-2})
-                              : 2.0 * std::numbers::pi / map.number("counts_per_revolution", Range{16, 1e8});
-  encoder.sign = read_sign(map);
-  encoder.width_bits = small_integer(map, "width_bits", 8, 32);
-  encoder.fastest_per_s = map.number(is_cart ? "fastest_mps" : "fastest_radps", Range{1e-3, 1e4});
-  map.finish();
-  return encoder;
-}
-
-Calibration read_calibration(const YamlMap& map) {
-  Calibration calibration;
-  calibration.cart = read_encoder(map.map("cart"), true);
-  calibration.pendulum = read_encoder(map.map("pendulum"), false);
-  const YamlMap zero = map.map("zero");
-  calibration.zero_at_start = choose<int>(zero, "at", zeros) == 1;
-  if (!calibration.zero_at_start) {
-    const auto counts = [&](const char* key, int width_bits) {
-      return zero.integer(key, -(std::int64_t{1} << (width_bits - 1)), (std::int64_t{1} << width_bits) - 1);
-    };
-    calibration.cart_zero_counts = counts("cart_counts", calibration.cart.width_bits);
-    calibration.pendulum_zero_counts = counts("pendulum_counts", calibration.pendulum.width_bits);
+/// Counts per revolution that give the same radians per count, bit for bit.
+double counts_per_revolution(double rad_per_count) {
+  const double turn = 2.0 * std::numbers::pi;
+  const double near = turn / rad_per_count;
+  if (turn / std::nearbyint(near) == rad_per_count) return std::nearbyint(near);
+  double low = near, high = near;
+  for (int i = 0; i < 16; ++i) {
+    if (turn / low == rad_per_count) return low;
+    if (turn / high == rad_per_count) return high;
+    low = std::nextafter(low, 0.0);
+    high = std::nextafter(high, 2.0 * high);
   }
-  calibration.zero_pose = choose<ZeroPose>(zero, "pose", poses);
-  zero.finish();
-  map.finish();
-  return calibration;
+  return near;
 }
 
-Backend choose_backend(const YamlMap& map, const std::string& key) {
-  std::vector<std::string> names;
-  for (DescribeBackend* describe : all_backends) names.emplace_back(describe().name);
-  const std::string name = map.choice(key, names);
-  return static_cast<Backend>(std::find(names.begin(), names.end(), name) - names.begin());
+void counts_per_revolution_key(YamlKeys& keys, double& rad_per_count) {
+  double counts = rad_per_count > 0.0 ? counts_per_revolution(rad_per_count) : 0.0;
+  keys.number("counts_per_revolution", counts, Range{16, 1e8});
+  rad_per_count = 2.0 * std::numbers::pi / counts;
 }
 
-void read_backends(const YamlMap& document, RigFile& rig) {
-  if (!document.is_map("backend")) {
-    rig.cart_encoder = rig.pendulum_encoder = rig.output = choose_backend(document, "backend");
+void encoder_keys(YamlKeys& keys, EncoderCalibration& encoder, bool is_cart) {
+  if (is_cart)
+    keys.number("m_per_count", encoder.per_count, Range{1e-9, 1e-2});
+  else
+    counts_per_revolution_key(keys, encoder.per_count);
+  sign_key(keys, encoder.sign);
+  keys.integer("width_bits", encoder.width_bits, 8, 32);
+  keys.number(is_cart ? "fastest_mps" : "fastest_radps", encoder.fastest_per_s, Range{1e-3, 1e4});
+}
+
+void zero_keys(YamlKeys& keys, Calibration& calibration) {
+  keys.one_of("at", calibration.zero_at_start, zeros);
+  if (!calibration.zero_at_start) {
+    const auto low = [](int width_bits) { return -(std::int64_t{1} << (width_bits - 1)); };
+    const auto high = [](int width_bits) { return (std::int64_t{1} << width_bits) - 1; };
+    const int cart_bits = calibration.cart.width_bits, pendulum_bits = calibration.pendulum.width_bits;
+    keys.integer("cart_counts", calibration.cart_zero_counts, low(cart_bits), high(cart_bits));
+    keys.integer("pendulum_counts", calibration.pendulum_zero_counts, low(pendulum_bits),
+                 high(pendulum_bits));
+  }
+  keys.one_of("pose", calibration.zero_pose, poses);
+}
+
+void calibration_keys(YamlKeys& keys, Calibration& calibration) {
+  keys.map("cart", [&](YamlKeys& map) { encoder_keys(map, calibration.cart, true); });
+  keys.map("pendulum", [&](YamlKeys& map) { encoder_keys(map, calibration.pendulum, false); });
+  keys.map("zero", [&](YamlKeys& map) { zero_keys(map, calibration); });
+}
+
+void backend_key(YamlKeys& keys, const char* key, Backend& backend) {
+  Words<all_backends.size()> names{};
+  for (std::size_t i = 0; i < names.size(); ++i) names[i] = all_backends[i]().name;
+  keys.one_of(key, backend, names);
+}
+
+void backends_by_part(YamlKeys& keys, RigFile& rig) {
+  const bool are_apart = rig.cart_encoder != rig.pendulum_encoder;
+  if (keys.given("cart_encoder", are_apart) || keys.given("pendulum_encoder", are_apart)) {
+    backend_key(keys, "cart_encoder", rig.cart_encoder);
+    backend_key(keys, "pendulum_encoder", rig.pendulum_encoder);
+  } else {
+    backend_key(keys, "encoders", rig.cart_encoder);
+    rig.pendulum_encoder = rig.cart_encoder;
+  }
+  backend_key(keys, "output", rig.output);
+}
+
+void backend_keys(YamlKeys& document, RigFile& rig) {
+  const bool is_one = rig.cart_encoder == rig.pendulum_encoder && rig.cart_encoder == rig.output;
+  if (!document.is_map("backend", !is_one)) {
+    backend_key(document, "backend", rig.output);
+    rig.cart_encoder = rig.pendulum_encoder = rig.output;
     return;
   }
-  const YamlMap map = document.map("backend");
-  if (map.has("cart_encoder") || map.has("pendulum_encoder")) {
-    rig.cart_encoder = choose_backend(map, "cart_encoder");
-    rig.pendulum_encoder = choose_backend(map, "pendulum_encoder");
-  } else {
-    rig.cart_encoder = rig.pendulum_encoder = choose_backend(map, "encoders");
-  }
-  rig.output = choose_backend(map, "output");
-  map.finish();
+  document.map("backend", [&](YamlKeys& map) { backends_by_part(map, rig); });
   const RigRoles simulated = roles_of(rig, Backend::simulated);
-  if (simulated.any() && !simulated.all())
-    document.fail("backend",
-                  "joins simulated to hardware, but a simulated plant moves by its own output only",
-                  "use simulated for all of it or for none");
+  document.check("backend", !simulated.any() || simulated.all(),
+                 "joins simulated to hardware, but a simulated plant moves by its own output only",
+                 "use simulated for all of it or for none");
 }
 
 bool uses(const RigFile& rig, Backend backend) {
@@ -110,51 +133,29 @@ void check_gpio_roles(const YamlMap& document, const RigFile& rig) {
   match("pendulum_encoder", roles.pendulum, rig.gpio->pendulum_encoder.has_value());
 }
 
-std::string backend_line(const RigFile& rig) {
-  const std::string cart = backend_name(rig.cart_encoder), pendulum = backend_name(rig.pendulum_encoder);
-  const std::string output = backend_name(rig.output);
-  if (cart != pendulum)
-    return "backend: {cart_encoder: " + cart + ", pendulum_encoder: " + pendulum + ", output: " + output +
-           "}\n";
-  if (cart != output) return "backend: {encoders: " + cart + ", output: " + output + "}\n";
-  return "backend: " + output + "\n";
-}
-
-std::string zero_text(const Calibration& calibration) {
-  std::string text = "{at: ";
-  if (calibration.zero_at_start)
-    text += "start";
-  else
-    text += "counts, cart_counts: " + std::to_string(calibration.cart_zero_counts) +
-            ", pendulum_counts: " + std::to_string(calibration.pendulum_zero_counts);
-  return text + ", pose: " + word_of(calibration.zero_pose, poses) + "}";
-}
-
-/// Counts per revolution whose reader gives the same radians per count, bit for bit.
-std::string counts_per_revolution_text(double rad_per_count) {
-  const double turn = 2.0 * std::numbers::pi;
-  const double near = turn / rad_per_count;
-  if (turn / std::nearbyint(near) == rad_per_count) return exact_text(std::nearbyint(near));
-  double low = near, high = near;
-  for (int i = 0; i < 16; ++i) {
-    if (turn / low == rad_per_count) return exact_text(low);
-    if (turn / high == rad_per_count) return exact_text(high);
-    low = std::nextafter(low, 0.0);
-    high = std::nextafter(high, 2.0 * high);
-  }
-  return exact_text(near);
-}
-
-std::string calibration_text(const Calibration& calibration) {
-  const EncoderCalibration& cart = calibration.cart;
-  const EncoderCalibration& pendulum = calibration.pendulum;
-  return "calibration:\n  cart: {m_per_count: " + exact_text(cart.per_count) +
-         ", sign: " + std::to_string(cart.sign) + ", width_bits: " + std::to_string(cart.width_bits) +
-         ", fastest_mps: " + exact_text(cart.fastest_per_s) +
-         "}\n  pendulum: {counts_per_revolution: " + counts_per_revolution_text(pendulum.per_count) +
-         ", sign: " + std::to_string(pendulum.sign) + ", width_bits: " + std::to_string(pendulum.width_bits) +
-         ", fastest_radps: " + exact_text(pendulum.fastest_per_s) + "}\n  zero: " + zero_text(calibration) +
-         "\n";
+/// The whole file.
+void rig_keys(YamlKeys& document, RigFile& rig) {
+  backend_keys(document, rig);
+  document.section("calibration", [&](YamlKeys& keys) { calibration_keys(keys, rig.calibration); });
+  document.map("amplifier", [&](YamlKeys& keys) {
+    keys.number("limit_v", rig.amplifier.limit_v, Range{0, 100, true});
+    sign_key(keys, rig.amplifier.sign);
+  });
+  document.map("track", [&](YamlKeys& keys) {
+    keys.number("limit_m", rig.track_limit_m, Range{0, 100, true});
+    keys.number("coast_s", rig.coast_s, Range::within(0, 10), 0.0);
+  });
+  document.number("fall_angle_rad", rig.fall_angle_rad, Range{0, std::numbers::pi, true});
+  document.number("watchdog_s", rig.watchdog_s, Range{0, RigFile::longest_watchdog_s, true});
+  document.number("spin_us", rig.spin_us, Range::within(0, longest_spin_us), 0.0, Usual::left_out);
+  if (uses(rig, Backend::simulated) || document.given("simulated", rig.simulated.has_value()))
+    document.section_of("simulated", rig.simulated, simulated_keys);
+  for (std::size_t i = 0; i < all_backends.size(); ++i)
+    if (const BackendKind kind = all_backends[i](); kind.keys && uses(rig, static_cast<Backend>(i)))
+      kind.keys(document, rig);
+  if (uses(rig, Backend::gpio) || document.given("gpio", rig.gpio.has_value())) gpio_keys(document, rig.gpio);
+  document.optional_map("encoder_watch", rig.encoder_watch, encoder_assumption_keys);
+  if (const YamlMap* map = document.source()) check_gpio_roles(*map, rig);
 }
 
 }  // namespace
@@ -194,28 +195,8 @@ Calibration calibration_in_use(const RigFile& rig) {
 RigFile read_rig(const YamlMap& document) {
   RigFile rig;
   rig.file = document.file();
-  read_backends(document, rig);
-  rig.calibration = read_calibration(document.map("calibration"));
-  const YamlMap amplifier = document.map("amplifier");
-  rig.amplifier.limit_v = amplifier.number("limit_v", Range{0, 100, true});
-  rig.amplifier.sign = read_sign(amplifier);
-  amplifier.finish();
-  const YamlMap track = document.map("track");
-  rig.track_limit_m = track.number("limit_m", Range{0, 100, true});
-  rig.coast_s = track.number_or("coast_s", 0.0, Range::within(0, 10));
-  track.finish();
-  rig.fall_angle_rad = document.number("fall_angle_rad", Range{0, std::numbers::pi, true});
-  rig.watchdog_s = document.number("watchdog_s", Range{0, RigFile::longest_watchdog_s, true});
-  rig.spin_us = document.number_or("spin_us", 0.0, Range::within(0, longest_spin_us));
-  if (uses(rig, Backend::simulated) || document.has("simulated"))
-    rig.simulated = read_simulated(document.map("simulated"));
-  for (std::size_t i = 0; i < all_backends.size(); ++i)
-    if (const BackendKind kind = all_backends[i](); kind.read && uses(rig, static_cast<Backend>(i)))
-      kind.read(document, rig);
-  if (uses(rig, Backend::gpio) || document.has("gpio")) rig.gpio = read_gpio(document.map("gpio"));
-  if (const auto watch = document.optional_map("encoder_watch"))
-    rig.encoder_watch = read_encoder_assumptions(*watch);
-  check_gpio_roles(document, rig);
+  YamlKeyReader reader(document);
+  rig_keys(reader, rig);
   document.finish();
   return rig;
 }
@@ -225,20 +206,10 @@ RigFile read_rig_file(const std::filesystem::path& file) {
 }
 
 std::string rig_text(const RigFile& rig) {
-  std::string text = backend_line(rig);
-  text += calibration_text(rig.calibration);
-  text += "amplifier: {limit_v: " + exact_text(rig.amplifier.limit_v) +
-          ", sign: " + std::to_string(rig.amplifier.sign) +
-          "}\ntrack: {limit_m: " + exact_text(rig.track_limit_m) + ", coast_s: " + exact_text(rig.coast_s) +
-          "}\nfall_angle_rad: " + exact_text(rig.fall_angle_rad) +
-          "\nwatchdog_s: " + exact_text(rig.watchdog_s) + "\n";
-  if (rig.spin_us > 0.0) text += "spin_us: " + exact_text(rig.spin_us) + "\n";
-  if (rig.simulated) text += simulated_text(*rig.simulated);
-  for (DescribeBackend* describe : all_backends)
-    if (const BackendKind kind = describe(); kind.text) text += kind.text(rig);
-  if (rig.gpio) text += gpio_text(*rig.gpio);
-  if (rig.encoder_watch) text += "encoder_watch: " + encoder_assumptions_text(*rig.encoder_watch) + "\n";
-  return text;
+  RigFile copy = rig;
+  YamlKeyWriter writer(YamlKeyWriter::Layout::lines);
+  rig_keys(writer, copy);
+  return writer.written();
 }
 
 }  // namespace upright

@@ -13,15 +13,16 @@ import pathlib
 import re
 import sys
 
-# Folders whose sources that name YamlMap or PieceKeys read files of the user, and single such sources.
+# Folders whose sources that name YamlMap, YamlKeys or PieceKeys read files of the user, and single such sources.
 READERS = ("src/model", "src/control", "src/sweep", "src/experiment", "hal", "src/measurement/dataset_file.cpp")
 JOURNAL = ("src/experiment/servo_model.cpp", "src/experiment/experiment.cpp")  # they read what the program wrote itself
 PAGES = ("docs/reference/files.md", "docs/reference/rig-files.md", "docs/reference/dataset-files.md",
          "docs/reference/experiment-files.md", "docs/reference/effects.md", "docs/explanation/quiet-control.md",
          "docs/how-to/run-sweeps.md")
 ASKED = re.compile(r'(?:\.|->)(?:number|number_or|optional_number|numbers|choice|flag|flag_or|integer|text|text_or|path|map|'
-                   r'optional_map|maps|has|is_map)\(\s*(?:is_cart \? )?"([a-z0-9_]+)"(?: : "([a-z0-9_]+)")?')
-HELPED = re.compile(r'\b\w+(?:<\w+>)?\((?:map|zero|grid|document|section), "([a-z0-9_]+)"|\bcounts\("([a-z0-9_]+)"'
+                   r'optional_map|maps|has|is_map|one_of|optional_integer|usual_map|section|section_of|items|given)'
+                   r'\(\s*(?:is_cart \? )?"([a-z0-9_]+)"(?: : "([a-z0-9_]+)")?')
+HELPED = re.compile(r'\b\w+(?:<\w+>)?\((?:map|keys|grid|document), "([a-z0-9_]+)"|\bencoder\("([a-z0-9_]+)"'
                     r'|\bkeys\.\w+\("([a-z0-9_]+)"')
 LISTED = re.compile(r'^\s*\{"([a-z0-9_]+)", &\w+::', re.MULTILINE)  # tables of keys and where they go
 
@@ -32,7 +33,7 @@ def keys_of(root):
         path = root / reader
         for file in sorted(path.rglob("*.?pp")) if path.is_dir() else [path]:
             text = file.read_text() if file.exists() else ""
-            if path.is_dir() and not re.search("YamlMap|PieceKeys", text) or file.relative_to(root).as_posix() in JOURNAL:
+            if path.is_dir() and not re.search("YamlMap|YamlKeys|PieceKeys", text) or file.relative_to(root).as_posix() in JOURNAL:
                 continue
             for match in [*ASKED.finditer(text), *HELPED.finditer(text), *LISTED.finditer(text)]:
                 for key in filter(None, match.groups()):

@@ -1,16 +1,14 @@
-// The section `gpio` of a rig file, read and written.
+// The section `gpio` of a rig file.
 #pragma once
 
-#include <string>
+#include <optional>
 
-#include "upright/base/yaml_reader.hpp"
+#include "base/yaml_keys.hpp"
 #include "upright/hal/gpio.hpp"
 
 namespace upright {
 
-/// Throws ConfigError with remedy, file, line and key.
-GpioRig read_gpio(const YamlMap& map);
-
-std::string gpio_text(const GpioRig& rig);
+/// Visits the section, which must be there to be read and is written where the rig has one.
+void gpio_keys(YamlKeys& document, std::optional<GpioRig>& rig);
 
 }  // namespace upright

@@ -1,16 +1,11 @@
-// Section `simulated` of a rig file, read and written.
+// The keys of section `simulated` of a rig file.
 #pragma once
 
-#include <string>
-
-#include "upright/base/yaml_reader.hpp"
+#include "base/yaml_keys.hpp"
 #include "upright/hal/rig_file.hpp"
 
 namespace upright {
 
-/// Throws ConfigError with remedy, file, line and key.
-SimulatedRig read_simulated(const YamlMap& map);
-
-std::string simulated_text(const SimulatedRig& rig);
+void simulated_keys(YamlKeys& keys, SimulatedRig& rig);
 
 }  // namespace upright

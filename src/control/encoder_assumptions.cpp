@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/yaml_keys.hpp"
 #include "upright/model/dynamics.hpp"
 #include "upright/model/plant_model.hpp"
 
@@ -92,34 +93,24 @@ EncoderAssumptions either(const EncoderAssumptions& a, const EncoderAssumptions&
           std::max(a.pivot_friction_mps2, b.pivot_friction_mps2)};
 }
 
-EncoderAssumptions read_encoder_assumptions(const YamlMap& section) {
-  EncoderAssumptions a;
-  if (const auto breakaway = section.optional_map("breakaway_v")) {
-    a.breakaway_v.low = breakaway->number("from", Range::within(0.0, 100.0));
-    a.breakaway_v.high = breakaway->number("to", Range::within(a.breakaway_v.low, 100.0));
-    breakaway->finish();
-  }
-  a.largest_lag_s = section.number_or("largest_lag_s", a.largest_lag_s, Range::within(0.0, 1.0));
-  a.acceleration_mps2_per_v =
-      section.number_or("acceleration_mps2_per_v", a.acceleration_mps2_per_v, Range{0.0, 1e4, true});
-  a.damping_v_per_mps = section.number_or("damping_v_per_mps", a.damping_v_per_mps, Range::within(0.0, 1e4));
-  a.unseen_travel_m = section.number_or("unseen_travel_m", a.unseen_travel_m, Range::within(0.0, 0.1));
-  a.longest_pendulum_m =
-      section.number_or("longest_pendulum_m", a.longest_pendulum_m, Range{0.0, 100.0, true});
-  a.pivot_friction_mps2 =
-      section.number_or("pivot_friction_mps2", a.pivot_friction_mps2, Range::within(0.0, 100.0));
-  section.finish();
-  return a;
+void encoder_assumption_keys(YamlKeys& keys, EncoderAssumptions& a) {
+  keys.usual_map("breakaway_v", [&](YamlKeys& breakaway) {
+    breakaway.number("from", a.breakaway_v.low, Range::within(0.0, 100.0));
+    breakaway.number("to", a.breakaway_v.high, Range::within(a.breakaway_v.low, 100.0));
+  });
+  keys.number("largest_lag_s", a.largest_lag_s, Range::within(0.0, 1.0), a.largest_lag_s);
+  keys.number("acceleration_mps2_per_v", a.acceleration_mps2_per_v, Range{0.0, 1e4, true},
+              a.acceleration_mps2_per_v);
+  keys.number("damping_v_per_mps", a.damping_v_per_mps, Range::within(0.0, 1e4), a.damping_v_per_mps);
+  keys.number("unseen_travel_m", a.unseen_travel_m, Range::within(0.0, 0.1), a.unseen_travel_m);
+  keys.number("longest_pendulum_m", a.longest_pendulum_m, Range{0.0, 100.0, true}, a.longest_pendulum_m);
+  keys.number("pivot_friction_mps2", a.pivot_friction_mps2, Range::within(0.0, 100.0), a.pivot_friction_mps2);
 }
 
-std::string encoder_assumptions_text(const EncoderAssumptions& a) {
-  return "{breakaway_v: {from: " + exact_text(a.breakaway_v.low) + ", to: " + exact_text(a.breakaway_v.high) +
-         "}, largest_lag_s: " + exact_text(a.largest_lag_s) +
-         ", acceleration_mps2_per_v: " + exact_text(a.acceleration_mps2_per_v) +
-         ", damping_v_per_mps: " + exact_text(a.damping_v_per_mps) +
-         ", unseen_travel_m: " + exact_text(a.unseen_travel_m) +
-         ", longest_pendulum_m: " + exact_text(a.longest_pendulum_m) +
-         ", pivot_friction_mps2: " + exact_text(a.pivot_friction_mps2) + "}";
+std::string encoder_assumptions_text(EncoderAssumptions assumptions) {
+  YamlKeyWriter writer(YamlKeyWriter::Layout::one_line);
+  encoder_assumption_keys(writer, assumptions);
+  return "{" + writer.written() + "}";
 }
 
 }  // namespace upright

@@ -14,13 +14,10 @@ constexpr double radians_per_degree = std::numbers::pi / 180.0;
 constexpr std::size_t most_list = 1000;
 constexpr std::size_t most_controllers = 8, longest_controller_name = 20;  // a table that can be read
 
-class KeyReader final : public PieceKeys {
+class KeyReader final : public PieceKeys, public YamlKeyReader {
  public:
-  explicit KeyReader(const YamlMap& map) : map_(map) {}
+  using YamlKeyReader::YamlKeyReader;
 
-  void number(const char* key, double& value, const Range& range, std::optional<double> otherwise) override {
-    value = otherwise ? map_.number_or(key, *otherwise, range) : map_.number(key, range);
-  }
   void numbers(const char* key, std::vector<double>& values, const Range& range) override {
     values = list(key, range);
   }
@@ -33,9 +30,6 @@ class KeyReader final : public PieceKeys {
       if (!(values[i] > values[i - 1]))
         map_.fail(key, "does not grow", "order the delays from short to long, each once");
   }
-  void integer(const char* key, int& value, int low, int high, int otherwise) override {
-    value = static_cast<int>(map_.integer_or(key, otherwise, low, high));
-  }
   void voltage(const char* key, double& value) override { value = map_.number(key, any_voltage); }
   void voltages(const char* key, std::vector<double>& values) override { values = list(key, any_voltage); }
   void largest_voltage(const char* key, double& value, double otherwise) override {
@@ -43,7 +37,7 @@ class KeyReader final : public PieceKeys {
   }
   void angle(const char* key, double& value_rad, const Range& degrees,
              std::optional<double> otherwise_deg) override {
-    number(key, value_rad, degrees, otherwise_deg);
+    number(key, value_rad, degrees, otherwise_deg, Usual::written);
     value_rad *= radians_per_degree;
   }
   void angle_or_list(const char* key, double& value_rad, std::vector<double>& values_rad,
@@ -51,12 +45,6 @@ class KeyReader final : public PieceKeys {
     if (!map_.has(key) || !map_.is_list(key)) return angle(key, value_rad, degrees, otherwise_deg);
     for (const double angle_deg : list(key, degrees)) values_rad.push_back(angle_deg * radians_per_degree);
   }
-  void choice(const char* key, std::size_t& word, const std::vector<std::string>& words) override {
-    if (!map_.has(key)) return;
-    word = static_cast<std::size_t>(std::find(words.begin(), words.end(), map_.choice(key, words)) -
-                                    words.begin());
-  }
-  void flag(const char* key, bool& value) override { value = map_.flag_or(key, false); }
   void controllers(const char* key, std::vector<NamedGains>& controllers) override {
     if (!map_.has(key)) return;
     const YamlMap files = map_.map(key);
@@ -72,9 +60,6 @@ class KeyReader final : public PieceKeys {
       map_.fail(
           key, "has " + std::to_string(controllers.size()) + " controllers",
           "give it 2 to " + std::to_string(most_controllers) + ", as {name: gain file, name: gain file}");
-  }
-  void check(const char* key, bool holds, const std::string& problem, const std::string& remedy) override {
-    if (!holds) map_.fail(key, problem, remedy);
   }
 
  private:
@@ -94,8 +79,6 @@ class KeyReader final : public PieceKeys {
       values.push_back(from + (to - from) * static_cast<double>(i) / static_cast<double>(count - 1));
     return values;
   }
-
-  const YamlMap& map_;
 };
 
 /// Degrees whose reader gives the same radians, bit for bit where there are any.
@@ -110,29 +93,15 @@ std::string degrees_text(double rad) {
   return exact_text(rounded * radians_per_degree == rad ? rounded : degrees);
 }
 
-template <class Text>
-std::string list_text(const std::vector<double>& values, const Text& text_of) {
-  std::string text = "[";
-  for (const double value : values) text += (text.size() > 1 ? ", " : "") + text_of(value);
-  return text + "]";
-}
-
-class KeyWriter final : public PieceKeys {
+class KeyWriter final : public PieceKeys, public YamlKeyWriter {
  public:
-  void number(const char* key, double& value, const Range&, std::optional<double>) override {
-    add(key, exact_text(value));
-  }
-  void numbers(const char* key, std::vector<double>& values, const Range&) override {
-    add(key, list_text(values, exact_text));
-  }
+  KeyWriter() : YamlKeyWriter(Layout::one_line) {}
+
   void growing(const char* key, std::vector<double>& values, const Range& range) override {
     numbers(key, values, range);
   }
-  void integer(const char* key, int& value, int, int, int) override { add(key, std::to_string(value)); }
   void voltage(const char* key, double& value) override { add(key, exact_text(value)); }
-  void voltages(const char* key, std::vector<double>& values) override {
-    add(key, list_text(values, exact_text));
-  }
+  void voltages(const char* key, std::vector<double>& values) override { numbers(key, values, any_voltage); }
   void largest_voltage(const char* key, double& value, double) override { add(key, exact_text(value)); }
   void angle(const char* key, double& value_rad, const Range&, std::optional<double>) override {
     add(key, degrees_text(value_rad));
@@ -140,12 +109,6 @@ class KeyWriter final : public PieceKeys {
   void angle_or_list(const char* key, double& value_rad, std::vector<double>& values_rad, const Range&,
                      double) override {
     add(key, values_rad.empty() ? degrees_text(value_rad) : list_text(values_rad, degrees_text));
-  }
-  void choice(const char* key, std::size_t& word, const std::vector<std::string>& words) override {
-    add(key, words[word]);
-  }
-  void flag(const char* key, bool& value) override {
-    if (value) add(key, "true");
   }
   void controllers(const char* key, std::vector<NamedGains>& controllers) override {
     if (controllers.empty()) return;
@@ -155,13 +118,6 @@ class KeyWriter final : public PieceKeys {
                yaml_quoted(std::filesystem::absolute(c.file).lexically_normal().string());
     add(key, files + "}");
   }
-
-  const std::string& text() const noexcept { return text_; }
-
- private:
-  void add(const char* key, const std::string& value) { text_ += std::string(", ") + key + ": " + value; }
-
-  std::string text_;
 };
 
 class LargestVoltage final : public PieceKeys {
@@ -234,7 +190,7 @@ void read_keys(PieceKind& kind, const YamlMap& map) {
 std::string keys_text(const PieceKind& kind) {
   KeyWriter writer;
   look(kind, writer);
-  return writer.text();
+  return writer.written().empty() ? "" : ", " + writer.written();
 }
 
 KeyedVoltage largest_voltage(const PieceKind& kind) {

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "base/yaml_keys.hpp"
 #include "upright/base/yaml_reader.hpp"
 
 namespace upright {
@@ -25,18 +26,13 @@ constexpr double longest_travel_m = 10.0;
 constexpr Range any_voltage{0.0, highest_voltage_v, true};
 constexpr Range any_duration{0.0, longest_piece_s, true};
 constexpr Range any_period = Range::within(0.01, longest_piece_s);
-constexpr std::nullopt_t required = std::nullopt;  ///< in place of a default
 
-/// Visits the keys of a piece in the order of the file. A visitor overrides what it cares for.
-class PieceKeys {
+/// Visits the keys of a piece: besides those that any section may have, some that mean voltages, angles or
+/// gain files.
+class PieceKeys : public virtual YamlKeys {
  public:
-  virtual ~PieceKeys() = default;
-  virtual void number(const char* /*key*/, double& /*value*/, const Range& /*range*/,
-                      std::optional<double> /*otherwise*/) {}
-  virtual void numbers(const char* /*key*/, std::vector<double>& /*values*/, const Range& /*range*/) {}
   /// A list that grows, or {from, to, count}.
   virtual void growing(const char* /*key*/, std::vector<double>& /*values*/, const Range& /*range*/) {}
-  virtual void integer(const char* /*key*/, int& /*value*/, int /*low*/, int /*high*/, int /*otherwise*/) {}
   /// A voltage that the piece puts out: the plan may lower it.
   virtual void voltage(const char* /*key*/, double& /*value*/) {}
   virtual void voltages(const char* /*key*/, std::vector<double>& /*values*/) {}
@@ -48,16 +44,8 @@ class PieceKeys {
   /// One angle, or a list of them: then `values_rad` is not empty.
   virtual void angle_or_list(const char* /*key*/, double& /*value_rad*/, std::vector<double>& /*values_rad*/,
                              const Range& /*degrees*/, double /*otherwise_deg*/) {}
-  /// One of `words`, the first where the key is left out.
-  virtual void choice(const char* /*key*/, std::size_t& /*word*/, const std::vector<std::string>& /*words*/) {
-  }
-  /// Left out: false.
-  virtual void flag(const char* /*key*/, bool& /*value*/) {}
   /// 2 to 8 gain files by name; left out: none.
   virtual void controllers(const char* /*key*/, std::vector<NamedGains>& /*controllers*/) {}
-  /// Refuses the file where `holds` is false. `problem` goes on from the key.
-  virtual void check(const char* /*key*/, bool /*holds*/, const std::string& /*problem*/,
-                     const std::string& /*remedy*/) {}
 };
 
 class PieceKind;

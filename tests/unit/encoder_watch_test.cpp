@@ -6,6 +6,8 @@
 #include <cmath>
 #include <random>
 
+#include "base/yaml_keys.hpp"
+
 namespace upright {
 namespace {
 
@@ -104,8 +106,10 @@ TEST(EncoderWatch, ReadsBackItsAssumptions) {
   a.breakaway_v = {0.125, 0.75};
   a.largest_lag_s = 0.01;
   const YamlMap document = YamlMap::from_text("encoder_watch: " + encoder_assumptions_text(a), "rig.yaml");
-  EXPECT_EQ(encoder_assumptions_text(read_encoder_assumptions(document.map("encoder_watch"))),
-            encoder_assumptions_text(a));
+  YamlKeyReader reader(document.map("encoder_watch"));
+  EncoderAssumptions again;
+  encoder_assumption_keys(reader, again);
+  EXPECT_EQ(encoder_assumptions_text(again), encoder_assumptions_text(a));
 }
 
 /// A cart and a pendulum that follow what the watch takes for granted: however the voltage goes, nobody is

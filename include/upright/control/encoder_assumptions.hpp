@@ -4,10 +4,11 @@
 
 #include <string>
 
-#include "upright/base/yaml_reader.hpp"
 #include "upright/model/plant.hpp"
 
 namespace upright {
+
+class YamlKeys;
 
 /// A quantity that lies between two values.
 struct Bounds {
@@ -42,9 +43,9 @@ EncoderAssumptions encoder_assumptions(const Plant& plant, double track_limit_m,
 /// Bounds that hold where either of two sets of bounds does.
 EncoderAssumptions either(const EncoderAssumptions& a, const EncoderAssumptions& b);
 
-/// The section `encoder_watch` of a rig file; what it leaves out keeps its default. Throws ConfigError.
-EncoderAssumptions read_encoder_assumptions(const YamlMap& section);
+/// The keys of the section `encoder_watch` of a rig file; one that is left out keeps its value.
+void encoder_assumption_keys(YamlKeys& keys, EncoderAssumptions& assumptions);
 /// The same section as a map on one line.
-std::string encoder_assumptions_text(const EncoderAssumptions& assumptions);
+std::string encoder_assumptions_text(EncoderAssumptions assumptions);
 
 }  // namespace upright

@@ -27,9 +27,9 @@ struct QuanserRig {
   // What `library` needs, loaded before it. One that is not there is left to the loader.
   std::string common_library = "libquanser_common.so";
   std::string runtime_library = "libquanser_runtime.so";
-  std::string board_type;        ///< "q2_usb": what hil_open takes as card type
-  std::string board_identifier;  ///< "0", or a URI
-  std::string board_options;     ///< for hil_set_card_specific_options; empty: none
+  std::string board_type;              ///< "q2_usb": what hil_open takes as card type
+  std::string board_identifier = "0";  ///< or a URI
+  std::string board_options;           ///< for hil_set_card_specific_options; empty: none
   std::optional<int> cart_channel;
   std::optional<int> pendulum_channel;
   std::optional<QuanserOutput> output;

@@ -41,9 +41,8 @@ class Balancing : public PieceKind {
   static constexpr double usual_release_deg = 2.0;
 
   void start_key(PieceKeys& keys) {
-    auto word = static_cast<std::size_t>(start_);
-    keys.choice("start", word, {"hand", "swing_up"});
-    start_ = static_cast<StartBy>(word);
+    constexpr Words<2> who = {"hand", "swing_up"};
+    keys.one_of("start", start_, who, StartBy::hand);
   }
   void patience_key(PieceKeys& keys) { keys.number("patience_s", patience_s_, any_duration, 60.0); }
 
