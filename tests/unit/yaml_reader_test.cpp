@@ -4,6 +4,7 @@
 
 #include <functional>
 
+#include "base/yaml_keys.hpp"
 #include "upright/base/error.hpp"
 
 namespace upright {
@@ -78,6 +79,69 @@ TEST(YamlReader, RefusesAZeroByteWhichNoPathCanHold) {
   EXPECT_THROW(YamlMap::from_text(std::string("plant: a\0b.yaml", 15), "bad.yaml"), ConfigError);
   EXPECT_THROW(YamlMap::from_text("plant: \"a\\0b.yaml\"", "bad.yaml"), ConfigError);
   EXPECT_THROW(YamlMap::from_text("\"plant\\x00\": a", "bad.yaml"), ConfigError);
+}
+
+/// A list of every sort of key.
+struct Device {
+  double gain = 0.0, offset = 0.5;
+  int channel = 0;
+  std::optional<int> line;
+  bool inverted = false;
+  std::string name;
+  std::vector<int> switches;
+
+  void keys(YamlKeys& keys) {
+    constexpr Words<2> senses = {"plain", "inverted"};
+    keys.text("name", name);
+    keys.number("gain", gain, Range::positive());
+    keys.number("offset", offset, Range::any(), 0.5, Usual::left_out);
+    keys.section("wiring", [&](YamlKeys& wiring) {
+      wiring.integer("channel", channel, 0, 7);
+      wiring.optional_integer("line", line, 0, 7);
+      wiring.one_of("sense", inverted, senses, false);
+    });
+    if (keys.given("switches", !switches.empty()))
+      keys.items("switches", switches, [](YamlKeys& item, int& at) { item.integer("at", at, 0, 99); });
+    keys.check("gain", gain < 100.0, "is too much", "lower it");
+  }
+  std::string text(YamlKeyWriter::Layout layout) const {
+    Device copy = *this;
+    YamlKeyWriter writer(layout);
+    copy.keys(writer);
+    return writer.written();
+  }
+  static Device read(const std::string& text) {
+    const YamlMap map = YamlMap::from_text(text, "f.yaml");
+    YamlKeyReader reader(map);
+    Device device;
+    device.keys(reader);
+    map.finish();
+    return device;
+  }
+};
+
+TEST(YamlKeys, OneListReadsWhatItWrites) {
+  using Layout = YamlKeyWriter::Layout;
+  const std::string lines =
+      "name: \"a \\\"b\\\"\"\ngain: 0.1\nwiring:\n  channel: 3\n  line: 5\n  sense: inverted\n"
+      "switches:\n  - {at: 7}\n  - {at: 8}\n";
+  const Device device = Device::read(lines);
+  EXPECT_EQ(device.name, "a \"b\"");
+  EXPECT_EQ(device.text(Layout::lines), lines);
+  const std::string line = device.text(Layout::one_line);
+  EXPECT_EQ(line,
+            "name: \"a \\\"b\\\"\", gain: 0.1, wiring: {channel: 3, line: 5, sense: inverted}, "
+            "switches: [{at: 7}, {at: 8}]");
+  EXPECT_EQ(Device::read("{" + line + "}").text(Layout::lines), lines);
+}
+
+TEST(YamlKeys, RefusesAsTheReaderDoes) {
+  const auto refusal = [](const std::string& text) { return message_of([&] { Device::read(text); }); };
+  EXPECT_EQ(refusal("name: a\ngain: 100\nwiring: {channel: 3}\n"), "f.yaml:2: gain is too much: lower it");
+  EXPECT_EQ(refusal("name: a\ngain: 1\nwiring: {channel: 3, lime: 5}\n"),
+            "f.yaml:3: wiring.lime is not a known key: did you mean line? otherwise remove it");
+  EXPECT_EQ(Device::read("name: a\ngain: 1\nwiring: {channel: 3}\n").text(YamlKeyWriter::Layout::one_line),
+            "name: \"a\", gain: 1.0, wiring: {channel: 3, sense: plain}");
 }
 
 }  // namespace
