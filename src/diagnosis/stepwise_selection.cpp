@@ -300,8 +300,10 @@ std::vector<StepwiseSelection::Believed> StepwiseSelection::believe(int round,
         "fitting " + kind_of(finalist.effect));
     Believed fitted{finalist.effect, finalist.hypothesis, 0.0};
     const Decision decision = try_finalist(round, calmly, fitted);
-    if (decision.accepted) believed.push_back(std::move(fitted));
-    if (decision.in_doubt()) doubtful.push_back(std::move(fitted));
+    if (decision.accepted)
+      believed.push_back(std::move(fitted));
+    else if (decision.in_doubt())
+      doubtful.push_back(std::move(fitted));
   }
   if (!believed.empty() || doubtful.empty()) return believed;
   if (!standing_) standing_.emplace(Standing{current_, found_});
@@ -346,6 +348,7 @@ std::size_t StepwiseSelection::choose(std::vector<Believed>& believed) {
       b.score += gain;
     }
   std::vector<Contender> contenders;
+  contenders.reserve(believed.size());
   for (const Believed& b : believed)
     contenders.push_back({b.effect, b.score, compare(current_, b.hypothesis).held});
   return best_of(contenders, policy_.acceptance);
