@@ -11,6 +11,7 @@
 #include <cmath>
 
 #include "hal/modbus_exception.hpp"
+#include "hal/voltage_freshness.hpp"
 #include "upright/base/error.hpp"
 
 namespace upright {
@@ -25,8 +26,6 @@ constexpr double open_patience_s = 1.0;
 constexpr double share_of_period = 0.75;  // the rest is for computing and writing
 constexpr int replies_until_certain = 3;  // a single one may have a wrong bit that nothing betrays
 constexpr int io_priority = 70;
-/// A cycle may begin up to a period late before it counts as missed; a voltage from before that is old.
-constexpr double freshness_periods = 2.0;
 
 std::int64_t now_ns() noexcept {
   timespec now{};

@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "hal/modbus_exception.hpp"
+#include "hal/voltage_freshness.hpp"
 
 namespace upright {
 
@@ -17,10 +18,6 @@ constexpr double longest_return_s = 10.0;   // several times the way at the scri
 constexpr double return_roll_s = 0.3;       // a braked cart rolls on for less than this times its velocity
 constexpr double return_slack_m = 0.05;     // what a swinging pendulum moves the cart against the motor
 constexpr double estimates_settle_s = 0.1;  // several time constants of a velocity filter
-
-/// A voltage that is computed later than so many periods after its cycle was due is old. A cycle may begin up
-/// to a period late before it counts as missed.
-constexpr std::uint64_t freshness_periods = 2;
 
 /// What a fault means for the loop: nothing yet while it is one of the link, which may pass within the
 /// watchdog time.
