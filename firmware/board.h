@@ -1,11 +1,11 @@
-// Which pin does what, per board, and the numbers that a builder may want to change. Also read by the assembler.
+// Pin assignments of each board, and the settings that a builder may change. The assembler also includes this file.
 #pragma once
 
 #include <avr/io.h>
 
-// Of the make variables (Makefile): SUPPLY_MV, BAUD, UNIT.
+// The Makefile sets SUPPLY_MV, BAUD and UNIT from variables of the same names.
 #ifndef SUPPLY_MV
-#define SUPPLY_MV 12000  // what the bridge gets: full duty is this voltage
+#define SUPPLY_MV 12000  // supply of the bridge; full duty gives this voltage
 #endif
 #ifndef BAUD
 #define BAUD 500000
@@ -14,8 +14,8 @@
 #define UNIT 1  // the device's Modbus address
 #endif
 
-// The four encoder lines are bits 0 to 3 of one port, so that one instruction takes them all at the same moment, and bear
-// the same names, A0 to A3, on both boards: cart A, cart B, pendulum A, pendulum B.
+// The four encoder lines are bits 0 to 3 of one port, so that one instruction reads all of them at the same moment. On
+// both boards they are A0 to A3: cart A, cart B, pendulum A, pendulum B.
 #if defined(__AVR_ATmega328P__)
 #define ENCODER_PIN PINC
 #define ENCODER_PORT PORTC
@@ -51,22 +51,22 @@
 #define PWM_DDR DDRB
 #define PWM_BIT 5  // D11, output A of timer 1
 #else
-#error "build for atmega328p or atmega2560"
+#error "this processor is not supported: build for atmega328p or atmega2560"
 #endif
 
 #if F_CPU != 16000000
-#error "the boards run at 16 MHz"
+#error "F_CPU must be 16000000, the clock of the boards"
 #endif
 #if F_CPU % (8L * BAUD) != 0
-#error "16 MHz gives 250000, 500000, 1000000 or 2000000 baud exactly; the usual 115200 or 921600 it does not"
+#error "BAUD does not divide 16 MHz exactly: use 250000, 500000, 1000000 or 2000000, not 115200 or 921600"
 #endif
 
-// The encoders are sampled by one interrupt at a fixed rate: an edge is never missed as long as those of one encoder are
-// further apart than a sample and the few cycles by which it may be late. The load is the same whatever the encoders do,
-// so that no noise on their lines can keep the processor from anything else.
+// One interrupt samples the encoders at a fixed rate. No edge is missed if the edges of one encoder are further apart
+// than the sample period and its jitter of a few cycles. The load does not depend on the encoders, so noise on their
+// lines cannot block the processor.
 #define CYCLES_PER_SAMPLE 128  // 125 kHz; the interrupt takes 47 to 80 of them
 
-// Where the sampler keeps what it needs at once: registers that are read in one cycle.
-#define LAST_LINES GPIOR0    // the encoders' lines in the upper four bits, as they were sampled last
+// The sampler keeps its state in registers that are read in one cycle.
+#define LAST_LINES GPIOR0    // the last sample of the encoder lines, in the upper four bits
 #define CART_LOW GPIOR1      // the lower eight bits of the counts
 #define PENDULUM_LOW GPIOR2

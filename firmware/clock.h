@@ -6,7 +6,7 @@
 #include "board.h"
 
 #define TICKS_PER_S (F_CPU / 1024)
-/// At least so many ticks as these microseconds.
+/// The number of ticks in these microseconds, rounded up.
 #define TICKS(us) (uint16_t)(((us) * (TICKS_PER_S / 25) + 39999) / 40000)
 
 static inline void clock_begin(void) {

@@ -1,4 +1,4 @@
-// Two quadrature encoders that are counted in quarter periods, in 32 bits.
+// Counts two quadrature encoders, four counts per period, in 32 bits.
 #pragma once
 
 #include <stdbool.h>
@@ -10,7 +10,7 @@ typedef struct {
 } counts_t;
 
 void encoders_begin(void);
-/// Both encoders at the same moment. To be called at least every quarter of a second, for the sampler counts in 16 bits.
+/// Both counts at the same moment. Call it at least every quarter of a second, because the sampler counts in 16 bits.
 counts_t encoders_latch(void);
-/// True, until the next reset: edges came faster than they are sampled, and the counts are wrong.
+/// True until the next reset if edges came faster than the sample rate, so that the counts are wrong.
 bool encoders_lost_edges(void);

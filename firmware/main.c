@@ -1,5 +1,5 @@
-// A board that is the Modbus RTU device of config/rigs/board.yaml: two encoders, a motor bridge, stop inputs, and a watchdog
-// that takes the voltage away. docs/how-to/build-a-board.md says how to build one.
+// Main program of a board that acts as the Modbus RTU device of config/rigs/board.yaml: two encoders, a motor bridge,
+// stop inputs, and a watchdog that switches the voltage off. See docs/how-to/build-a-board.md.
 #include <avr/eeprom.h>
 #include <avr/interrupt.h>
 #include <avr/wdt.h>
@@ -12,7 +12,7 @@
 
 static uint16_t EEMEM boots_kept;
 
-/// After a reset by the processor's watchdog it still runs, at its shortest time.
+/// After a reset by the processor's watchdog, the watchdog still runs with its shortest time.
 void stop_watchdog(void) __attribute__((naked, used, section(".init3")));
 void stop_watchdog(void) {
   MCUSR = 0;
@@ -32,7 +32,7 @@ int main(void) {
   modbus_begin();
   encoders_begin();
   sei();
-  // Nothing below takes a millisecond: a program that does not come round has gone astray, and is reset.
+  // One pass of the loop takes less than a millisecond. If a pass does not complete, the watchdog resets the processor.
   wdt_enable(WDTO_15MS);
   uint8_t before = clock_now();
   for (;;) {

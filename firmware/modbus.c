@@ -7,9 +7,9 @@
 #include "clock.h"
 #include "registers.h"
 
-// Where a request ends follows from its function and its length, so that it is answered at once. After a byte that belongs to
-// no request for us the line has to be silent before the next one counts, and a request that stops in the middle is given up
-// after the same silence. It is what the standard allows between two bytes of a frame above 19200 baud.
+// The function and the length of a request determine its end, so it is answered at once. After a byte that does not
+// belong to a request for this unit, bytes are ignored until the line has been silent. An incomplete request is
+// discarded after the same silence, which is the longest gap that the standard allows within a frame above 19200 baud.
 #define SILENCE_US 750UL
 #define LONGEST_FRAME 256
 #define ADDRESS_SIZE 1
@@ -20,13 +20,13 @@
 
 enum { READ_HOLDING = 0x03, READ_INPUT = 0x04, WRITE_SINGLE = 0x06, WRITE_MULTIPLE = 0x10, READ_WRITE = 0x17 };
 
-extern volatile uint8_t received[], received_head, line_errors;  // the sampler's
+extern volatile uint8_t received[], received_head, line_errors;  // written by the sampler
 
 static uint8_t frame[LONGEST_FRAME];
 static uint16_t frame_size;
-static uint16_t check;  // over what is in the frame
-static bool deaf;       // until the line is silent
-static uint8_t taken;   // how far the ring has been read
+static uint16_t check;  // CRC of the bytes in the frame
+static bool deaf;       // bytes are ignored until the line is silent
+static uint8_t taken;   // read position in the ring
 static uint16_t quiet_ticks;
 
 static uint8_t reply[ADDRESS_SIZE + 2 + 2 * READABLE_END + CHECK_SIZE];
@@ -79,7 +79,7 @@ static void add_registers(uint16_t first, uint16_t count) {
 static exception_t read(uint8_t function) {
   const uint16_t first = word_at(2), count = word_at(4);
   if (count == 0) return ILLEGAL_VALUE;
-  registers_latch();  // first: what was lost before has shown itself by the time it is asked for
+  registers_latch();  // first, so that edges lost before the request are detected
   const exception_t problem = registers_readable(first, count);
   if (problem != NO_EXCEPTION) return problem;
   begin_reply(function);
@@ -87,7 +87,7 @@ static exception_t read(uint8_t function) {
   return NO_EXCEPTION;
 }
 
-/// Address and quantity, or the value, as they came.
+/// The reply repeats the address and the quantity, or the value, of the request.
 static void repeat_request(void) {
   begin_reply(frame[1]);
   for (uint8_t i = 2; i < 6; ++i) add(frame[i]);
@@ -111,7 +111,7 @@ static exception_t write_multiple(void) {
   return NO_EXCEPTION;
 }
 
-/// Writes first, as the standard says, but nothing unless all of it can be done.
+/// Writes first, as the standard requires, but only if both the write and the read are possible.
 static exception_t read_write(void) {
   const uint16_t first = word_at(6), count = word_at(8);
   if (word_at(4) == 0 || count == 0 || count > LONGEST_FRAME / 2 || frame[10] != 2 * count) return ILLEGAL_VALUE;
@@ -148,8 +148,8 @@ static void answer(void) {
   send_reply();
 }
 
-/// The size of the frame as its beginning tells it; NOT_KNOWN_YET: it is too short to tell; UNTIL_SILENCE: of a function that
-/// we do not know.
+/// The size of the frame, from its first bytes. NOT_KNOWN_YET: more bytes are needed. UNTIL_SILENCE: the function is
+/// unknown, so the frame ends with a silence.
 static uint16_t whole_size(void) {
   if (frame_size < 2) return NOT_KNOWN_YET;
   switch (frame[1]) {
@@ -165,7 +165,7 @@ static uint16_t whole_size(void) {
   return UNTIL_SILENCE;
 }
 
-/// What has come is a request or nothing. The check over a frame with its own check sum is zero.
+/// Answers the frame if it is valid: the CRC over a frame that includes its check sum is zero.
 static void end_frame(void) {
   if (check == 0 && frame_size >= ADDRESS_SIZE + 1 + CHECK_SIZE)
     answer();
@@ -190,7 +190,7 @@ static void take(uint8_t byte) {
   if (frame_size == whole_size()) end_frame();
 }
 
-/// A frame of a function that we do not know ends here, too.
+/// A silence also ends a frame with an unknown function.
 static void note_silence(void) {
   if (!deaf && frame_size > 0 && whole_size() == UNTIL_SILENCE) end_frame();
   begin_frame();

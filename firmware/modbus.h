@@ -1,8 +1,8 @@
-// Modbus RTU on the board's serial line, as a device.
+// Modbus RTU device on the serial line of the board.
 #pragma once
 
 #include <stdint.h>
 
 void modbus_begin(void);
-/// Takes what has come, answers a request when it is whole, and puts out the next byte of a reply.
+/// Reads the received bytes, answers a complete request, and sends the next byte of a reply.
 void modbus_serve(uint8_t elapsed_ticks);

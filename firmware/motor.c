@@ -2,8 +2,8 @@
 
 #include "board.h"
 
-// Timer 1 makes 800 steps per period: 20 kHz, which nobody hears and common bridges follow. Full voltage is a step short of
-// all of them, since a bridge may need the gap to charge what drives its upper transistors.
+// Timer 1 counts 800 steps per period. The resulting 20 kHz is inaudible and suits common bridges. The largest width is
+// one step less than a period, since a bridge may need this gap to recharge the gate supply of its upper transistors.
 #define STEPS 800
 #define MOST_STEPS (STEPS - 1)
 #define CONNECTED (1 << COM1A1 | 1 << WGM11)
@@ -17,10 +17,10 @@
 #define LAMP_BIT 7
 #endif
 
-static bool driven;     // the timer has the pin
-static bool backwards;  // the direction's level
+static bool driven;     // the timer drives the pin
+static bool backwards;  // the level of the direction pin
 
-/// The pin's own level is low; the timer in its other mode takes a new width at once.
+/// The pin is then low. In the normal mode the timer applies a new width at once.
 static void disconnect(void) {
   TCCR1A = 0;
   PWM_PORT &= (uint8_t)~(1 << PWM_BIT);
@@ -44,12 +44,12 @@ void motor_drive(int16_t millivolts) {
   const bool back = millivolts < 0;
   const uint16_t size = back ? (uint16_t)(0 - (uint16_t)millivolts) : (uint16_t)millivolts;
   const uint16_t steps = size >= SUPPLY_MV ? MOST_STEPS : (uint16_t)((uint32_t)size * STEPS / SUPPLY_MV);
-  // With width 0 the timer would still give a spike of one cycle.
+  // With width 0 the timer would still produce a pulse of one cycle.
   if (steps == 0) {
     disconnect();
     return;
   }
-  // Never the old width in the new direction.
+  // Prevents the old width in the new direction.
   if (driven && back != backwards) disconnect();
   if (back)
     DIRECTION_PORT |= 1 << DIRECTION_BIT;

@@ -1,13 +1,13 @@
-// The voltage that the bridge gives the motor: PWM at 20 kHz, a direction, and the bridge's enable.
+// Controls the motor voltage through the bridge: PWM at 20 kHz, direction and enable.
 #pragma once
 
 #include <stdbool.h>
 #include <stdint.h>
 
 void motor_begin(void);
-/// In millivolts; what the supply does not give is clamped.
+/// In millivolts, clamped to the supply voltage.
 void motor_drive(int16_t millivolts);
-/// The enable line, and the board's own lamp.
+/// Sets the enable line and the LED of the board.
 void motor_enable(bool on);
-/// Zero volts and not enabled, within microseconds.
+/// Sets zero volts and disables the bridge, within microseconds.
 void motor_off(void);

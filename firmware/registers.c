@@ -14,13 +14,13 @@ static counts_t latched;
 static uint16_t boot_count, sequence;
 static int16_t voltage_mv;
 static bool enabled;
-static uint16_t watchdog_ms;  // 0 after a reset: nobody has said anything
+static uint16_t watchdog_ms;  // 0 after a reset: not set yet, so the default applies
 static uint32_t ticks_left;
 static uint8_t status;
-// Inputs that were active whenever they were looked at, in this tick and in all of the one before.
+// Inputs that were active in every sample of this tick, and of the whole previous tick.
 static uint8_t steady, steady_before;
 
-/// The stop inputs that are active, as bits of the status. Switches open when pressed, and a pull-up makes the line high.
+/// The active stop inputs, as status bits. A switch opens when pressed, and a pull-up then makes the line high.
 static uint8_t active_inputs(void) {
   const uint8_t lines = STOP_PIN;
   uint8_t active = 0;
@@ -103,7 +103,7 @@ static void drive(void) {
   motor_enable(true);
 }
 
-/// Switching off forgets what has stopped the motor, as far as it is over; lost edges only a reset brings back.
+/// Disabling clears the causes of a stop that are no longer present. Only a reset clears lost edges.
 static void set_enabled(uint16_t word) {
   if (word == 0) {
     status &= (uint8_t)(active_inputs() | STATUS_EDGES_LOST);

@@ -1,4 +1,4 @@
-// The device's register map (docs/how-to/build-a-board.md), and what writing to it does.
+// The register map of the device (docs/how-to/build-a-board.md), and the effects of writing to it.
 #pragma once
 
 #include <stdbool.h>
@@ -28,7 +28,7 @@ enum {
   STATUS_WATCHDOG = 1 << 4
 };
 
-/// What Modbus calls an exception; NO_EXCEPTION: done.
+/// Modbus exceptions. NO_EXCEPTION: the request was executed.
 typedef enum {
   NO_EXCEPTION = 0,
   ILLEGAL_FUNCTION = 1,
@@ -38,15 +38,15 @@ typedef enum {
 } exception_t;
 
 void registers_begin(uint16_t boot_count);
-/// Takes the counts, at one moment, for the reads that follow.
+/// Latches both counts at one moment for the following reads.
 void registers_latch(void);
-/// Whether all of them can be read now, or written. Nothing has happened yet.
+/// Whether all these registers can be read now, or written. Changes nothing.
 exception_t registers_readable(uint16_t first, uint16_t count);
 exception_t registers_writable(uint16_t first, uint16_t count, const uint8_t *bytes);
 uint16_t registers_read(uint16_t address);
-/// Bytes as they travel, the high one first; all of them take effect together.
+/// `bytes` are in the order of the line, high byte first. All registers take effect together.
 void registers_write(uint16_t first, uint16_t count, const uint8_t *bytes);
-/// A valid request came: the watchdog begins anew.
+/// Resets the watchdog after a valid request.
 void registers_feed(void);
-/// To be called as often as possible: stop inputs, lost edges and the watchdog take the voltage away.
+/// Call it as often as possible: stop inputs, lost edges and the watchdog switch the voltage off here.
 void registers_watch(uint8_t elapsed_ticks);

@@ -1,16 +1,16 @@
-; The one interrupt of the firmware, every CYCLES_PER_SAMPLE cycles: takes the four encoder lines at once, counts, and takes a
-; byte from the serial line where there is one. In assembler, since it runs 125,000 times per second.
+; The only interrupt of the firmware, every CYCLES_PER_SAMPLE cycles. It samples the four encoder lines at once, counts,
+; and reads a byte from the serial line if there is one. It is in assembler because it runs 125,000 times per second.
 #define __SFR_OFFSET 0
 #include "board.h"
 
-; A step of one encoder in an entry of the table.
+; Bits of one encoder in an entry of the table.
 #define MOVED 1
 #define DOWN 2
 #define PENDULUM_SHIFT 2
 #define SKIPPED_BIT 7
 
-; What each encoder's lines mean together with those of the sample before: indexed by (before << 4 | now).
-; The lines as a number, B the upper bit, run 0, 1, 3, 2 as the shaft turns up: n ^ n >> 1 is where it stands.
+; The step of each encoder from the previous sample to the present one, indexed by (before << 4 | now).
+; With B as the upper bit, the lines run through 0, 1, 3, 2 when the shaft turns up, and n ^ n >> 1 is the position.
   .section .progmem.data.steps, "a", @progbits
   .balign 256
 steps:
@@ -36,7 +36,7 @@ steps:
     .set index, index + 1
   .endr
 
-; The bytes received, in a ring of a whole page: its place is the upper half of the address.
+; Ring of the received bytes. It fills an aligned page of 256 bytes, so the lower half of the address is the position.
   .section .bss.received, "aw", @nobits
   .balign 256
   .global received
@@ -48,7 +48,7 @@ received:
 received_head:
   .space 1
   .global line_errors
-line_errors:              ; not zero: a byte came in a broken frame, or came and found no room
+line_errors:              ; not zero: a byte had a framing error, or was lost because the buffer was full
   .space 1
   .global cart_high
 cart_high:
@@ -57,7 +57,7 @@ cart_high:
 pendulum_high:
   .space 1
   .global edges_lost
-edges_lost:               ; not zero: an encoder moved by two between two samples, which way nobody knows
+edges_lost:               ; not zero: an encoder moved by two counts between two samples, in an unknown direction
   .space 1
 
   .section .text

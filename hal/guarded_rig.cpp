@@ -27,6 +27,8 @@ class GuardedRig final : public Rig {
   int last_exception() const noexcept override { return rig_->last_exception(); }
   SafetyInputs safety_inputs() const noexcept override { return rig_->safety_inputs(); }
   DeviceFacts device_facts() const override { return rig_->device_facts(); }
+  bool is_clock() const noexcept override { return rig_->is_clock(); }
+  DeviceSample wait_next(std::int64_t until_ns) noexcept override { return rig_->wait_next(until_ns); }
 
   RigReading read() noexcept override {
     RigReading reading = rig_->read();

@@ -82,6 +82,12 @@ class JoinedRig final : public Rig {
     return all;
   }
 
+  bool is_clock() const noexcept override { return clock_part() != nullptr; }
+  DeviceSample wait_next(std::int64_t until_ns) noexcept override {
+    Rig* const clock = clock_part();
+    return clock == nullptr ? DeviceSample{} : clock->wait_next(until_ns);
+  }
+
   int last_exception() const noexcept override {
     for (const Part& part : parts_)
       if (const int number = part.rig->last_exception(); number != 0) return number;
@@ -89,6 +95,13 @@ class JoinedRig final : public Rig {
   }
 
  private:
+  /// The part whose device is the clock; null: none.
+  Rig* clock_part() const noexcept {
+    for (const Part& part : parts_)
+      if (part.rig->is_clock()) return part.rig.get();
+    return nullptr;
+  }
+
   static RigReading read_part(Part& part) noexcept {
     RigReading reading = part.rig->read();
     if (reading.status != RigStatus::fresh) return reading;

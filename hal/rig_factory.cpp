@@ -43,18 +43,19 @@ void require_link_fits(const RigFile& rig, double period_s) {
   if (rig.quanser && rig.quanser->watchdog_s > 0.0 && rig.quanser->watchdog_s < fewest_periods * period_s)
     throw ConfigError(file + "quanser_hil.watchdog_s is " + exact_text(rig.quanser->watchdog_s) +
                       ", less than twice " + period +
-                      ": raise sample_rate_hz in the gain file, or give quanser_hil.watchdog_s at least " +
+                      ": raise sample_rate_hz in the gain file, or set quanser_hil.watchdog_s to at least " +
                       exact_text(fewest_periods * period_s));
   if (!rig.modbus || is_simulated(rig)) return;
   if (rig.modbus->response_timeout_s >= period_s)
-    throw ConfigError(file + "modbus.response_timeout_s is " + exact_text(rig.modbus->response_timeout_s) +
-                      ", and " + period + " is no longer: lower sample_rate_hz in the gain file, or give " +
-                      "modbus.response_timeout_s less than the period");
+    throw ConfigError(
+        file + "modbus.response_timeout_s is " + exact_text(rig.modbus->response_timeout_s) +
+        ", which is not less than " + period +
+        ": lower sample_rate_hz in the gain file, or reduce modbus.response_timeout_s below it");
   if (!rig.modbus->device.empty() && line_time_s(rig) >= period_s)
     throw ConfigError(file + "modbus.baud is " + std::to_string(rig.modbus->baud) +
-                      ", at which the bytes of " + "one period take " + exact_text(line_time_s(rig)) +
-                      " s, and " + period +
-                      " is no longer: lower sample_rate_hz in the gain file, or raise modbus.baud");
+                      ", at which one period's bytes take " + exact_text(line_time_s(rig)) +
+                      " s, which is not less than " + period +
+                      ": lower sample_rate_hz in the gain file, or raise modbus.baud");
 }
 
 std::unique_ptr<Rig> assembled(std::unique_ptr<Rig> parts, const RigFile& rig) {

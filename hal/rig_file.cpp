@@ -9,6 +9,7 @@
 #include "backends.hpp"
 #include "base/yaml_keys.hpp"
 #include "gpio/gpio_section.hpp"
+#include "rig_keys.hpp"
 #include "simulated/simulated_section.hpp"
 #include "upright/base/error.hpp"
 
@@ -24,7 +25,7 @@ constexpr Words<2> zeros = {"counts", "start"};
 
 void sign_key(YamlKeys& keys, int& sign) {
   keys.integer("sign", sign, -1, 1);
-  keys.check("sign", sign != 0, "is 0", "give sign 1 or -1");
+  keys.check("sign", sign != 0, "is 0", "use 1 or -1");
 }
 
 /// Counts per revolution that give the same radians per count, bit for bit.
@@ -105,8 +106,8 @@ void backend_keys(YamlKeys& document, RigFile& rig) {
   document.map("backend", [&](YamlKeys& map) { backends_by_part(map, rig); });
   const RigRoles simulated = roles_of(rig, Backend::simulated);
   document.check("backend", !simulated.any() || simulated.all(),
-                 "joins simulated to hardware, but a simulated plant moves by its own output only",
-                 "use simulated for all of it or for none");
+                 "combines simulated with hardware, but a simulated plant responds only to its own output",
+                 "use simulated for all parts or for none");
 }
 
 bool uses(const RigFile& rig, Backend backend) {
@@ -117,23 +118,24 @@ bool uses(const RigFile& rig, Backend backend) {
 void check_gpio_roles(const YamlMap& document, const RigFile& rig) {
   const RigRoles roles = roles_of(rig, Backend::gpio);
   if (roles.output)
-    document.fail("backend", "gives the output to gpio, whose lines cannot carry a voltage",
-                  "name another backend as output");
+    document.fail("backend", "uses gpio as output, but digital lines cannot carry the motor voltage",
+                  "use another backend as output");
   if (!rig.gpio) return;
   const YamlMap section = document.map("gpio");
   const auto match = [&](const char* key, bool is_wanted, bool is_there) {
     if (is_wanted && !is_there)
-      section.fail(key, "is missing, though backend takes its counts from gpio",
+      section.fail(key, "is missing, but backend reads its counts from gpio",
                    std::string("add ") + key + " (its lines a and b)");
     if (!is_wanted && is_there)
-      section.fail(key, "is not in use, since backend takes its counts from elsewhere",
-                   std::string("remove ") + key + ", or name gpio as its backend");
+      section.fail(key, "is not used, because backend reads its counts from another backend",
+                   std::string("remove ") + key + ", or use gpio as its backend");
   };
   match("cart_encoder", roles.cart, rig.gpio->cart_encoder.has_value());
   match("pendulum_encoder", roles.pendulum, rig.gpio->pendulum_encoder.has_value());
 }
 
-/// The whole file.
+}  // namespace
+
 void rig_keys(YamlKeys& document, RigFile& rig) {
   backend_keys(document, rig);
   document.section("calibration", [&](YamlKeys& keys) { calibration_keys(keys, rig.calibration); });
@@ -158,8 +160,6 @@ void rig_keys(YamlKeys& document, RigFile& rig) {
   if (const YamlMap* map = document.source()) check_gpio_roles(*map, rig);
 }
 
-}  // namespace
-
 std::string backend_name(Backend backend) {
   return all_backends.at(static_cast<std::size_t>(backend))().name;
 }
@@ -176,7 +176,7 @@ std::string backends_text(const RigFile& rig) {
   const std::string cart = backend_name(rig.cart_encoder), pendulum = backend_name(rig.pendulum_encoder);
   const std::string output = backend_name(rig.output);
   if (cart != pendulum)
-    return "cart's encoder " + cart + ", pendulum's encoder " + pendulum + ", output " + output;
+    return "cart encoder " + cart + ", pendulum encoder " + pendulum + ", output " + output;
   return cart == output ? output : "encoders " + cart + ", output " + output;
 }
 

@@ -29,7 +29,7 @@ void RigLock::take(const std::string& link) {
   std::copy(name.begin(), name.end(), address.sun_path + 1);
   const auto size = static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + 1 + name.size());
   const int descriptor = ::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0);
-  if (descriptor < 0) throw DeviceError("no socket can be had: raise the limit of open files");
+  if (descriptor < 0) throw DeviceError("no socket can be opened: raise the limit on open files (ulimit -n)");
   if (::bind(descriptor, reinterpret_cast<const sockaddr*>(&address), size) != 0) {
     const int problem = errno;
     ::close(descriptor);
@@ -37,7 +37,7 @@ void RigLock::take(const std::string& link) {
       throw DeviceError("the rig at " + link +
                         " already has a controller on this machine: end the other program first");
     throw DeviceError("the rig at " + link + " cannot be reserved (" + std::strerror(problem) +
-                      "): check the limits of this machine");
+                      "): check the resource limits of this computer");
   }
   descriptor_ = descriptor;
 }

@@ -1,9 +1,9 @@
 #!/usr/bin/env bash
-# Builds the program for three processors side by side, x86-64, x86-64-v3 (AVX2) and x86-64-v4 (AVX-512), and compares
-# what must not differ, byte for byte: logs of `run --fast`, their replay by each other's program, and docs/paper.md with
-# its figures. A program that this processor cannot run is built but not compared, which is said.
-#   scripts/check-same-bits.sh [FOLDER]     builds and results are kept in FOLDER, build/same-bits when none is named
-# UPRIGHT_SKIP_PAPER=1 leaves out the paper, which takes the most time.
+# Checks that results do not depend on the processor. Builds the program for x86-64, x86-64-v3 (AVX2) and x86-64-v4
+# (AVX-512) and compares byte for byte: logs of `run --fast`, each log replayed by the other builds, and docs/paper.md
+# with its figures. A build that this processor cannot run is reported and not compared.
+#   scripts/check-same-bits.sh [FOLDER]     FOLDER keeps builds and results (default: build/same-bits)
+# UPRIGHT_SKIP_PAPER=1 skips the paper, which takes most of the time.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -19,11 +19,11 @@ for arch in x86-64 x86-64-v3 x86-64-v4; do
   if /lib64/ld-linux-x86-64.so.2 --help | grep -q "^  $arch (supported" || [ "$arch" = x86-64 ]; then
     programs+=("$arch")
   else
-    echo "!! NOT COMPARED: this processor does not run $arch"
+    echo "!! NOT COMPARED: this processor cannot run $arch"
   fi
 done
 
-# As libm sees a processor without fused multiply-add.
+# Makes libm behave as on a processor without fused multiply-add.
 older="glibc.cpu.hwcaps=-AVX512F,-AVX2,-FMA,-FMA4,-AVX"
 rm -rf "$folder/results"
 # run ARCH LABEL ENVIRONMENT: a log for each gain file, with each plant.
@@ -34,7 +34,7 @@ run() {
       -e "s,noise: {cart_m: 0.0,noise: {cart_m: 1.0e-5," config/rigs/simulated.yaml >"$folder/rig-$plant.yaml"
     for gain in config/gains/*.yaml; do
       out=$folder/results/$2/$plant-$(basename "$gain" .yaml)
-      # A run that falls is a log as well (exit code 3).
+      # A run that falls also has a log (exit code 3).
       env $3 "$folder/$1/src/cli/upright" run --fast --duration 20 --theta0-deg 2 --seed 5 --rig "$folder/rig-$plant.yaml" \
         --gains "$gain" --out "$out" >/dev/null || [ $? = 3 ]
     done
@@ -48,19 +48,20 @@ for other in "${programs[@]:1}" older-libm; do
   for run in "$folder/results/$first"/*; do
     name=$(basename "$run")
     cmp "$run"/*/samples.csv "$folder/results/$other/$name"/*/samples.csv || different=1
-    # The log of one build, replayed by the other.
+    # Replay the log of one build with the other.
     program=$folder/$other/src/cli/upright
     [ -x "$program" ] || continue
-    "$program" replay "$run"/* >/dev/null || { echo "$other does not replay $run" >&2; different=1; }
+    "$program" replay "$run"/* >/dev/null || { echo "$other cannot replay $run" >&2; different=1; }
   done
 done
-echo "logs: $(find "$folder/results/$first" -name samples.csv | wc -l) runs each of ${programs[*]} and with an older libm"
+runs=$(find "$folder/results/$first" -name samples.csv | wc -l)
+echo "logs compared: $runs runs each of ${programs[*]} and with an older libm"
 
 if [ -z "${UPRIGHT_SKIP_PAPER:-}" ]; then
   for arch in "${programs[@]}"; do
     "$folder/$arch/src/cli/upright" paper --config config --out "$folder/paper-$arch" --overwrite >/dev/null
     diff -r "$folder/paper-$first" "$folder/paper-$arch" || different=1
   done
-  echo "paper: ${programs[*]}"
+  echo "paper compared: ${programs[*]}"
 fi
-[ $different = 0 ] && echo "the same bits" || { echo "NOT the same bits" >&2; exit 1; }
+[ $different = 0 ] && echo "all results are identical" || { echo "results DIFFER: see the lines above" >&2; exit 1; }

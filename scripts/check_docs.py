@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
-"""Checks that what README.md, the other pages beside it and docs/ point at is there: links, anchors, and files of the sources named in code style.
+"""Checks the links, anchors and names of source files in README.md, the pages beside it, and docs/.
 
   scripts/check_docs.py [--root FOLDER]
 
-- A link to a file of the repository leads to a file, and its anchor to a heading of that page.
-- `name.cpp` is a source of that name; `src/folder/name.hpp` is a file at that place.
-Ends with 1 and a line for each finding. Links to the web are not followed.
+- A link to a file of the repository must lead to a file, and its anchor to a heading of that page.
+- `name.cpp` in code style must be a source of that name, and `src/folder/name.hpp` a file at that path.
+The exit code is 1, with a line for each finding. Links to the web are not followed.
 """
 import argparse
 import pathlib
@@ -19,7 +19,7 @@ FENCE = re.compile(r"^```.*?^```", re.MULTILINE | re.DOTALL)
 
 
 def anchors_of(text):
-    """The anchors that GitHub makes of the headings of a page."""
+    """The anchors that GitHub creates for the headings of a page."""
     found = set()
     for heading in re.findall(r"^#+ +(.*)$", FENCE.sub("", text), re.MULTILINE):
         words = re.sub(r"[`*]|\[([^\]]*)\]\([^)]*\)", r"\1", heading).strip().lower()
@@ -45,7 +45,7 @@ def findings_of(page, root, files):
         name, _, anchor = target.partition("#")
         file = (page.parent / name).resolve() if name else page
         if not file.exists():
-            yield f"{where(match)}: links to {target}, which is not there: correct the link"
+            yield f"{where(match)}: links to {target}, which does not exist: correct the link"
         elif anchor and file.suffix == ".md" and anchor not in anchors_of(file.read_text()):
             yield f"{where(match)}: links to {target}, but that page has no such heading: correct the anchor"
     names = {pathlib.PurePosixPath(file).name for file in files}
@@ -53,7 +53,7 @@ def findings_of(page, root, files):
         name = match.group(1)
         here = (page.parent / name).resolve()
         if name not in files and not here.exists() and ("/" in name or name not in names):
-            yield f"{where(match)}: names {name}, which is no file of the repository: correct the name"
+            yield f"{where(match)}: names {name}, which is not a file of the repository: correct the name"
 
 
 def main():

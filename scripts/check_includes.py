@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Checks that each folder includes only what its CMake target may use, and that docs/architecture.md says the same.
+"""Checks that each folder includes only what its CMake target may use, and that docs/architecture.md agrees.
 
   scripts/check_includes.py [--root FOLDER] [--write]
 
@@ -9,7 +9,7 @@ A file may include
   - of a target that its own links, directly or through others: a header in include/upright/FOLDER, or one that the
     target lists under OFFERS.
 Tests may include every header. Two targets may not use each other. `--write` writes the table of folders into
-docs/architecture.md instead of comparing it. Ends with 1 and a line for each finding when something is wrong.
+docs/architecture.md instead of comparing it. The exit code is 1, with a line for each finding.
 """
 import argparse
 import pathlib
@@ -38,7 +38,7 @@ class Target:
 
 
 def words_after(keyword, text):
-    """The words of a CMake call between KEYWORD and the next keyword in capitals."""
+    """The words of a CMake call between `keyword` and the next keyword in capitals."""
     match = re.search(rf"\b{keyword}\b(.*?)(?=\b(?:SOURCES|OFFERS|LINK|PRIVATE|PUBLIC)\b|$)", text, re.DOTALL)
     return match.group(1).split() if match else []
 
@@ -67,7 +67,7 @@ def read_targets(root):
 
 
 def used_by(target, by_name):
-    """All targets that this one links, also through others."""
+    """All targets that this one links, directly or through others."""
     found, open_ = {}, list(target.links)
     while open_:
         name = open_.pop()
@@ -84,7 +84,7 @@ def cycles(targets):
 
 
 def owner_of(path, targets):
-    """The target whose folder, or whose part of include/upright, holds a path."""
+    """The target whose folder, or whose part of include/upright, contains a path."""
     def holds(target):
         api = (API / target.short).as_posix()
         return any(path.startswith(folder + "/") for folder in (target.folder, api))
@@ -106,7 +106,7 @@ def wrong_includes(root, targets):
             path = file.relative_to(root).as_posix()
             owner = owner_of(path, targets)
             if not owner:
-                findings.append(f"{path}: in no target's folder: move it to one")
+                findings.append(f"{path}: is in no target's folder: move it to one")
                 continue
             may_use = used_by(owner, by_name)
             for match in INCLUDE.finditer(file.read_text()):
@@ -123,12 +123,12 @@ def wrong_includes(root, targets):
                     findings.append(f"{where} of {other.name}, which {owner.name} does not link: link it, or move what is shared")
                 elif not is_api and header.removeprefix(other.folder + "/") not in other.offers:
                     findings.append(f"{where}, which {other.name} does not offer: list it under OFFERS in "
-                                    f"{other.folder}/CMakeLists.txt, or do without it")
+                                    f"{other.folder}/CMakeLists.txt, or remove the include")
     return findings
 
 
 def unused_offers(root, targets):
-    """Headers that are offered and that nobody takes, or that do not exist."""
+    """Headers that are offered but not included elsewhere, or that do not exist."""
     taken = set()
     for top in ("include", *ROOTS, "tests"):
         for file in (root / top).rglob("*.?pp"):
@@ -137,12 +137,12 @@ def unused_offers(root, targets):
                 header = resolve(root, file, include)
                 if header and owner_of(header, targets) is not owner_of(path, targets):
                     taken.add(header)
-    return [f"{target.folder}/CMakeLists.txt: offers {header}, which nobody outside includes: leave it out"
+    return [f"{target.folder}/CMakeLists.txt: offers {header}, which no other folder includes: remove it from OFFERS"
             for target in targets for header in sorted(target.offers) if f"{target.folder}/{header}" not in taken]
 
 
 def in_order(targets):
-    """What stands lower first."""
+    """Lower targets come first."""
     by_name = {target.name: target for target in targets}
     return sorted(targets, key=lambda target: (len(used_by(target, by_name)), target.folder))
 
@@ -163,12 +163,12 @@ def check_table(root, targets, write):
     text = page.read_text()
     begin, end = text.find(TABLE_BEGIN), text.find(TABLE_END)
     if begin < 0 or end < 0:
-        return [f"docs/architecture.md: holds no table between '{TABLE_BEGIN}' and '{TABLE_END}': put the two lines in"]
+        return [f"docs/architecture.md: has no table between '{TABLE_BEGIN}' and '{TABLE_END}': insert the two lines"]
     table = table_of(targets)
     if text[begin:end + len(TABLE_END)] == table:
         return []
     if not write:
-        return ["docs/architecture.md: its table of folders is not that of the targets: run scripts/check_includes.py --write"]
+        return ["docs/architecture.md: the table of folders differs from the targets: run scripts/check_includes.py --write"]
     page.write_text(text[:begin] + table + text[end + len(TABLE_END):])
     return []
 
@@ -181,7 +181,7 @@ def main():
     root = arguments.root.resolve()
     targets = read_targets(root)
     findings = cycles(targets) or wrong_includes(root, targets) + unused_offers(root, targets)
-    findings += [f"{target.folder}/CMakeLists.txt: its first line does not say what it holds: begin it with '# Holds: ...'"
+    findings += [f"{target.folder}/CMakeLists.txt: the first line does not say what the folder holds: begin it with '# Holds: ...'"
                  for target in targets if not target.holds]
     findings += check_table(root, targets, arguments.write)
     for finding in findings:

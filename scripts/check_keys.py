@@ -1,21 +1,21 @@
 #!/usr/bin/env python3
-"""Checks that the reference has every key that a reader of files accepts, and none besides.
+"""Checks that the reference has every key that a reader of files accepts, and no other.
 
   scripts/check_keys.py [--root FOLDER]
 
-- A key is a word that a reader asks its YAML map for, as in `map.number("delay_s", ...)`.
-- It must stand in the reference, in code style or in a listing.
-- What the first column of a table of keys names must be a key of a reader.
-Ends with 1 and a line for each finding.
+- A key is a word that a reader requests from its YAML map, as in `map.number("delay_s", ...)`.
+- It must appear in the reference, in code style or in a listing.
+- Each name in the first column of a table of keys must be a key of a reader.
+The exit code is 1, with a line for each finding.
 """
 import argparse
 import pathlib
 import re
 import sys
 
-# Folders whose sources that name YamlMap, YamlKeys or PieceKeys read files of the user, and single such sources.
+# Folders and files of the readers. In a folder, the sources that name YamlMap, YamlKeys or PieceKeys are readers.
 READERS = ("src/model", "src/control", "src/sweep", "src/experiment", "hal", "src/measurement/dataset_file.cpp")
-JOURNAL = ("src/experiment/servo_model.cpp", "src/experiment/experiment.cpp")  # they read what the program wrote itself
+JOURNAL = ("src/experiment/servo_model.cpp", "src/experiment/experiment.cpp")  # they read files that the program wrote
 PAGES = ("docs/reference/files.md", "docs/reference/rig-files.md", "docs/reference/dataset-files.md",
          "docs/reference/experiment-files.md", "docs/reference/effects.md", "docs/explanation/quiet-control.md",
          "docs/how-to/run-sweeps.md")
@@ -24,7 +24,7 @@ ASKED = re.compile(r'(?:\.|->)(?:number|number_or|optional_number|numbers|choice
                    r'\(\s*(?:is_cart \? )?"([a-z0-9_]+)"(?: : "([a-z0-9_]+)")?')
 HELPED = re.compile(r'\b\w+(?:<\w+>)?\((?:map|keys|grid|document), "([a-z0-9_]+)"|\bencoder\("([a-z0-9_]+)"'
                     r'|\bkeys\.\w+\("([a-z0-9_]+)"')
-LISTED = re.compile(r'^\s*\{"([a-z0-9_]+)", &\w+::', re.MULTILINE)  # tables of keys and where they go
+LISTED = re.compile(r'^\s*\{"([a-z0-9_]+)", &\w+::', re.MULTILINE)  # tables of keys and their destinations
 
 
 def keys_of(root):
@@ -50,7 +50,7 @@ def named_in(text):
 
 
 def table_keys(text):
-    """Keys that tables of keys name in their first column, with the number of the line."""
+    """Keys in the first column of tables of keys, with their line numbers."""
     in_table = False
     for number, line in enumerate(text.split("\n"), 1):
         if not line.startswith("|"):
@@ -72,7 +72,7 @@ def main():
     findings = [f"{file}: reads {key}, which the reference does not have: describe it in docs/reference"
                 for key, file in sorted(keys.items()) if key not in named]
     for page, text in pages.items():
-        findings += [f"{page}:{line}: has the key {key}, which no reader asks for: correct it"
+        findings += [f"{page}:{line}: has the key {key}, which no reader accepts: correct it"
                      for line, key in table_keys(text) if key not in keys]
     for finding in findings:
         print(finding, file=sys.stderr)

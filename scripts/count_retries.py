@@ -1,22 +1,23 @@
 #!/usr/bin/env python3
-"""Counts what tests in real time tried again, and what tests skipped; fails above the budget.
+"""Counts retried and skipped tests, and fails if they exceed the budget.
 
   scripts/count_retries.py BUILD_FOLDER...
 
-Of each build folder it reads retries_and_skips.log, a line for each retry and skip that a stall of the machine excused
-(tests/support/real_time.hpp) and for tests that could not be run at all, and ctest.xml, what ctest said of its last run, if they
-are there. No file: nothing to count.
+Reads two files of each build folder, if they exist: retries_and_skips.log has a line for each retry and skip because of
+a stall of the machine (tests/support/real_time.hpp) and for tests that could not run; ctest.xml is the output of the
+last ctest.
 """
 import pathlib
 import re
 import sys
 import xml.etree.ElementTree
 
-# The budgets of one run of all tests, of .ci/run and of scripts/test.sh alike.
-MOST_RETRIES = 20        # of some 250 test cases in real time: more says that the machine is too busy to judge by
-MOST_STALLED_SKIPS = 2   # of the same: what was skipped was not tested
-# Tests that need what is not everywhere, each with its remedy in its output: measured data (1), a second variant of libm (1),
-# memory that can be locked (1), a browser (4), MPI (1), pymodbus (7), a mount name space (1), a model of friction (1).
+# The budgets for one run of all tests, with .ci/run or scripts/test.sh.
+MOST_RETRIES = 20        # of about 250 test cases in real time; with more, the machine is too busy for valid results
+MOST_STALLED_SKIPS = 2   # of the same; a skipped test has tested nothing
+# Tests whose requirements may be missing; the output of each says what to install. Measured data (1), a second variant
+# of libm (1), memory that can be locked (1), a browser (4), MPI (1), pymodbus (7), a mount name space (1), a model of
+# friction (1).
 MOST_OTHER_SKIPS = 17
 
 
@@ -48,15 +49,16 @@ def main(folders):
         if ctest.exists():
             counts.read_ctest(ctest)
     too_many = False
-    for what, found, most in (("retries after a stall of the machine", counts.retries, MOST_RETRIES),
-                              ("tests skipped, each attempt hit by a stall", counts.stalled, MOST_STALLED_SKIPS),
-                              ("tests skipped for what is not here", counts.other, MOST_OTHER_SKIPS)):
+    for what, found, most in (("retries because of a stall of the machine", counts.retries, MOST_RETRIES),
+                              ("tests skipped because every attempt met a stall", counts.stalled, MOST_STALLED_SKIPS),
+                              ("tests skipped because a requirement is missing", counts.other, MOST_OTHER_SKIPS)):
         print(f"{len(found)} {what} (at most {most})")
         for entry in found:
             print(f"  {entry[:150]}")
         too_many = too_many or len(found) > most
     if too_many:
-        print("FAILED: more retries or skips than the budget at the top of scripts/count_retries.py", file=sys.stderr)
+        print("FAILED: retries or skips exceed the budget in scripts/count_retries.py: repeat on an idle machine, or install"
+              " what the skipped tests require", file=sys.stderr)
     return 1 if too_many else 0
 
 

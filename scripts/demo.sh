@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Balances the pendulum for 10 s without hardware: the plant runs in real time behind a real Modbus server, and the
-# controller talks to it over TCP as it would to a rig. Installs what is missing; needs git and apt, nothing else.
+# Balances the pendulum for 10 s without hardware. A Modbus server simulates the plant in real time, and the controller
+# communicates with it over TCP as with a real rig. Installs missing packages; requires only git and apt.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -19,7 +19,7 @@ finish() {
 }
 trap finish EXIT
 
-# Port 0 takes a free port; the virtual rig says which.
+# Port 0 selects a free port, which the virtual rig prints.
 "$upright" virtual-rig --rig config/rigs/modbus-tcp.yaml --plant config/plants/exponential.yaml \
   --tcp 127.0.0.1:0 --theta0-deg 3 >"$work/server.out" &
 server=$!
@@ -27,14 +27,14 @@ port=
 for _ in $(seq 100); do
   port=$(sed -n 's/^listening on .*:\([0-9]*\)$/\1/p' "$work/server.out")
   [ -z "$port" ] || break
-  kill -0 "$server" 2>/dev/null || exit 4 # it has said why
+  kill -0 "$server" 2>/dev/null || exit 4 # it has printed the reason
   sleep 0.1
 done
-[ -n "$port" ] || { echo "the virtual rig did not start within 10 s: look at the machine's load" >&2; exit 4; }
+[ -n "$port" ] || { echo "the virtual rig did not start within 10 s: reduce the load on this computer" >&2; exit 4; }
 
 sed -e "s/^  port: .*/  port: $port/" -e "s#\.\./plants/#$PWD/config/plants/#" config/rigs/modbus-tcp.yaml >"$work/rig.yaml"
 
-# --unchecked: a virtual rig's signs are those of its file. A stopped run (exit code 3) has its data and its report too.
+# --unchecked: the signs of a virtual rig match its file. A stopped run (exit code 3) also has data and a report.
 status=0
 "$upright" run --rig "$work/rig.yaml" --gains config/gains/exponential.yaml --duration 10 --label demo \
   --unchecked >"$work/run.out" || status=$?

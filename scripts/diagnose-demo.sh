@@ -1,14 +1,14 @@
 #!/usr/bin/env bash
-# The diagnosis on the paper's own case: a plant file with viscous friction only, against runs of a (simulated) rig that has
-# stick-slip. Builds if it must, makes six runs of 8 s in virtual time, and lets `upright diagnose` find what is missing.
-#   scripts/diagnose-demo.sh [FOLDER]      FOLDER is a new temporary one when none is named
+# Demonstrates the diagnosis with the paper's case: the plant file has viscous friction only, and the simulated rig has
+# stick-slip. Builds the program if necessary, makes six runs of 8 s in virtual time, and runs `upright diagnose`.
+#   scripts/diagnose-demo.sh [FOLDER]      FOLDER keeps the results (default: a new temporary folder)
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
 upright=$(scripts/program.sh)
 folder=${1:-$(mktemp -d)}
 
-# Gains, starting angle in degrees, delay in seconds: delays make the cart move far enough to show how friction slides.
+# Gains, initial angle in degrees, delay in seconds. The delays increase the cart's motion, which excites the friction.
 number=0
 while read -r gains theta0_deg delay_s; do
   number=$((number + 1))

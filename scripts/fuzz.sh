@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Fuzzes the file readers, starting from the repository's own files.
-#   scripts/fuzz.sh [SECONDS]       60 when none are named
+# Fuzzes the file readers. The corpus starts with the example files of the repository.
+#   scripts/fuzz.sh [SECONDS]       default: 60
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -16,7 +16,7 @@ for file in config/*/*.yaml config/experiments/*/*.yaml tests/acceptance/malform
   number=$((number + 1))
   cp "$file" "$corpus/$number"
 done
-# A table of measured data with enough rows for the check of mistakes, and how one is described.
+# A table of measured data with enough rows for the data checks, and a dataset file for it.
 awk 'BEGIN { print "time_s,voltage_v,cart_m,theta_rad"
   for (k = 0; k < 170; k++) printf "%.2f,%.1f,%.4f,%.3f\n", k / 100, cos(k / 8), -cos(k / 8) / 20, 3.14 + sin(k / 9) }' \
   >"$corpus/table"

@@ -1,10 +1,10 @@
 #!/usr/bin/env bash
-# Installs the Debian 12 packages that upright is built from. Quiet and quick when all are there.
-#   scripts/install-deps.sh         what building and the demo need
-#   scripts/install-deps.sh --test  also the browser that the live page is tested in
-#   scripts/install-deps.sh --kernel  also what boots a kernel for the tests of GPIO and Comedi
-#   scripts/install-deps.sh --dev   also what .ci/run needs: all these, clang's formatter, linter, sanitizers, fuzzer; ccache; what
-#                                   compiles and emulates the firmware of a board; and a spelling checker
+# Installs the Debian 12 packages that upright requires. Does nothing if all are installed.
+#   scripts/install-deps.sh           packages for building and for the demo
+#   scripts/install-deps.sh --test    also the browser for the tests of the live page
+#   scripts/install-deps.sh --kernel  also QEMU and busybox for the kernel tests of GPIO and Comedi
+#   scripts/install-deps.sh --dev     also everything for .ci/run: all of these, clang's formatter, linter, sanitizers and
+#                                     fuzzer, ccache, compiler and emulator for the board's firmware, a spelling checker
 set -euo pipefail
 
 packages=(
@@ -29,7 +29,7 @@ case "${1:-}" in
 esac
 
 command -v apt-get >/dev/null || {
-  echo "install these packages by hand (no apt-get here): ${packages[*]}" >&2
+  echo "apt-get is not available: install these packages by other means: ${packages[*]}" >&2
   exit 2
 }
 
@@ -43,7 +43,7 @@ done
 as_root=()
 if [ "$(id -u)" -ne 0 ]; then
   command -v sudo >/dev/null || {
-    echo "run it as root, or install sudo: these packages are missing: ${missing[*]}" >&2
+    echo "packages are missing: ${missing[*]}: run this script as root, or install sudo" >&2
     exit 2
   }
   as_root=(sudo)
@@ -55,5 +55,6 @@ trap 'rm -f "$log"' EXIT
 quietly() {
   "$@" </dev/null >"$log" 2>&1 || { tail -n 30 "$log" >&2; return 1; }
 }
-quietly "${as_root[@]}" apt-get update || echo "the package lists could not be renewed; trying with those at hand" >&2
+quietly "${as_root[@]}" apt-get update ||
+  echo "the package lists could not be updated; continuing with the present lists" >&2
 quietly "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y --no-install-recommends "${missing[@]}"

@@ -1,7 +1,7 @@
-"""clang-tidy over the sources under the folders named: lint.py COMPILE_COMMANDS FOLDER...
+"""Runs clang-tidy on the sources in the given folders: lint.py COMPILE_COMMANDS FOLDER...
 
-Nearly all of its time goes into the headers that a source includes, so the sources of one library are read as one
-text. Sources that do not compile together, for both define a name of their own, go into a further text.
+Parsing headers takes nearly all of the time, so the sources of one library are checked as one translation unit.
+Sources that do not compile together, because both define the same name, go into separate units.
 """
 import collections
 import concurrent.futures
@@ -14,7 +14,7 @@ import sys
 import tempfile
 
 TOOLS = {"compiler": "clang++-14", "tidy": "clang-tidy-14"}
-# What g++ understands and clang does not.
+# Options of g++ that clang does not support.
 FOREIGN = re.compile(r"-fno-gnu-unique|-fno-sanitize-recover.*|-ffp-contract=.*|-mmemset-strategy=.*|-Wno-maybe-uninitialized|-W(all|extra|pedantic|shadow|error)")
 
 
@@ -32,7 +32,7 @@ def flags_of(command):
 
 
 def libraries(commands, folders):
-    """Sources that are compiled alike, in one list each."""
+    """Lists of sources that are compiled with the same flags."""
     groups = collections.defaultdict(list)
     for entry in commands:
         name = os.path.relpath(entry["file"])
@@ -46,7 +46,7 @@ def text_of(sources):
 
 
 def read_as_one(sources, flags, folder):
-    """Splits sources into lists that compile as one text each; says what does not compile by itself."""
+    """Splits sources into lists that compile together; also returns the errors of sources that do not compile alone."""
     lists, problems, left = [], "", sources
     while left:
         file = os.path.join(folder, f"{len(os.listdir(folder))}.cpp")
@@ -60,7 +60,7 @@ def read_as_one(sources, flags, folder):
             if len(together) == 1 or not said:
                 problems += said
                 break
-            # A clash that shows in a header only names no source: then half of them.
+            # An error in a header names no source: then try half of the sources.
             kept = [s for s in together if s not in bad] if bad else together[:len(together) // 2]
             together = kept or together[:1]
         lists.append(file)
@@ -90,7 +90,7 @@ def main(database, folders):
         problems += [said for said in pool.map(lambda text: tidy(*text), texts) if said]
     sys.stderr.write("\n".join(problems))
     count = sum(len(sources) for sources in groups.values())
-    print(f"{count} sources in {len(texts)} texts: {'not clean' if problems else 'clean'}")
+    print(f"{count} sources in {len(texts)} units: {'findings above' if problems else 'no findings'}")
     return 1 if problems or not count else 0
 
 

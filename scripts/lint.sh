@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# clang-tidy over our own sources; .clang-tidy says which checks.
+# Runs clang-tidy on all sources with the checks of .clang-tidy.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 

@@ -1,16 +1,16 @@
 #!/usr/bin/env python3
-"""A manifest of what upright computes: one SHA-256 for each output, to compare two builds on one machine.
+"""Prints a SHA-256 for each output of upright, to compare two builds on one machine.
 
   output_manifest.py BUILD MATRIX WORK [--cases N] [--threads N] [--data DIR] [--only WORD]
 
-BUILD is the folder of a build (build/ci), MATRIX the build whose diagnosis_matrix makes the cases: name the same one
-for both manifests. WORK is a folder for what is made; it may be kept for the next call. Prints "SHA256  NAME" lines.
-What differs from call to call by nature (times of day, durations, the commit, folders) is taken out before.
---cases N    diagnoses N cases of the matrix (100)
---threads N  of each search (UPRIGHT_THREADS)
---data DIR   diagnoses the measurements of other laboratories too (../shared/data)
---only WORD  only outputs whose name begins so: design, margin, sweep, run, identify, diagnose, data
-Two builds compute the same if `diff` finds the same manifests:
+BUILD is a build folder (build/ci). MATRIX is the build whose diagnosis_matrix makes the cases: use the same one for both
+manifests. WORK is a folder for intermediate files, which may be reused. Prints "SHA256  NAME" lines. Values that always
+differ between calls (times of day, durations, the commit, folders) are removed first.
+--cases N    number of cases of the matrix to diagnose (100)
+--threads N  threads of each search (UPRIGHT_THREADS)
+--data DIR   also diagnose the measurements of other laboratories (../shared/data)
+--only WORD  only outputs whose name begins with WORD: design, margin, sweep, run, identify, diagnose, data
+Two builds compute the same results if `diff` finds no difference between their manifests:
   scripts/output_manifest.py build/before build/before /tmp/m > before.txt
   scripts/output_manifest.py build/after build/before /tmp/m > after.txt && diff before.txt after.txt
 """

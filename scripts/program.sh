@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Prints where the program is; builds it first where it is not there yet.
+# Prints the path of the program. Builds the program first if it does not exist.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 

@@ -1,12 +1,12 @@
 #!/usr/bin/env bash
-# Measurements of other laboratories, diagnosed: writes a dataset and a plant file for each, lets `upright diagnose` and
-# `upright report` run, and prints the table of what was found (docs/results/real-data.md holds a measured one).
-#   scripts/real-data.sh DATA [OUT] [NAME...]    DATA holds the folders emps, aau, uw and canterbury, which are not part of
-#                                                this repository; OUT is a new temporary folder when none is named; NAMEs
-#                                                (as in the table) choose some of the diagnoses
-# What is in OUT already is not diagnosed again.
+# Diagnoses measurements of other laboratories: writes a dataset file and a plant file for each, runs `upright diagnose`
+# and `upright report`, and prints a table of the results (docs/results/real-data.md has such a table).
+#   scripts/real-data.sh DATA [OUT] [NAME...]    DATA contains the folders emps, aau, uw and canterbury, which are not
+#                                                part of this repository; OUT keeps the results (default: a new temporary
+#                                                folder); NAMEs (as in the table) select some of the diagnoses
+# Diagnoses that OUT already contains are not repeated.
 set -euo pipefail
-data=$(realpath "${1:?name the folder that holds emps, aau, uw and canterbury}")
+data=$(realpath "${1:?the first argument is missing: name the folder that contains emps, aau, uw and canterbury}")
 cd "$(dirname "$0")/.."
 
 upright=$(scripts/program.sh)

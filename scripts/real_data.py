@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
-"""Plant and dataset files for measurements of other laboratories, and the table of their diagnoses.
+"""Writes plant and dataset files for measurements of other laboratories, and the table of their diagnoses.
 
   real_data.py prepare DATA OUT    writes OUT/<name>/plant.yaml and data*.yaml for the files below DATA
-  real_data.py table OUT           the table of every OUT/<name>/diagnosis, as Markdown
+  real_data.py table OUT           prints a Markdown table of every OUT/<name>/diagnosis
 
-Only the standard library is used. See scripts/real-data.sh.
+Uses the standard library only. See scripts/real-data.sh.
 """
 import csv
 import json
@@ -19,7 +19,7 @@ EMPS_PLANT = """plant:
   effects:
     - {kind: viscous_friction, coefficient_n_per_mps: 203.5034}
 """
-# The current in ampere stands for the voltage: k_tau / r = 0.0934 / 0.028 N/A, and no back-EMF.
+# The current in ampere replaces the voltage: k_tau / r = 0.0934 / 0.028 N/A, and no back-EMF.
 AAU_CART_PLANT = """plant:
   cart_mass_kg: 6.28
   gravity_mps2: 9.82
@@ -77,7 +77,7 @@ def aau_decay(data):
 
 
 def sources(data):
-    """Name: plant file, dataset files, and what the authors or the ladder of SOURCE.md say."""
+    """Name: plant file, dataset files, and the findings of the authors or of the ladder in SOURCE.md."""
     return {
         "emps": (
             EMPS_PLANT,
@@ -158,14 +158,14 @@ def table(out):
             continue
         rows.append((name, said, json.loads(file.read_text()), rms_off(out / name / "diagnosis" / "traces.csv"),
                      (out / name / "seconds.txt").read_text().strip()))
-    print("| data | gap before | gap after | off before | off after | verdict | seconds |")
+    print("| data | gap before | gap after | RMS error before | RMS error after | verdict | seconds |")
     print("|---|---|---|---|---|---|---|")
     for name, _, found, off, seconds in rows:
         text = [" and ".join(f"{1e3 * pair[step]:.3g} {'mm' if q == 'cart' else 'mrad'}" for q, pair in off.items())
                 for step in (0, 1)]
         print(f"| {name} | {found['gap']['before']:.3g} | {found['gap']['after']:.3g} | {text[0]} | {text[1]} |"
               f" {found['verdict']} | {seconds} |")
-    print("\n| data | named, with 95 % intervals | what is left | authors, or the ladder of SOURCE.md |")
+    print("\n| data | effects found, with 95 % intervals | residual | authors, or the ladder of SOURCE.md |")
     print("|---|---|---|---|")
     for name, said, found, _, _ in rows:
         named = "; ".join(in_words(effect) for effect in found["effects"]) or "nothing"

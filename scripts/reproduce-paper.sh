@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Recomputes the paper's figures and tables into docs/paper.md and docs/paper/. Builds what is needed first.
-#   scripts/reproduce-paper.sh [FOLDER]     FOLDER is docs when none is named
+# Computes the paper's figures and tables and writes docs/paper.md and docs/paper/. Builds the program first.
+#   scripts/reproduce-paper.sh [FOLDER]     FOLDER replaces docs
 set -euo pipefail
 cd "$(dirname "$0")/.."
 

@@ -1,15 +1,20 @@
 #!/usr/bin/env python3
-"""Lets the controller run for long and holds what it leaves behind against what it should.
+"""Runs the controller for a long time and checks its memory, its clock and its records.
 
   scripts/soak.py [--virtual-hours 2] [--real-minutes 10] [--seed N] [--rate 200] [--binary PATH] [--keep FOLDER] [--busy]
                   [--stalls PROGRAM --retry-log FILE]
 
-First in virtual time on the simulated rig, then in real time over Modbus TCP against `upright virtual-rig`, whose replies are
-late, lost, corrupt, old or out of order at random (--seed). Both parts are judged alike: memory of every process once it is
-warm, ticks and time stamps of each row, the rows against what run.yaml counted, the replay, the report and what both took.
---busy: on a machine that has other work, a run that stopped for being late (and only for that) is followed by another one until
-the time is up; how often is said. --stalls (tests/support/stall_answers.cpp): the same where a stall of the machine overlaps the
-moment at which it stopped; a line in the retry log counts it. Prints what was measured; exit code 1 and a sentence for each demand that was not met.
+The first part runs in virtual time on the simulated rig, the second in real time over Modbus TCP against
+`upright virtual-rig`, whose replies are late, lost, corrupt, old or out of order at random (--seed). Both parts check
+the memory of every process after a warm-up, ticks and time stamps of each row, the rows against the counts in run.yaml,
+the replay and the report.
+
+--busy      for a machine with other work: a run that stopped with an overrun is restarted until the time is over, and
+            the number of restarts is printed
+--stalls    (tests/support/stall_answers.cpp) restarts only after an overrun during a stall of the machine; a line in
+            the retry log counts it
+
+Prints the measurements. The exit code is 1, with a line for each failed check.
 """
 import argparse
 import json
@@ -23,25 +28,25 @@ import threading
 import time
 
 ROOT = pathlib.Path(__file__).resolve().parents[1]
-FAULTS = {"late": 400, "drop": 2000, "corrupt": 4000, "stale": 4000, "reorder": 4000}  # one reply in so many
+FAULTS = {"late": 400, "drop": 2000, "corrupt": 4000, "stale": 4000, "reorder": 4000}  # one reply in this number
 LATE_MS = 6
 MISSED, HELD = 128, 3  # bits of the column flags: see docs/reference/run-directory.md
 
-WARM_SHARE = 0.3           # of a part's time, in which memory may still grow
-MOST_GROWTH_KIB = 512      # from then on, of the resident memory, in all
-MOST_DRIFT_S = 1e-3        # of ticks against time stamps, in real time
-READER_MIB = 256           # for replay and report, however long the run was
+WARM_SHARE = 0.3           # share of the time in which memory may still grow
+MOST_GROWTH_KIB = 512      # of the resident memory after that, in total
+MOST_DRIFT_S = 1e-3        # between ticks and time stamps, in real time
+READER_MIB = 256           # for replay and report, independent of the length of the run
 problems = []
 
 
 def demand(good, sentence):
     if not good:
         problems.append(sentence)
-        print(f"  NOT MET: {sentence}", flush=True)
+        print(f"  FAILED: {sentence}", flush=True)
 
 
 class Watched:
-    """A process whose resident memory is looked at while it runs."""
+    """A process whose resident memory is monitored while it runs."""
 
     def __init__(self, command, out=subprocess.PIPE):
         self.started = time.monotonic()
@@ -58,7 +63,7 @@ class Watched:
             except OSError:
                 return
             kib = dict(re.findall(r"(VmHWM|VmRSS):\s+(\d+) kB", status))
-            if len(kib) == 2:  # an ended process has none
+            if len(kib) == 2:  # a process that has ended has none
                 self.memory.append((time.monotonic() - self.started, int(kib["VmRSS"])))
                 self.peak_kib = int(kib["VmHWM"])
             time.sleep(0.1)
@@ -80,11 +85,11 @@ class Watched:
 
 
 class Rows:
-    """What samples.csv says, read once, row by row."""
+    """Statistics of samples.csv, which is read once, row by row."""
 
     def __init__(self, file, rate_hz):
         self.count = self.missed = self.unexplained = self.held = 0
-        # How far a row's time stamp is behind its tick at least, at the beginning and at the end: what delays a row comes on top.
+        # The smallest delay of a time stamp behind its tick, at the beginning and at the end. Latency only adds to it.
         self.first_s, self.last_s = [], []
         window = max(1, int(10 * rate_hz))
         expected = 0
@@ -117,7 +122,7 @@ class Rows:
 
 
 class Stalls:
-    """What a stall of the machine excuses: a run that stopped for being late, at most this long after the stall."""
+    """Finds runs that stopped with an overrun at most LATE_S after a stall of the machine."""
     LATE_S = 0.05
 
     def __init__(self, program, log):
@@ -156,12 +161,12 @@ def outcome_of(run):
 
 
 def judge_readers(options, run):
-    """Replay and report of a run: right, and in the same memory for any length."""
+    """Checks replay and report of a run, and that their memory does not grow with the length of the run."""
     for verb in ("replay", "report"):
         reader = Watched([options.binary, verb, run])
         code, out, err = reader.finish()
-        demand(code == 0, f"{verb} of {run} ends with {code}: {err or out}")
-        demand(reader.largest_mib() < READER_MIB, f"{verb} takes {reader.largest_mib():.0f} MiB, more than {READER_MIB}")
+        demand(code == 0, f"{verb} of {run} ended with exit code {code}: {err or out}")
+        demand(reader.largest_mib() < READER_MIB, f"{verb} used {reader.largest_mib():.0f} MiB, more than {READER_MIB} MiB")
         print(f"  {verb}: {reader.seconds:.1f} s, {reader.largest_mib():.0f} MiB, {out.strip().splitlines()[-1]}", flush=True)
     size = (run / "report.html").stat().st_size
     demand(size < 8 << 20, f"report.html has {size} bytes, more than 8 MiB")
@@ -172,19 +177,19 @@ def judge_run(options, run, rate_hz, virtual):
     rows, counts = Rows(run / "samples.csv", rate_hz), outcome_of(run)
     print(f"  {rows.count} rows, {rows.missed} periods missed, {rows.held} without fresh counts; the clock drifted by "
           f"{1e6 * rows.drift_s():.1f} us", flush=True)
-    demand(rows.count == counts["rows_written"], f"{rows.count} rows in the file, {counts['rows_written']} in run.yaml")
+    demand(rows.count == counts["rows_written"], f"the file has {rows.count} rows, but run.yaml counts {counts['rows_written']}")
     demand(counts["rows_dropped"] == 0, f"{counts['rows_dropped']} rows were dropped")
     demand(rows.unexplained == 0, f"{rows.unexplained} gaps between ticks are not flagged as missed periods")
-    demand(rows.missed == counts["missed"], f"{rows.missed} ticks are missing, run.yaml counts {counts['missed']}")
-    demand(abs(rows.drift_s()) <= (1e-9 if virtual else MOST_DRIFT_S), f"the clock drifts: {rows.drift_s()} s")
-    demand(rows.held == counts["stale"] + counts["faults"], "rows without fresh counts differ from run.yaml's counts")
+    demand(rows.missed == counts["missed"], f"{rows.missed} ticks are missing, but run.yaml counts {counts['missed']}")
+    demand(abs(rows.drift_s()) <= (1e-9 if virtual else MOST_DRIFT_S), f"the clock drifted by {rows.drift_s()} s")
+    demand(rows.held == counts["stale"] + counts["faults"], "the number of rows without fresh counts differs from run.yaml")
     judge_readers(options, run)
     return counts
 
 
 def judge_memory(name, watched):
-    print(f"  memory of the {name}: at most {watched.largest_mib():.1f} MiB, {watched.growth_kib():+d} KiB once warm", flush=True)
-    demand(watched.growth_kib() <= MOST_GROWTH_KIB, f"the {name}'s memory grows by {watched.growth_kib()} KiB")
+    print(f"  memory of the {name}: at most {watched.largest_mib():.1f} MiB, {watched.growth_kib():+d} KiB after the warm-up", flush=True)
+    demand(watched.growth_kib() <= MOST_GROWTH_KIB, f"the memory of the {name} grew by {watched.growth_kib()} KiB")
 
 
 def soak_virtual(options, folder):
@@ -194,7 +199,7 @@ def soak_virtual(options, folder):
                    ROOT / "config/gains/exponential.yaml", "--duration", seconds, "--seed", options.seed, "--fast", "--out", folder,
                    "--json"])
     code, out, err = run.finish()
-    demand(code == 0, f"the run ends with {code}: {err}")
+    demand(code == 0, f"the run ended with exit code {code}: {err}")
     print(f"  ran for {run.seconds:.1f} s", flush=True)
     judge_memory("run", run)
     judge_run(options, pathlib.Path(json.loads(out)["run_directory"]), 1000, True)
@@ -202,7 +207,7 @@ def soak_virtual(options, folder):
 
 def rig_and_gains(options, folder, port):
     rig = (ROOT / "config/rigs/modbus-tcp.yaml").read_text().replace("../plants", str(ROOT / "config/plants"))
-    # A reply may take most of a period, and a late one more than that.
+    # A reply may take most of a period; a late one takes longer.
     rig = rig.replace("response_timeout_s: 0.0008", f"response_timeout_s: {0.6 / options.rate}").replace("port: 1502", f"port: {port}")
     (folder / "rig.yaml").write_text(rig)
     gains = (ROOT / "config/gains/exponential.yaml").read_text()
@@ -239,24 +244,24 @@ def soak_real(options, folder):
             late_stops += late
             demand(code == 0 or late, f"the run stopped after {said['time_s']:.1f} s: {said['sentence']} {err}")
             print(f"  {said['sentence']}", flush=True)
-            print(f"  woke late by {said['timing']['wake_late']['p99_9_us']:.0f} us (99.9 %), "
-                  f"{said['timing']['wake_late']['max_us']:.0f} us at worst", flush=True)
+            print(f"  wake-up latency {said['timing']['wake_late']['p99_9_us']:.0f} us (99.9 %), "
+                  f"{said['timing']['wake_late']['max_us']:.0f} us (max)", flush=True)
             judge_memory("controller", run)
             counts = judge_run(options, run_directory, options.rate, False)
             for cause in ("late_reply", "no_reply", "no_connection", "wrong_reply", "refused", "other", "recoveries"):
                 troubles[cause] = troubles.get(cause, 0) + counts[cause]
             left_s = left_s - said["time_s"] if late else 0
-            time.sleep(1)  # by then the rig knows that its master has gone
+            time.sleep(1)  # by then the rig has detected that its master is gone
     finally:
         stalls.end()
         server.process.terminate()
         server.finish()
     judge_memory("virtual rig", server)
     if late_stops:
-        print(f"  {late_stops} times a run stopped for being late on this machine and was started again", flush=True)
-    print("  survived: " + ", ".join(f"{count} {cause}" for cause, count in troubles.items()), flush=True)
-    demand(sum(troubles.values()) > 0, "no fault was injected: the soak shows nothing")
-    demand(troubles.get("recoveries", 0) > 0, "the link was never brought back")
+        print(f"  {late_stops} runs stopped with an overrun on this machine and were restarted", flush=True)
+    print("  tolerated faults: " + ", ".join(f"{count} {cause}" for cause, count in troubles.items()), flush=True)
+    demand(sum(troubles.values()) > 0, "no fault was injected, so the soak tested nothing")
+    demand(troubles.get("recoveries", 0) > 0, "the link was never re-established")
 
 
 def main():
@@ -281,7 +286,7 @@ def main():
     finally:
         if not options.keep:
             shutil.rmtree(folder, ignore_errors=True)
-    print(f"{len(problems)} demands were not met" if problems else "all demands were met")
+    print(f"{len(problems)} checks failed" if problems else "all checks passed")
     return 1 if problems else 0
 
 

@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# A long run and what it must leave behind: no leak, no drift of the clock, no row lost, a replay to the bit and a report.
+# Runs the controller for a long time and checks that there is no memory leak, no clock drift and no lost row, that the
+# log replays bit for bit, and that a report can be made.
 #   scripts/soak.sh [--virtual-hours 2] [--real-minutes 10] [further options of scripts/soak.py, see its --help]
 set -euo pipefail
 cd "$(dirname "$0")/.."

@@ -1,16 +1,16 @@
 #!/usr/bin/env bash
-# Runs the tests that need the kernel's own GPIO and Comedi devices: boots Debian's kernel in QEMU (no KVM needed) with
-# gpio-sim and comedi_test, and prints what the test programs say. The programs and the modules each asks for are listed
-# in tests/kernel/CMakeLists.txt.
-#   scripts/test-kernel.sh [PROGRAM...]    all programs when none is named
-# They are built with the preset ci, which keeps to what the guest's processor can do.
-# Ends with the programs' exit code, or with 77 where the kernel's packages are not to be had. An emulated processor says
-# what is right and what is wrong, never how fast. Kernel and modules are kept in build/kernel-test.
+# Runs the tests that need the GPIO and Comedi devices of the kernel: boots Debian's kernel in QEMU (KVM is not needed)
+# with gpio-sim and comedi_test, and prints the output of the test programs. tests/kernel/CMakeLists.txt lists the
+# programs and the modules that each requires.
+#   scripts/test-kernel.sh [PROGRAM...]    default: all programs
+# The programs are built with the preset ci, which uses only instructions that the guest's processor has.
+# The exit code is that of the programs, or 77 if the kernel's packages are not available. An emulated processor tests
+# correctness, not speed. The kernel and its modules are kept in build/kernel-test.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
 cache=$PWD/build/kernel-test
-guests=2  # an emulated processor each, with a share of each program's tests
+guests=2  # each is an emulated processor that runs a share of the tests
 patience_s=270
 
 skip() {
@@ -20,7 +20,7 @@ skip() {
   exit 77
 }
 
-# The kernel, its Comedi modules, and gpio-sim with irq_sim, which Debian has the source of but does not build.
+# Gets the kernel and its Comedi modules, and builds gpio-sim and irq_sim, which Debian ships as source only.
 make_kernel() {
   local image version work root source module
   image=$(apt-cache depends linux-image-amd64 2>/dev/null | sed -n 's/^ *Depends: //p' | head -n 1)
@@ -37,11 +37,11 @@ make_kernel() {
   dpkg-deb --fsys-tarfile "$work"/packages/$source*.deb | tar -x -O "./usr/src/$source.tar.xz" |
     tar -xJ -C "$work" "$source/kernel/irq/irq_sim.c" "$source/drivers/gpio/gpio-sim.c" "$source/drivers/gpio/gpiolib.h"
   cp "$work/$source/kernel/irq/irq_sim.c" "$work/$source"/drivers/gpio/gpio{-sim.c,lib.h} "$work/modules"
-  # As a module it may not touch the interrupt's descriptor itself, and must say its licence.
+  # As a module, irq_sim cannot access the interrupt descriptor directly, and must declare its licence.
   sed -i -e 's/handle_simple_irq(irq_to_desc(irqnum))/generic_handle_irq(irqnum)/' \
     -e '1a #include <linux/module.h>' -e '$a MODULE_LICENSE("GPL");' "$work/modules/irq_sim.c"
   echo 'obj-m := irq_sim.o gpio-sim.o' >"$work/modules/Kbuild"
-  # The headers are not installed: they lie in the cache, and must look for each other there.
+  # The headers are not installed but unpacked in the cache, so their paths must point there.
   sed -i "s#/usr/src#$root/usr/src#" "$root/usr/src/linux-headers-$version/Makefile"
   make -C "$root/usr/src/linux-headers-$version" M="$work/modules" modules >"$work/modules.log" 2>&1 ||
     { tail -n 20 "$work/modules.log" >&2; return 2; }
@@ -55,7 +55,7 @@ make_kernel() {
   rm -rf "$work"
 }
 
-# copy FILE...: into the guest, to the same path, with the libraries it needs.
+# copy FILE...: copies files and the libraries they need into the guest, to the same paths.
 copy() {
   local file library
   for file in "$@"; do
@@ -67,7 +67,7 @@ copy() {
   done
 }
 
-# What the fault suite has seen in the guest, against its columns of docs/reference/faults.md.
+# Compares the results of the fault suite in the guest with its columns of docs/reference/faults.md.
 compare_outcomes() {
   local records=$build/kernel_fault_records name cell
   [[ $(cat "$guest/programs") == *kernel_fault_test* ]] || return 0
@@ -102,12 +102,12 @@ INIT
   chmod +x "$guest/init"
 }
 
-scripts/install-deps.sh --kernel || skip "qemu and busybox are not to be had"
+scripts/install-deps.sh --kernel || skip "qemu and busybox cannot be installed"
 problem=0
 make_kernel || problem=$?
-[ "$problem" -ne 2 ] || { echo "look at the lines above: gpio-sim does not build" >&2; exit 1; }
-[ -e "$cache/version" ] || skip "the kernel's packages are not to be had"
-[ "$problem" -eq 0 ] || echo "the kernel's packages are not to be had: running the $(cat "$cache/version") at hand" >&2
+[ "$problem" -ne 2 ] || { echo "gpio-sim does not build: see the lines above" >&2; exit 1; }
+[ -e "$cache/version" ] || skip "the kernel's packages are not available"
+[ "$problem" -eq 0 ] || echo "the kernel's packages are not available: using the cached $(cat "$cache/version")" >&2
 
 build=build/ci
 scripts/build.sh ci kernel_tests
@@ -128,12 +128,16 @@ while read -r program modules; do
   copy "$program"
   echo "$program $modules" >>"$guest/programs"
 done <"$build/tests/kernel/programs"
-[ -e "$guest/programs" ] || { echo "name one of these programs:" >&2; cat "$build/tests/kernel/programs" >&2; exit 2; }
+[ -e "$guest/programs" ] || {
+  echo "there is no such program: name one of these:" >&2
+  cat "$build/tests/kernel/programs" >&2
+  exit 2
+}
 write_init
 (cd "$guest" && find . | busybox cpio -o -H newc 2>/dev/null) | gzip -1 >"$guest.gz"
 
-# The guest's clock follows the instructions it has executed, and leaps while it idles: it is never late because the machine
-# around it is busy. What the kernel does not know on its command line is its first process's environment.
+# The guest's clock counts executed instructions and jumps ahead while the guest idles, so a busy host does not delay
+# it. The kernel passes unknown options of its command line to the first process as environment variables.
 boot() {
   timeout "$patience_s" qemu-system-x86_64 -accel tcg -icount shift=2,sleep=off -M q35 -cpu max -smp 1 -m 512 \
     -kernel "$cache/vmlinuz" -initrd "$guest.gz" -nodefaults -nographic -no-reboot -serial stdio -append \
@@ -146,7 +150,7 @@ sed -n 's/^guest: counted //p' "$consoles"/* >>"$build/retries_and_skips.log"
 status=0
 for ((i = 0; i < guests; ++i)); do
   said=$(sed -n 's/^guest: exit \([0-9]*\)$/\1/p' "$consoles/$i")
-  [ -n "$said" ] || { echo "look at the lines above: guest $i did not end within $patience_s s" >&2; exit 1; }
+  [ -n "$said" ] || { echo "guest $i did not end within $patience_s s: see the lines above" >&2; exit 1; }
   [ "$said" -eq 0 ] || status=$said
 done
 [ "$status" -eq 0 ] || exit "$status"

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# Installs what is missing, builds, and runs every test; says what was tried again and what was skipped, and fails above the
-# budget for that (scripts/count_retries.py). Needs git and apt, nothing else.
-#   scripts/test.sh [PRESET] [ctest arguments]      PRESET is release when none is named
+# Installs missing packages, builds, and runs every test. Reports retried and skipped tests, and fails if they exceed
+# the budget in scripts/count_retries.py. Requires only git and apt.
+#   scripts/test.sh [PRESET] [ctest arguments]      default: release
 set -euo pipefail
 cd "$(dirname "$0")/.."
 

@@ -1,11 +1,12 @@
 #!/usr/bin/env python3
-"""Compares the generated parts of docs/reference with what the program says of itself, or writes them.
+"""Compares the generated parts of docs/reference with the program, or writes them.
 
   scripts/write_reference.py --upright PROGRAM [--write]
 
 - docs/reference/effects.md: every effect of the registry, from `upright effects --json`.
 - docs/reference/commands.md: the options of every command, from its `--help`.
-The parts stand between two marker lines. Ends with 1 and a line for each page that differs.
+- docs/reference/diagnosis-rules.md: every limit of SelectionPolicy with its comment, from src/diagnosis/selection_policy.hpp.
+The parts are between two marker lines. The exit code is 1, with a line for each page that differs.
 """
 import argparse
 import json
@@ -53,6 +54,33 @@ def commands_of(program):
     return lines
 
 
+def number_of(expression):
+    """A number of C++ as readers write it; of a ratio, as it stands."""
+    return f"{float(expression):g}" if re.fullmatch(r"[\d.e+-]+", expression) else re.sub(r"(\d)\.0\b", r"\1", expression)
+
+
+def limits_of(header):
+    """A table for each part of SelectionPolicy. Every member needs a comment of its own that begins with its unit."""
+    text = header.read_text()
+    parts = dict(re.findall(r"^struct (\w+) \{\n(.*?)^\};", text, re.MULTILINE | re.DOTALL))
+    comments = dict((name, comment) for comment, name in re.findall(r"((?:^/// .*\n)+)^struct (\w+)", text, re.MULTILINE))
+    lines = []
+    for part, name in re.findall(r"^  (\w+) (\w+);$", parts["SelectionPolicy"], re.MULTILINE):
+        lines += ["", f"### {name.capitalize()}", "", plain(comments[part]), "", "| limit | value | unit | meaning |", "|---|---|---|---|"]
+        members = re.findall(r"^  (?:double|int|std::size_t) (\w+) = (.*);", parts[part], re.MULTILINE)
+        commented = re.findall(r"((?:^  /// .*\n)+)^  (?:double|int|std::size_t) (\w+) = (.*);", parts[part], re.MULTILINE)
+        if [member for member, _ in members] != [member for _, member, _ in commented]:
+            sys.exit(f"{header}: a member of {part} has no comment of its own")
+        for comment, member, value in commented:
+            unit, meaning = re.fullmatch(r"\[(.*?)\] (.*)", plain(comment)).groups()
+            lines.append(f"| `{member}` | {number_of(value)} | {'-' if unit == '1' else unit} | {cell(meaning)} |")
+    return lines
+
+
+def plain(comment):
+    return " ".join(line.strip().removeprefix("///").strip() for line in comment.strip().split("\n"))
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--upright", type=pathlib.Path, required=True, help="the program")
@@ -60,7 +88,9 @@ def main():
     parser.add_argument("--write", action="store_true", help="write the pages")
     arguments = parser.parse_args()
     wrong = 0
-    for name, lines in (("effects", effects_of(arguments.upright)), ("commands", commands_of(arguments.upright))):
+    limits = limits_of(arguments.root / "src" / "diagnosis" / "selection_policy.hpp")
+    for name, lines in (("effects", effects_of(arguments.upright)), ("commands", commands_of(arguments.upright)),
+                        ("diagnosis-rules", limits)):
         page = arguments.root / "docs" / "reference" / f"{name}.md"
         text = page.read_text()
         begin, end = text.index(BEGIN), text.index(END)
@@ -71,7 +101,7 @@ def main():
             page.write_text(made)
             continue
         wrong += 1
-        print(f"{page}: is not what the program says: run scripts/write_reference.py --upright {arguments.upright} --write",
+        print(f"{page}: differs from the program: run scripts/write_reference.py --upright {arguments.upright} --write",
               file=sys.stderr)
     sys.exit(1 if wrong else 0)
 

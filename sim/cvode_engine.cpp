@@ -42,12 +42,12 @@ void require(int flag, const char* what) {
                                      ": use the fast engine for this plant");
 }
 
-void keep_quiet(int, const char*, const char*, char*, void*) {}
+void ignore_message(int, const char*, const char*, char*, void*) {}
 
 template <class T, void (*Free)(T)>
-struct Freed {
+struct ScopedHandle {
   T at = nullptr;
-  ~Freed() {
+  ~ScopedHandle() {
     if (at != nullptr) Free(at);
   }
 };
@@ -91,7 +91,7 @@ class CvodeEngine::Work {
     N_VConst(1e-2 * options_.relative_tolerance, tolerance_.at);
     require(CVodeSVtolerances(cvode_.at, options_.relative_tolerance, tolerance_.at), "set-up");
     require(CVodeSetUserData(cvode_.at, this), "set-up");
-    require(CVodeSetErrHandlerFn(cvode_.at, &keep_quiet, nullptr), "set-up");
+    require(CVodeSetErrHandlerFn(cvode_.at, &ignore_message, nullptr), "set-up");
     if (stiff) {
       matrix_.at = SUNDenseMatrix(state_size, state_size, context_.at);
       linear_.at = SUNLinSol_Dense(y_.at, matrix_.at, context_.at);
@@ -120,7 +120,7 @@ class CvodeEngine::Work {
     volts_ = volts;
     held_v_ = dynamics_.actuate(voltage_v);
     lag_ = dynamics_.has_motor_lag() && (volts == nullptr || dynamics_.motor_time_constant_s() > least_lag_s);
-    follow_motor();
+    set_motor_state();
     settle();
     halt_where_ended();
     const double end_s = time_s_ + duration_s;
@@ -157,7 +157,7 @@ class CvodeEngine::Work {
     return s;
   }
 
-  void follow_motor() { state_ = with_motor(time_s_, state_); }
+  void set_motor_state() { state_ = with_motor(time_s_, state_); }
   void settle() { contacts_ = settled_contacts(dynamics_, state_, contacts_); }
 
   void note(EventKind kind) {
@@ -236,7 +236,7 @@ class CvodeEngine::Work {
       }
       state_ = unpack(N_VGetArrayPointer(y_.at));
       time_s_ = to_s;
-      follow_motor();
+      set_motor_state();
       if (event) {
         enter(*event, held);
         return;
@@ -285,7 +285,7 @@ class CvodeEngine::Work {
     if (kind == EventKind::actuator_corner) return;
     if (kind == EventKind::cart_reversal || kind == EventKind::cart_stick) state_.cart_mps = 0.0;
     if (kind == EventKind::pivot_reversal || kind == EventKind::pivot_stick) state_.theta_radps = 0.0;
-    follow_motor();
+    set_motor_state();
     contacts_ = contacts_after(dynamics_, state_, contacts_, kind, held);
     if (kind == EventKind::fall || kind == EventKind::track_end) halted_ = kind;
     note(resolved_kind(kind, contacts_));
@@ -315,12 +315,12 @@ class CvodeEngine::Work {
   Dynamics<double> dynamics_;
   ActuatorCorners<double> corners_;
   EngineOptions options_;
-  Freed<SUNContext, &free_context> context_;
-  Freed<N_Vector, &free_vector> y_, derivative_, tolerance_;
-  Freed<SUNMatrix, &free_matrix> matrix_;
-  Freed<SUNLinearSolver, &free_linear> linear_;
-  Freed<SUNNonlinearSolver, &free_nonlinear> nonlinear_;
-  Freed<void*, &free_cvode> cvode_;
+  ScopedHandle<SUNContext, &free_context> context_;
+  ScopedHandle<N_Vector, &free_vector> y_, derivative_, tolerance_;
+  ScopedHandle<SUNMatrix, &free_matrix> matrix_;
+  ScopedHandle<SUNLinearSolver, &free_linear> linear_;
+  ScopedHandle<SUNNonlinearSolver, &free_nonlinear> nonlinear_;
+  ScopedHandle<void*, &free_cvode> cvode_;
   WatchList watches_;
   const Volts* volts_ = nullptr;
   double held_v_ = 0.0;

@@ -22,9 +22,9 @@ std::string range_text(double low_v, double high_v) {
 }
 
 std::string remedy_for(int problem) {
-  if (problem == EACCES || problem == EPERM) return "let this user read and write it (group iocard)";
+  if (problem == EACCES || problem == EPERM) return "give this user read and write access (group iocard)";
   if (problem == ENOENT || problem == ENXIO || problem == ENODEV)
-    return "load the card's driver and, for an ISA card, attach it with comedi_config";
+    return "load the card's driver; attach an ISA card with comedi_config";
   return "check the card and comedi.device";
 }
 
@@ -56,23 +56,23 @@ void ComediCard::require(const ComediChannel& at) const {
   const int subdevices = comedi_get_n_subdevices(handle_);
   if (at.subdevice >= subdevices)
     refuse(at, "the device has no subdevice " + std::to_string(at.subdevice),
-           "give subdevice 0 to " + std::to_string(subdevices - 1));
+           "use subdevice 0 to " + std::to_string(subdevices - 1));
   const int channels = comedi_get_n_channels(handle_, static_cast<unsigned int>(at.subdevice));
   if (at.channel >= channels)
     refuse(at, "subdevice " + std::to_string(at.subdevice) + " has no channel " + std::to_string(at.channel),
-           channels > 0 ? "give channel 0 to " + std::to_string(channels - 1) : "give another subdevice");
+           channels > 0 ? "use channel 0 to " + std::to_string(channels - 1) : "use another subdevice");
 }
 
 void ComediCard::require_type(const ComediChannel& at, int type, const char* name) const {
   if (comedi_get_subdevice_type(handle_, static_cast<unsigned int>(at.subdevice)) == type) return;
   const int there = comedi_find_subdevice_by_type(handle_, type, 0);
   refuse(at, "subdevice " + std::to_string(at.subdevice) + " is not " + name,
-         there < 0 ? std::string("use a device with ") + name : "give subdevice " + std::to_string(there));
+         there < 0 ? std::string("use a device with ") + name : "use subdevice " + std::to_string(there));
 }
 
 void ComediCard::lock(const ComediChannel& at) {
   if (comedi_lock(handle_, static_cast<unsigned int>(at.subdevice)) == 0) return;
-  if (comedi_errno() != EBUSY) fail(at, "locking it");
+  if (comedi_errno() != EBUSY) fail(at, "locking the subdevice");
   throw DeviceError("subdevice " + std::to_string(at.subdevice) + " of " + device_ + ", comedi." + at.key +
                     " of " + rig_file_ + ", already has a controller: end the other program first");
 }
@@ -89,8 +89,8 @@ unsigned int ComediCard::find_range(const ComediChannel& at, const ComediRange& 
       return static_cast<unsigned int>(i);
     there += (there.empty() ? "" : " or ") + range_text(offered->min, offered->max);
   }
-  refuse(at, "the channel has no range " + range_text(range.low_v, range.high_v) + " V",
-         there.empty() ? "give a channel with a range in volts" : "give range_v " + there);
+  refuse(at, "the channel does not support the range " + range_text(range.low_v, range.high_v) + " V",
+         there.empty() ? "use a channel with a range in volts" : "set range_v to " + there);
 }
 
 lsampl_t ComediCard::maxdata(const ComediChannel& at) const {

@@ -89,7 +89,7 @@ void ComediTransport::open_output(const ComediOutput& wiring) {
              range_number,
              as_comedi(wiring.range),
              on.maxdata(at)};
-  if (put_out(0.0) != RigFault::none) on.fail(at, "putting out zero volts");
+  if (put_out(0.0) != RigFault::none) on.fail(at, "writing zero volts");
 }
 
 void ComediTransport::open_encoder(const ComediEncoder& wiring, const char* key,
@@ -131,24 +131,25 @@ void ComediTransport::open_counter(ComediCard& on, const ComediChannel& at, cons
                                    Encoder& encoder) {
   const double range = static_cast<double>(encoder.maxdata) + 1.0;
   if (range != std::ldexp(1.0, encoder.width_bits))
-    on.refuse(at, "its data go from 0 to " + std::to_string(encoder.maxdata),
-              "give calibration." + std::string(at.key) + ".width_bits " +
+    on.refuse(at, "its data range is 0 to " + std::to_string(encoder.maxdata),
+              "set calibration." + std::string(at.key) + ".width_bits to " +
                   std::to_string(static_cast<int>(std::lround(std::log2(range)))));
   if (wiring.kind == ComediEncoderKind::plain_counter) return;
   const CounterSetup* setup = counter_setup(on.driver());
   if (setup == nullptr)
-    on.refuse(at, "how its counters are set up is known for " + known_counter_drivers() + " only",
-              "set the counter up by other means and give kind plain_counter");
+    on.refuse(at, "the program can set up counters only for the drivers " + known_counter_drivers(),
+              "set the counter up with another program and use kind: plain_counter");
   on.require_type(at, COMEDI_SUBD_COUNTER, "a counter");
   if (setup->one_channel && at.channel != 0)
-    on.refuse(at, "the other channels are no counts", "give channel 0");
+    on.refuse(at, "only channel 0 contains the count", "use channel 0");
   if (setup->has_lines != wiring.lines.has_value())
     on.refuse(at,
-              setup->has_lines ? "the counter's inputs are to be chosen" : "the counter's inputs are fixed",
-              setup->has_lines ? "add lines: {a: 8, b: 10}, the PFI lines of A and B" : "remove lines");
+              setup->has_lines ? "the counter's input lines must be selected"
+                               : "the counter's input lines are fixed",
+              setup->has_lines ? "add lines: {a: 8, b: 10} with the PFI lines of A and B" : "remove lines");
   if (setup->begins_anew && !rig_.calibration.zero_at_start)
-    on.refuse(at, "the counter begins anew at every start, so counts of an earlier one are no zero",
-              "give calibration.zero {at: start, pose: hanging}");
+    on.refuse(at, "the counter is reset at every start, so a zero from an earlier start is invalid",
+              "set calibration.zero to {at: start, pose: hanging}");
   encoder.zero = setup->zero;
   if (set_up_) return;
   for (const CounterStep& step : setup->steps) {
@@ -163,7 +164,7 @@ void ComediTransport::open_counter(ComediCard& on, const ComediChannel& at, cons
     instruction.chanspec =
         CR_PACK(setup->one_channel ? step.channel : static_cast<unsigned int>(at.channel), 0, 0);
     if (comedi_do_insn(on.handle(), &instruction) < 0 && !step.may_be_refused)
-      on.fail(at, "setting up the counter, which must count in quadrature");
+      on.fail(at, "setting up the counter for quadrature");
   }
 }
 

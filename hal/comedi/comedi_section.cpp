@@ -32,14 +32,14 @@ void range_key(YamlKeys& keys, ComediRange& range) {
   std::vector<double> ends = {range.low_v, range.high_v};
   keys.numbers("range_v", ends, Range::within(-largest_v, largest_v));
   keys.check("range_v", ends.size() == 2 && ends[0] < ends[1], "is not a range",
-             "give the lower and the upper end, such as [-10, 10]");
+             "write the lower and the upper end, such as [-10, 10]");
   range = {ends[0], ends[1]};
 }
 
 void line_keys(YamlKeys& keys, ComediLines& lines) {
   keys.integer("a", lines.a, 0, last_line);
   keys.integer("b", lines.b, 0, last_line);
-  keys.check("b", lines.a != lines.b, "is the line of a", "give A and B a line each");
+  keys.check("b", lines.a != lines.b, "is also the line of a", "use a different line for each");
 }
 
 void analog_keys(YamlKeys& keys, int width_bits, ComediEncoder& encoder) {
@@ -48,9 +48,10 @@ void analog_keys(YamlKeys& keys, int width_bits, ComediEncoder& encoder) {
   keys.number("counts_per_v", encoder.counts_per_v, Range{1e-3, 1e9});
   const double most = std::max(std::abs(encoder.range.low_v), std::abs(encoder.range.high_v));
   const double room = std::ldexp(1.0, width_bits - 1) - 1.0;
-  keys.check("counts_per_v", most * encoder.counts_per_v <= room,
-             "makes more counts than the calibration's " + std::to_string(width_bits) + " bits hold",
-             "give counts_per_v at most " + exact_text(std::floor(room / most)) + ", or width_bits 32");
+  keys.check(
+      "counts_per_v", most * encoder.counts_per_v <= room,
+      "gives more counts than the calibration's " + std::to_string(width_bits) + " bits can hold",
+      "reduce counts_per_v to at most " + exact_text(std::floor(room / most)) + ", or set width_bits to 32");
 }
 
 void encoder_keys(YamlKeys& keys, const std::string& device, int width_bits, ComediEncoder& encoder) {
@@ -65,10 +66,9 @@ void output_keys(YamlKeys& keys, const std::string& device, double limit_v, Come
   range_key(keys, output.range);
   keys.number("amplifier_gain", output.amplifier_gain, Range::within(1e-3, 1e3));
   const double room_v = output.amplifier_gain * std::min(-output.range.low_v, output.range.high_v);
-  keys.check("range_v", room_v > 0.0, "has no zero volts between its ends",
-             "give a range of both signs, such as [-10, 10]");
-  keys.check("range_v", room_v >= limit_v, "times amplifier_gain leaves no room for the amplifier's limit",
-             "give amplifier.limit_v at most " + exact_text(room_v));
+  keys.check("range_v", room_v > 0.0, "does not contain zero volts", "use a range such as [-10, 10]");
+  keys.check("range_v", room_v >= limit_v, "times amplifier_gain is less than amplifier.limit_v",
+             "reduce amplifier.limit_v to at most " + exact_text(room_v));
 }
 
 bool same_channel(const ComediEncoder& a, const ComediEncoder& b) {
@@ -88,8 +88,8 @@ void comedi_keys(YamlKeys& keys, const RigFile& rig, ComediRig& comedi) {
   if (roles.cart) encoder("cart", rig.calibration.cart, comedi.cart);
   if (roles.pendulum) encoder("pendulum", rig.calibration.pendulum, comedi.pendulum);
   if (comedi.cart && comedi.pendulum)
-    keys.check("pendulum", !same_channel(*comedi.cart, *comedi.pendulum), "is the channel of cart",
-               "give each encoder its own channel");
+    keys.check("pendulum", !same_channel(*comedi.cart, *comedi.pendulum), "is the same channel as cart",
+               "use a different channel for each encoder");
   if (roles.output)
     keys.map("output", [&](YamlKeys& map) {
       output_keys(map, device, rig.amplifier.limit_v, YamlKeys::made(comedi.output));

@@ -11,7 +11,7 @@ GpioChip::GpioChip(const std::string& chip, const std::string& file)
     : file_(file), chip_(gpiod_chip_open_lookup(chip.c_str())) {
   if (!chip_)
     throw DeviceError(chip + " cannot be opened (" + std::strerror(errno) + "): check gpio.chip in " + file +
-                      " against the output of gpiodetect, and who may open it");
+                      " against the output of gpiodetect, and the permissions of the device");
 }
 
 std::string GpioChip::path() const {
@@ -21,8 +21,8 @@ std::string GpioChip::path() const {
 gpiod_line* GpioChip::line(int number, const std::string& use) const {
   const unsigned lines = gpiod_chip_num_lines(chip_.get());
   if (static_cast<unsigned>(number) >= lines)
-    throw DeviceError(path() + " has no line " + std::to_string(number) + ": give gpio." + use + " in " +
-                      file_ + " a line below " + std::to_string(lines));
+    throw DeviceError(path() + " has no line " + std::to_string(number) + ": set gpio." + use + " in " +
+                      file_ + " to a line below " + std::to_string(lines));
   gpiod_line* line = gpiod_chip_get_line(chip_.get(), static_cast<unsigned>(number));
   if (line == nullptr) refuse(number, use);
   return line;
@@ -33,8 +33,8 @@ void GpioChip::refuse(int number, const std::string& use) const {
   const std::string line =
       "line " + std::to_string(number) + " of " + path() + " (gpio." + use + " in " + file_ + ")";
   if (problem == EBUSY) throw DeviceError(line + " is in use: end the other program first");
-  throw DeviceError(line + " cannot be had (" + std::strerror(problem) +
-                    "): check that the chip can do what gpio." + use + " asks of it, a bias included");
+  throw DeviceError(line + " cannot be reserved (" + std::strerror(problem) +
+                    "): check that the chip supports gpio." + use + " with its settings, including bias");
 }
 
 int bias_flag(LineBias bias) noexcept {

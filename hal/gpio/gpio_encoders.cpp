@@ -54,7 +54,7 @@ class GpioEncoder {
   void refuse_slow_loop(const std::string& file, double period_s) const {
     const double queued = share_of_queue * source_->queue_edges();
     if (config_.fastest_edges_per_s * period_s <= queued) return;
-    throw ConfigError(file + ":1: the kernel's queue of edges could overflow within a period of " +
+    throw ConfigError(file + ":1: the kernel's edge queue could overflow within a period of " +
                       exact_text(period_s) + " s: raise sample_rate_hz in the gain file to " +
                       exact_text(std::ceil(config_.fastest_edges_per_s / queued)) + ", or lower gpio." +
                       use_ + ".fastest_edges_per_s");
@@ -72,9 +72,9 @@ class GpioEncoder {
       if (fault == RigFault::none && decoder_.counts() == 0 && decoder_.levels() == levels) return;
       clock.sleep_until(clock.now_ns() + nanoseconds_per_second / 1000);
     }
-    throw DeviceError(
-        "the lines of gpio." + use_ +
-        " could not be read at rest: hold the encoder still while the rig is opened, and check its wiring");
+    throw DeviceError("the lines of gpio." + use_ +
+                      " changed or could not be read while the rig was opened: hold the encoder still then, "
+                      "and check its wiring");
   }
 
   LineEncoder config_;
@@ -145,8 +145,9 @@ class GpioEncodersRig final : public Rig {
   /// Opened again it goes on counting, since its zero was taken before.
   void refuse_lost_counts() {
     if (catch_up(clock_.now_ns()) == RigFault::none) return;
-    throw DeviceError("edges of an encoder were lost, or came faster than gpio's fastest_edges_per_s in " +
-                      file_ + ": start the program again, so that it takes a new zero");
+    throw DeviceError(
+        "encoder edges were lost or came faster than fastest_edges_per_s in the section gpio of " + file_ +
+        ": start the program again to set a new zero");
   }
 
   RigFault catch_up(std::int64_t now_ns) noexcept {

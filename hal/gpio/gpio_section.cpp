@@ -23,7 +23,7 @@ class TakenLines {
   void line_key(YamlKeys& keys, const char* key, int& line) {
     keys.integer(key, line, 0, highest_line);
     keys.check(key, std::find(lines_.begin(), lines_.end(), line) == lines_.end(),
-               "is " + std::to_string(line) + ", which is in use already", "give each its own line");
+               "is " + std::to_string(line) + ", which is already in use", "use a different line for each");
     lines_.push_back(line);
   }
   bool empty() const { return lines_.empty(); }
@@ -66,7 +66,7 @@ void rig_keys(YamlKeys& keys, GpioRig& rig, TakenLines& taken) {
     });
     const std::size_t count = rig.limit_switches.size();
     keys.check("limit_switches", count > 0 && count <= most_limit_switches,
-               "has " + std::to_string(count) + " of them",
+               "has " + std::to_string(count) + " switches",
                "list 1 to " + std::to_string(most_limit_switches) + " switches, or remove limit_switches");
   }
   keys.optional_map("amplifier_enable", rig.amplifier_enable, output);
@@ -83,7 +83,7 @@ void gpio_keys(YamlKeys& document, std::optional<GpioRig>& rig) {
   document.section_of("gpio", rig, [&](YamlKeys& keys, GpioRig& gpio) { rig_keys(keys, gpio, taken); });
   if (const YamlMap* map = document.source(); map && taken.empty())
     map->map("gpio").fail("chip", "has no line in use",
-                          "name a line, such as emergency_stop, or remove the section gpio");
+                          "add a line, such as emergency_stop, or remove the section gpio");
 }
 
 BackendKind gpio_backend() {

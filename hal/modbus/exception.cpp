@@ -10,7 +10,7 @@ namespace {
 const char* meaning_of(int exception) {
   static constexpr std::array meanings = {
       "unknown",       "illegal function",     "illegal data address",
-      "illegal value", "device failure",       "acknowledged, not done yet",
+      "illegal value", "device failure",       "acknowledged, but not done yet",
       "device busy",   "negative acknowledge", "memory parity error",
       "unknown",       "gateway has no path",  "no answer from the device behind the gateway"};
   const auto at = static_cast<std::size_t>(exception);

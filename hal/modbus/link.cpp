@@ -23,7 +23,7 @@ std::string address_of(const std::string& host) {
   hints.ai_socktype = SOCK_STREAM;
   addrinfo* found = nullptr;
   if (const int problem = getaddrinfo(host.c_str(), nullptr, &hints, &found); problem != 0)
-    throw DeviceError(host + " has no address (" + gai_strerror(problem) + "): check modbus.host");
+    throw DeviceError(host + " has no IP address (" + gai_strerror(problem) + "): check modbus.host");
   char text[NI_MAXHOST] = "";
   getnameinfo(found->ai_addr, found->ai_addrlen, text, sizeof text, nullptr, 0, NI_NUMERICHOST);
   freeaddrinfo(found);

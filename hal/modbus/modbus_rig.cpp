@@ -1,17 +1,15 @@
 #include "modbus_rig.hpp"
 
-#include <linux/futex.h>
 #include <pthread.h>
 #include <sched.h>
-#include <sys/syscall.h>
 #include <time.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cmath>
 
 #include "hal/modbus_exception.hpp"
 #include "hal/voltage_freshness.hpp"
+#include "hal/word_wait.hpp"
 #include "upright/base/error.hpp"
 
 namespace upright {
@@ -33,17 +31,6 @@ std::int64_t now_ns() noexcept {
   return now.tv_sec * ns_per_s + now.tv_nsec;
 }
 
-/// Sleeps while `word` is `value`, until woken or until the time comes.
-void wait_while(std::atomic<std::uint32_t>& word, std::uint32_t value, std::int64_t until_ns) noexcept {
-  static_assert(sizeof(std::atomic<std::uint32_t>) == sizeof(std::uint32_t));
-  const timespec until{until_ns / ns_per_s, until_ns % ns_per_s};
-  syscall(SYS_futex, &word, FUTEX_WAIT_BITSET_PRIVATE, value, &until, nullptr, FUTEX_BITSET_MATCH_ANY);
-}
-
-void wake(std::atomic<std::uint32_t>& word) noexcept {
-  syscall(SYS_futex, &word, FUTEX_WAKE_PRIVATE, 1, nullptr, nullptr, 0);
-}
-
 const char* words_for(RigFault fault) {
   switch (fault) {
     case RigFault::link_timeout:
@@ -51,7 +38,7 @@ const char* words_for(RigFault fault) {
     case RigFault::link_lost:
       return "no connection";
     case RigFault::corrupt_reply:
-      return "a reply that does not fit the request";
+      return "a reply that does not match the request";
     default:
       return "an unexpected answer";
   }
@@ -87,23 +74,24 @@ void ModbusTransport::fail(RigFault fault, const std::string& doing) {
   const std::string device = "the device at " + link_.name(), file = rig_.file.string();
   if (fault == RigFault::device_refused)
     throw DeviceError(device + " refused with " + exception_text(exception) + " while " + doing +
-                      ": check that it knows the addresses and functions that " + file + " names");
+                      ": check that it supports the addresses and functions in " + file);
   if (fault == RigFault::device_busy)
     throw DeviceError(device + " answered with " + exception_text(exception) + " while " + doing +
-                      ": check that no other master uses it, and what stands behind it");
+                      ": check that no other master uses it, and the devices behind it");
   if (fault == RigFault::output_kept)
-    throw DeviceError(device +
-                      " acknowledged zero volts, but its output reads back as another voltage: switch "
-                      "the amplifier off and check the device; where that register is no copy of the output, "
-                      "give modbus.voltage read_back: false in " +
-                      file);
+    throw DeviceError(
+        device +
+        " acknowledged zero volts, but its output reads back as another voltage: switch "
+        "the amplifier off and check the device; if that register does not show the output, set "
+        "modbus.voltage.read_back to false in " +
+        file);
   if (fault == RigFault::edges_lost)
     throw DeviceError(
         device +
-        " has lost edges of an encoder, so that its counts are wrong: check wiring and speed of the "
-        "encoders, and restart the device");
+        " has lost encoder edges, so its counts are wrong: check the wiring and the speed of the "
+        "encoders, then restart the device");
   throw DeviceError(std::string(words_for(fault)) + " from " + device + " while " + doing +
-                    ": check that it is on, wired and configured as " + file + " says");
+                    ": check that the device is on, and that its wiring and settings match " + file);
 }
 
 /// An exchange of open(), until it succeeds; a device that has just been switched on gets a second.
@@ -171,7 +159,7 @@ void ModbusTransport::open() {
   stop_sequence_.reset(false, 0.0);
   if (const RigFault fault = link_.connect(open_patience_s); fault != RigFault::none)
     fail(fault, "connecting");
-  const std::string reading_it = roles_.encoders() ? "reading the counters" : "asking for an answer";
+  const std::string reading_it = roles_.encoders() ? "reading the counters" : "requesting a reply";
   // A device that has just been switched on, or a line with old bytes on it, gets a second.
   retried([&] { return link_.resynchronise(0.0); }, reading_it);
   prepare_device();
@@ -206,7 +194,7 @@ void ModbusTransport::begin_serving() {
 
 void ModbusTransport::ring() noexcept {
   doorbell_.fetch_add(1, std::memory_order_release);
-  wake(doorbell_);
+  wake_one(doorbell_);
 }
 
 RigReading ModbusTransport::read() noexcept {
@@ -368,7 +356,7 @@ void ModbusTransport::serve_read(std::uint32_t number) noexcept {
   read_served_ = number;
   reading_ = answer;
   answered_.store(number, std::memory_order_release);
-  wake(answered_);
+  wake_one(answered_);
 }
 
 void ModbusTransport::serve_write() noexcept {

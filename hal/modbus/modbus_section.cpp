@@ -37,13 +37,13 @@ void watchdog_keys(YamlKeys& keys, DeviceWatchdog& watchdog) {
   keys.number("seconds_per_count", watchdog.seconds_per_count, Range{1e-6, 10});
   const double counts = watchdog.time_s / watchdog.seconds_per_count;
   keys.check("time_s", counts >= 0.5 && counts <= 65535.0, "does not fit into a 16-bit register",
-             "give time_s 1 to 65535 times seconds_per_count");
+             "set time_s to 1 to 65535 times seconds_per_count");
 }
 
 void serial_line_keys(YamlKeys& keys, ModbusRig& rig) {
   keys.text("device", rig.device);
-  keys.integer("baud", rig.baud, 1, 10'000'000);
-  keys.check("baud", baud_is_known(rig.baud), "is " + std::to_string(rig.baud),
+  keys.integer("baud", rig.baud, 110, 4'000'000);
+  keys.check("baud", baud_is_known(rig.baud), "is " + std::to_string(rig.baud) + ", which is not supported",
              "use a standard rate such as 9600, 19200, 38400, 57600, 115200, 230400, 460800 or 921600");
   keys.one_of("parity", rig.parity, parities);
   keys.integer("stop_bits", rig.stop_bits, 1, 2);
@@ -64,7 +64,7 @@ void counter_keys(YamlKeys& keys, const Calibration& calibration, const RigRoles
                               roles.pendulum ? calibration.pendulum.width_bits : 0);
   keys.check("registers", widest <= 16 * rig.counter.registers,
              "is 1, for counters of " + std::to_string(widest) + " bits",
-             "give registers 2, or width_bits 16 in the calibration");
+             "set registers to 2, or width_bits to 16 in the calibration");
 }
 
 void voltage_keys(YamlKeys& keys, double limit_v, ModbusRig& rig) {
@@ -73,8 +73,8 @@ void voltage_keys(YamlKeys& keys, double limit_v, ModbusRig& rig) {
   word_order_key(keys, rig.voltage.word_order, rig.voltage.registers());
   keys.number("counts_per_v", rig.voltage.counts_per_v, Range{1e-3, 1e9});
   const double largest_v = rig.voltage.largest_v();
-  keys.check("counts_per_v", largest_v >= limit_v, "leaves no room for the amplifier's limit",
-             "give counts_per_v at most " + exact_text(largest_v * rig.voltage.counts_per_v / limit_v));
+  keys.check("counts_per_v", largest_v >= limit_v, "is too large for the encoding to hold amplifier.limit_v",
+             "reduce counts_per_v to at most " + exact_text(largest_v * rig.voltage.counts_per_v / limit_v));
   keys.flag("read_back", rig.voltage_reads_back, true, Usual::left_out);
 }
 
@@ -89,11 +89,11 @@ void refuse_overlap(const YamlMap& map, const std::vector<Block>& blocks) {
   for (std::size_t i = 0; i < blocks.size(); ++i) {
     const Block& a = blocks[i];
     if (a.first + a.count - 1 > last_address)
-      map.fail(a.key, "ends beyond register 65535", "give it a lower address");
+      map.fail(a.key, "ends beyond register 65535", "use a lower address");
     for (std::size_t j = 0; j < i; ++j) {
       const Block& b = blocks[j];
       if (a.first < b.first + b.count && b.first < a.first + a.count)
-        map.fail(a.key, std::string("shares a register with ") + b.key, "give each its own registers");
+        map.fail(a.key, std::string("shares a register with ") + b.key, "use different registers for each");
     }
   }
 }
@@ -128,11 +128,12 @@ void check_registers(const YamlMap& map, const ModbusRig& rig, const RigRoles& r
     end = std::max(end, block.first + block.count);
   }
   if (end - first > most_registers_per_read)
-    map.fail("counters", "span " + std::to_string(end - first) + " registers, boot count and status included",
-             "put them within 125 registers, one request reads them all");
+    map.fail("counters",
+             "span " + std::to_string(end - first) + " registers, including boot count and status",
+             "place them within 125 registers, because one request reads them all");
   if (rig.exchange == ModbusExchange::read_write && rig.input_registers)
     map.fail("exchange", "is read_write, which reads holding registers only",
-             "use separate, or table holding");
+             "use exchange: separate, or table: holding");
 }
 
 void link_keys(YamlKeys& keys, bool is_serial, ModbusRig& rig) {
@@ -162,14 +163,14 @@ void modbus_keys(YamlKeys& keys, Backend link, const RigFile& rig_file, ModbusRi
   }
   if (const YamlMap* map = keys.source()) check_registers(*map, rig, roles);
   keys.check("response_timeout_s", rig.response_timeout_s < rig_file.watchdog_s, "is not below watchdog_s",
-             "give it less than the watchdog's time");
+             "set it to less than watchdog_s");
 }
 
 template <Backend link>
 void keys_of_link(YamlKeys& document, RigFile& rig) {
   document.check("backend",
                  !roles_of(rig, Backend::modbus_tcp).any() || !roles_of(rig, Backend::modbus_rtu).any(),
-                 "names both Modbus links", "use one of modbus-tcp and modbus-rtu");
+                 "names both Modbus links", "use either modbus-tcp or modbus-rtu");
   document.section_of("modbus", rig.modbus,
                       [&](YamlKeys& keys, ModbusRig& modbus) { modbus_keys(keys, link, rig, modbus); });
 }

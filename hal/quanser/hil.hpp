@@ -5,8 +5,11 @@
 //   JuliaComputing/QuanserInterface.jl, src/QuanserBindings.jl (types, values, every signature)
 //   mahilab/mahi-daq, src/Mahi/Daq/Quanser/*.cpp (order of the calls on Q2-USB and Q8-USB, what reload
 //   returns, hil_get_version, msg_get_error_message)
-// What an expired watchdog does follows Quanser's documentation: it sets the outputs to their expiration
-// states and keeps everybody from the hardware until it is cleared.
+//   quanser/quanser_sdk_examples, C/hardware/position_control_example (the loop that a hardware-timed task
+//   paces: hil_task_read_encoder, then hil_write_analog)
+// What an expired watchdog does, and what a task's buffer does when it is full, follows Quanser's
+// documentation: it sets the outputs to their expiration states and keeps everybody from the hardware until
+// it is cleared.
 #pragma once
 
 #include <cstddef>
@@ -15,7 +18,9 @@
 namespace upright::hil {
 
 struct CardTag;
-using Card = CardTag*;             // t_card
+using Card = CardTag*;  // t_card
+struct TaskTag;
+using Task = TaskTag*;             // t_task
 using Error = int;                 // t_error: negative on error
 using Boolean = char;              // t_boolean
 using Channels = const unsigned*;  // t_uint32[]
@@ -34,6 +39,10 @@ enum StringProperty : unsigned {
 };
 enum QuadratureMode : unsigned { quadrature_4x = 4 };
 enum DigitalState : unsigned { digital_low = 0, digital_high = 1, digital_tristate = 2 };
+
+enum Clock : int { hardware_clock_0 = 0 };
+enum BufferOverflowMode : unsigned { overwrite_on_overflow = 1 };
+inline constexpr auto endless = static_cast<unsigned>(-1);  // number of samples of a task
 
 /// hil_read_other: the encoders' velocities in counts per second.
 inline constexpr unsigned first_velocity_channel = 14000;
@@ -75,6 +84,14 @@ struct Functions {
   Error (*set_analog_termination_state)(Card, Channels, unsigned count, const double*) = nullptr;
   Error (*set_digital_termination_state)(Card, Channels, unsigned count, const Boolean*) = nullptr;
   Error (*write_termination_states)(Card) = nullptr;
+  Error (*task_create_encoder_reader)(Card, unsigned samples_in_buffer, Channels, unsigned count,
+                                      Task*) = nullptr;
+  Error (*task_set_buffer_overflow_mode)(Task, BufferOverflowMode) = nullptr;
+  Error (*task_start)(Task, Clock, double rate_hz, unsigned samples) = nullptr;
+  /// Waits for `samples` samples, or until the task is stopped. Returns how many came.
+  Error (*task_read_encoder)(Task, unsigned samples, std::int32_t*) = nullptr;
+  Error (*task_stop)(Task) = nullptr;
+  Error (*task_delete)(Task) = nullptr;
   /// What it returns is not used.
   void (*get_error_message)(const char* locale, Error, char* text, std::size_t size) = nullptr;
 };

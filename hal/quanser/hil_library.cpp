@@ -12,7 +12,7 @@ namespace upright {
 
 namespace {
 
-/// Distributions leave the plain name to their development packages.
+/// Distributions install the name without a version only with the development package.
 constexpr std::array endings = {"", ".1"};
 
 std::string place_of(const std::string& folder, const std::string& name) {
@@ -20,7 +20,7 @@ std::string place_of(const std::string& folder, const std::string& name) {
   return (std::filesystem::path(folder) / name).string();
 }
 
-/// A library stays until the program ends: it may have threads of its own, which cannot outlive its code.
+/// A library stays loaded until the program ends, because it may run its own threads.
 void* load(const std::string& folder, const std::string& name) {
   for (const char* ending : endings)
     if (void* handle = dlopen((place_of(folder, name) + ending).c_str(), RTLD_NOW | RTLD_GLOBAL);
@@ -34,7 +34,7 @@ std::string loader_words() {
   return words == nullptr ? "no reason given" : words;
 }
 
-/// What the loader says of `name` itself, not of the endings that were tried after it.
+/// The loader's error for `name` itself, and not for the endings that were tried after it.
 std::string problem_of(const std::string& folder, const std::string& name) {
   dlopen(place_of(folder, name).c_str(), RTLD_NOW | RTLD_GLOBAL);
   return loader_words();
@@ -72,6 +72,12 @@ hil::Functions functions_of(void* library) {
   find(library, "hil_set_analog_termination_state", f.set_analog_termination_state);
   find(library, "hil_set_digital_termination_state", f.set_digital_termination_state);
   find(library, "hil_write_termination_states", f.write_termination_states);
+  find(library, "hil_task_create_encoder_reader", f.task_create_encoder_reader);
+  find(library, "hil_task_set_buffer_overflow_mode", f.task_set_buffer_overflow_mode);
+  find(library, "hil_task_start", f.task_start);
+  find(library, "hil_task_read_encoder", f.task_read_encoder);
+  find(library, "hil_task_stop", f.task_stop);
+  find(library, "hil_task_delete", f.task_delete);
   // It is in one of the libraries that libhil needs, under its plain name or that of its 8-bit text.
   find(RTLD_DEFAULT, "msg_get_error_messageA", f.get_error_message);
   if (f.get_error_message == nullptr) find(RTLD_DEFAULT, "msg_get_error_message", f.get_error_message);
@@ -85,7 +91,7 @@ std::string path_of(const hil::Functions& functions) {
   return dladdr(address, &info) != 0 && info.dli_fname != nullptr ? info.dli_fname : "";
 }
 
-const char* own_words(int number) {
+const char* error_name(int number) {
   switch (number) {
     case hil::not_supported:
     case hil::function_not_supported:
@@ -95,13 +101,13 @@ const char* own_words(int number) {
     case hil::timed_out:
       return "timed out";
     case hil::unable_to_open_driver:
-      return "the board's driver could not be opened";
+      return "the driver of the board could not be opened";
     case hil::board_not_found:
-      return "no such board";
+      return "board not found";
     case hil::board_in_use:
       return "the board is in use";
     case hil::unrecognized_board_type:
-      return "no such board type";
+      return "unknown board type";
     default:
       return "see Quanser's list of error codes";
   }
@@ -114,16 +120,17 @@ HilLibrary::HilLibrary(const QuanserRig& rig, const std::string& rig_file) {
   load(rig.folder, rig.runtime_library);
   void* const library = load(rig.folder, rig.library);
   if (library == nullptr)
-    throw DeviceError("Quanser's HIL library " + rig.library + " of " + rig_file + " cannot be loaded (" +
-                      problem_of(rig.folder, rig.library) +
-                      "): install Quanser's SDK for Linux (package quanser-sdk), or name the library, or the "
-                      "folder it is in, as quanser_hil.library and quanser_hil.folder");
+    throw DeviceError(
+        "Quanser's HIL library " + rig.library + " of " + rig_file + " cannot be loaded (" +
+        problem_of(rig.folder, rig.library) +
+        "): install Quanser's SDK for Linux (package quanser-sdk), or set quanser_hil.library and "
+        "quanser_hil.folder to the library and its folder");
   functions_ = functions_of(library);
   if (functions_.open == nullptr || functions_.close == nullptr || functions_.read_encoder == nullptr ||
       functions_.write_analog == nullptr)
     throw DeviceError(rig.library + " of " + rig_file +
-                      " is no HIL library, for it has no hil_open, hil_close, hil_read_encoder or "
-                      "hil_write_analog: name Quanser's libhil.so as quanser_hil.library");
+                      " is not a HIL library, because it lacks hil_open, hil_close, hil_read_encoder or "
+                      "hil_write_analog: set quanser_hil.library to Quanser's libhil.so");
   path_ = path_of(functions_);
 }
 
@@ -139,7 +146,7 @@ std::string HilLibrary::words_for(hil::Error error) const {
   if (functions_.get_error_message != nullptr)
     functions_.get_error_message(nullptr, error, text.data(), text.size());
   text.back() = '\0';
-  return "error " + std::to_string(-error) + ": " + (text[0] != '\0' ? text.data() : own_words(-error));
+  return "error " + std::to_string(-error) + ": " + (text[0] != '\0' ? text.data() : error_name(-error));
 }
 
 }  // namespace upright

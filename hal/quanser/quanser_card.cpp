@@ -14,10 +14,10 @@ namespace upright {
 
 namespace {
 
-// The first hil_open after a card was plugged in, or after a program that was killed, may fail.
+// The first hil_open may fail after a card was plugged in or a program that used it was killed.
 constexpr int attempts_to_open = 3;
 constexpr auto pause_between_attempts = std::chrono::milliseconds(300);
-// What a USB card is told acts with its next transfers, at the latest after so long.
+// A USB card applies a setting with its next transfers, at the latest after this time.
 constexpr auto settling_time = std::chrono::milliseconds(10);
 
 bool is_unsupported(hil::Error error) noexcept {
@@ -28,16 +28,16 @@ bool is_unsupported(hil::Error error) noexcept {
 std::string remedy_for_opening(int number) {
   switch (number) {
     case hil::board_in_use:
-      return "end the other program that has the card";
+      return "end the other program that uses the card";
     case hil::no_permission:
-      return "let this user use the card (the udev rules of Quanser's SDK), then plug it in again";
+      return "give this user access to the card (udev rules of Quanser's SDK), then plug it in again";
     case hil::unrecognized_board_type:
     case hil::unable_to_open_driver:
       return "check quanser_hil.board_type, and that this version of Quanser's SDK has a driver for the card "
              "(its Linux documentation does not list Q2-USB and Q8-USB)";
     default:
       return "plug the card in, switch it on (lsusb lists a USB card), and check quanser_hil.board_type and "
-             "board_identifier";
+             "quanser_hil.board_identifier";
   }
 }
 
@@ -84,7 +84,7 @@ void QuanserCard::refuse_opening(hil::Error error) const {
                     std::to_string(attempts_to_open) + " attempts): " + remedy_for_opening(-error));
 }
 
-/// A library of another age, or a stand-in, may lack some.
+/// An older library, or a substitute, may lack some functions.
 void QuanserCard::require_functions() const {
   const auto need = [this](bool is_there, const char* name, const std::string& remedy) {
     if (!is_there)
@@ -93,11 +93,16 @@ void QuanserCard::require_functions() const {
   if (wiring_.amplifier_enable)
     need(hil_.write_digital != nullptr, "hil_write_digital",
          "install a newer SDK, or remove quanser_hil.amplifier_enable");
+  if (wiring_.is_clock)
+    need(hil_.task_create_encoder_reader != nullptr && hil_.task_start != nullptr &&
+             hil_.task_read_encoder != nullptr && hil_.task_stop != nullptr && hil_.task_delete != nullptr,
+         "hil_task functions", "install a newer SDK, or remove quanser_hil.clock");
   if (wiring_.watchdog_s <= 0.0) return;
   need(hil_.watchdog_start != nullptr && hil_.watchdog_reload != nullptr && hil_.watchdog_clear != nullptr &&
            hil_.watchdog_stop != nullptr && hil_.watchdog_set_analog_expiration_state != nullptr,
        "hil_watchdog functions",
-       "install a newer SDK, or remove quanser_hil.watchdog_s and let another watchdog guard the amplifier");
+       "install a newer SDK, or remove quanser_hil.watchdog_s and protect the amplifier with another "
+       "watchdog");
 }
 
 void QuanserCard::fail(hil::Error error, const std::string& doing) const {
@@ -110,16 +115,16 @@ void QuanserCard::require(hil::Error error, const std::string& doing) const {
   if (error < 0) fail(error, doing);
 }
 
-/// Fixed on many cards, so that there is nothing to set.
+/// Many cards have this fixed and refuse the setting.
 void QuanserCard::require_where_supported(hil::Error error, const std::string& doing) const {
   if (error < 0 && !is_unsupported(error)) fail(error, doing);
 }
 
 void QuanserCard::prepare() {
-  // Both may be refused where nothing runs and nothing is locked.
+  // Both may be refused if no watchdog runs and the card is not locked.
   stop_watchdog();
   if (hil_.watchdog_clear != nullptr) hil_.watchdog_clear(card_);
-  // First of all: a card that comes out of its lock may put out what it did before.
+  // This comes first, because a card that is unlocked may restore its previous output.
   put_out_zero();
   set_up_output();
   set_up_encoders();
@@ -129,7 +134,7 @@ void QuanserCard::prepare() {
 
 void QuanserCard::put_out_zero() const {
   if (!wiring_.output) return;
-  require(put_out(0.0), "putting out zero volts");
+  require(put_out(0.0), "writing zero volts");
 }
 
 void QuanserCard::set_up_output() {
@@ -144,7 +149,7 @@ void QuanserCard::set_up_output() {
     require_where_supported(
         hil_.set_analog_output_ranges(card_, &channel, 1, &wiring_.output->low_v, &wiring_.output->high_v),
         "setting quanser_hil.output_range_v");
-    // The same code is another voltage in another range.
+    // A new range changes the voltage that the same code means.
     put_out_zero();
   }
   knows_termination_ = hil_.write_termination_states != nullptr &&
@@ -157,7 +162,7 @@ void QuanserCard::set_up_enable() {
   const auto line = static_cast<unsigned>(wiring_.amplifier_enable->line);
   if (hil_.set_digital_directions != nullptr)
     require_where_supported(hil_.set_digital_directions(card_, nullptr, 0, &line, 1),
-                            "making quanser_hil.amplifier_enable an output");
+                            "configuring quanser_hil.amplifier_enable as an output");
   require(enable(false), "disabling the amplifier");
   const hil::Boolean off = wiring_.amplifier_enable->active_high ? 0 : 1;
   knows_termination_ = knows_termination_ && hil_.set_digital_termination_state != nullptr &&
@@ -169,7 +174,7 @@ void QuanserCard::set_up_encoders() const {
   const std::array modes = {hil::quadrature_4x, hil::quadrature_4x};
   require_where_supported(
       hil_.set_encoder_quadrature_mode(card_, encoders_.data(), encoder_count_, modes.data()),
-      "making the encoders count all four edges");
+      "setting the encoders to count all four edges");
 }
 
 void QuanserCard::set_up_watchdog() const {
@@ -177,8 +182,8 @@ void QuanserCard::set_up_watchdog() const {
   const auto channel = static_cast<unsigned>(wiring_.output->channel);
   const double zero_v = 0.0;
   require(hil_.watchdog_set_analog_expiration_state(card_, &channel, 1, &zero_v),
-          "setting the output to zero volts for when the watchdog expires (a card that cannot needs another "
-          "watchdog: remove quanser_hil.watchdog_s then)");
+          "setting the output voltage after an expired watchdog to zero (if the card does not support this, "
+          "remove quanser_hil.watchdog_s and use another watchdog)");
   if (hil_.watchdog_set_digital_expiration_state == nullptr) return;
   const QuanserCardKind* kind = quanser_card_kind(wiring_.board_type);
   if (kind != nullptr && kind->tristate_lines > 0) {
@@ -187,21 +192,21 @@ void QuanserCard::set_up_watchdog() const {
     const std::vector<hil::DigitalState> states(lines.size(), hil::digital_tristate);
     require(hil_.watchdog_set_digital_expiration_state(card_, lines.data(),
                                                        static_cast<unsigned>(lines.size()), states.data()),
-            "setting the digital lines to tri-state for when the watchdog expires");
+            "setting the state of the digital lines after an expired watchdog to tri-state");
     return;
   }
   if (!wiring_.amplifier_enable) return;
   const auto line = static_cast<unsigned>(wiring_.amplifier_enable->line);
   const hil::DigitalState off = wiring_.amplifier_enable->active_high ? hil::digital_low : hil::digital_high;
   require_where_supported(hil_.watchdog_set_digital_expiration_state(card_, &line, 1, &off),
-                          "setting the enable line to off for when the watchdog expires");
+                          "setting the state of the enable line after an expired watchdog to off");
 }
 
 void QuanserCard::clear_counts() {
   if (encoder_count_ == 0 || hil_.set_encoder_counts == nullptr) return;
   const std::array<std::int32_t, 2> zeros{};
   require_where_supported(hil_.set_encoder_counts(card_, encoders_.data(), encoder_count_, zeros.data()),
-                          "setting the encoders' counters to zero");
+                          "resetting the encoder counters");
   std::this_thread::sleep_for(settling_time);
 }
 
@@ -236,10 +241,38 @@ bool QuanserCard::read_velocities(std::array<double, 2>& counts_per_s) const noe
 hil::Error QuanserCard::read_counts(RawCounts& counts) const noexcept {
   std::array<std::int32_t, 2> read{};
   const hil::Error error = hil_.read_encoder(card_, encoders_.data(), encoder_count_, read.data());
-  if (error < 0) return error;
+  if (error >= 0) counts = counts_of(read);
+  return error;
+}
+
+RawCounts QuanserCard::counts_of(const std::array<std::int32_t, 2>& read) const noexcept {
+  RawCounts counts;
   if (wiring_.cart_channel) counts.cart = read[0];
   if (wiring_.pendulum_channel) counts.pendulum = read[encoder_count_ - 1];
-  return error;
+  return counts;
+}
+
+hil::Task QuanserCard::start_sampling(double rate_hz) const {
+  // The newest sample is what a controller needs: the buffer holds one, and a new one takes its place.
+  constexpr unsigned samples_in_buffer = 1;
+  const std::string remedy = " (without quanser_hil.clock the loop follows the computer's clock)";
+  hil::Task task = nullptr;
+  require(hil_.task_create_encoder_reader(card_, samples_in_buffer, encoders_.data(), encoder_count_, &task),
+          "making a hardware-timed task" + remedy);
+  // A card that cannot be told fails where it is not read in time, and the run ends then.
+  if (hil_.task_set_buffer_overflow_mode != nullptr)
+    hil_.task_set_buffer_overflow_mode(task, hil::overwrite_on_overflow);
+  const hil::Error error = hil_.task_start(task, hil::hardware_clock_0, rate_hz, hil::endless);
+  if (error >= 0) return task;
+  hil_.task_delete(task);
+  fail(error, "starting to sample " + exact_text(rate_hz) + " times per second on the card's clock" + remedy);
+}
+
+hil::Error QuanserCard::wait_for_sample(hil::Task task, RawCounts& counts) const noexcept {
+  std::array<std::int32_t, 2> read{};
+  const hil::Error came = hil_.task_read_encoder(task, 1, read.data());
+  if (came > 0) counts = counts_of(read);
+  return came;
 }
 
 hil::Error QuanserCard::put_out(double voltage_v) const noexcept {

@@ -35,6 +35,16 @@ class QuanserCard {
   bool read_velocities(std::array<double, 2>& counts_per_s) const noexcept;
 
   hil::Error read_counts(RawCounts& counts) const noexcept;
+
+  /// A task of the card that samples the encoders `rate_hz` times per second, on the card's own clock. Throws
+  /// DeviceError.
+  hil::Task start_sampling(double rate_hz) const;
+  /// Waits for the task's next sample. 0: the task was stopped, there is no sample.
+  hil::Error wait_for_sample(hil::Task task, RawCounts& counts) const noexcept;
+  /// Ends the wait of whoever waits for a sample.
+  void stop_sampling(hil::Task task) const noexcept { hil_.task_stop(task); }
+  void delete_task(hil::Task task) const noexcept { hil_.task_delete(task); }
+
   /// `voltage_v` is finite.
   hil::Error put_out(double voltage_v) const noexcept;
   hil::Error enable(bool on) const noexcept;
@@ -61,6 +71,7 @@ class QuanserCard {
   hil::Error open_once();
   [[noreturn]] void refuse_opening(hil::Error error) const;
   void require_functions() const;
+  RawCounts counts_of(const std::array<std::int32_t, 2>& read) const noexcept;
   void set_up_output();
   void set_up_enable();
   void set_up_encoders() const;

@@ -39,8 +39,8 @@ std::string read_encoders(QuanserCard& card) {
   std::array<double, 2> velocities{};
   return "read, counts " + std::to_string(counts.cart) + " (cart) and " + std::to_string(counts.pendulum) +
          " (pendulum); " +
-         (card.read_velocities(velocities) ? "the card has velocities too, which are not used"
-                                           : "the card offers no velocities");
+         (card.read_velocities(velocities) ? "the card also measures velocities, which are not used"
+                                           : "the card does not measure velocities");
 }
 
 std::string set_up(QuanserCard& card) {
@@ -50,7 +50,7 @@ std::string set_up(QuanserCard& card) {
 
 std::string prove_output(QuanserCard& card) {
   card.prepare();
-  return "took zero volts" + std::string(card.has_enable() ? ", with the amplifier disabled" : "");
+  return "accepts zero volts" + std::string(card.has_enable() ? ", with the amplifier disabled" : "");
 }
 
 void wait_for_expiry(double watchdog_s) {
@@ -61,23 +61,21 @@ void wait_for_expiry(double watchdog_s) {
 std::string prove_watchdog(QuanserCard& card) {
   if (const hil::Error error = card.start_watchdog(); error < 0) card.fail(error, "starting the watchdog");
   const hil::Error served = card.reload_watchdog();
-  if (served < 0) card.fail(served, "serving the watchdog");
+  if (served < 0) card.fail(served, "resetting the watchdog");
   if (served != hil::reloaded)
-    throw DeviceError(
-        "the watchdog had expired as soon as it was started: give quanser_hil.watchdog_s more "
-        "time");
+    throw DeviceError("the watchdog expired immediately after its start: raise quanser_hil.watchdog_s");
   wait_for_expiry(card.watchdog_s());
   const hil::Error after = card.reload_watchdog();
-  if (after < 0) card.fail(after, "asking the watchdog whether it had expired");
+  if (after < 0) card.fail(after, "reading whether the watchdog had expired");
   if (after != hil::expired_before)
     throw DeviceError(
-        "the watchdog was not served and did not expire: do not rely on it, let another one "
-        "guard the amplifier's enable");
+        "the watchdog was not reset but did not expire: do not rely on it, and protect the "
+        "amplifier's enable with another watchdog");
   if (const hil::Error error = card.clear_watchdog(); error < 0) card.fail(error, "clearing the watchdog");
   card.stop_watchdog();
   if (const hil::Error error = card.put_out(0.0); error < 0)
-    card.fail(error, "putting out zero volts after the watchdog was cleared");
-  return "expires when it is not served, and can be cleared; it is set to " + exact_text(card.watchdog_s()) +
+    card.fail(error, "writing zero volts after the watchdog was cleared");
+  return "expires when it is not reset, and can be cleared; its time is " + exact_text(card.watchdog_s()) +
          " s";
 }
 
@@ -85,7 +83,7 @@ CardStep examined(const std::string& subject, QuanserCard& card, const Trial& tr
   try {
     return {subject, true, trial(card), ""};
   } catch (const DeviceError& problem) {
-    return {subject, false, "it does not do what a rig needs", problem.what()};
+    return {subject, false, "this test failed", problem.what()};
   }
 }
 
@@ -96,7 +94,7 @@ std::vector<CardStep> prove_quanser_card(const RigFile& rig) {
   try {
     card = std::make_unique<QuanserCard>(rig);
   } catch (const DeviceError& problem) {
-    return {{"Quanser card", false, "it cannot be had", problem.what()}};
+    return {{"Quanser card", false, "it cannot be opened", problem.what()}};
   }
   std::vector<std::pair<const char*, Trial>> trials = {{"Quanser library", library_words},
                                                        {"Quanser card", board_words}};

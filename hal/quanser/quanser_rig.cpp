@@ -18,7 +18,9 @@ std::int64_t now_ns() noexcept {
 }  // namespace
 
 QuanserTransport::QuanserTransport(const RigFile& rig, double period_s)
-    : rig_(rig), patience_ns_(static_cast<std::int64_t>(1e9 * share_of_period * period_s)) {}
+    : rig_(rig),
+      period_s_(period_s),
+      patience_ns_(static_cast<std::int64_t>(1e9 * share_of_period * period_s)) {}
 
 QuanserTransport::~QuanserTransport() {
   for (int i = 0; i < attempts_at_the_end && !stop().done(); ++i) {
@@ -36,17 +38,31 @@ void QuanserTransport::open() {
 /// A card that is open stays so, and its counters go on. One that is gone stays gone: its counts are lost.
 void QuanserTransport::open_card() {
   const bool is_new = !card_;
+  sampler_.reset();
   if (is_new) card_ = std::make_unique<QuanserCard>(rig_);
   card_->prepare();
   if (is_new && rig_.calibration.zero_at_start) card_->clear_counts();
+  if (!rig_.quanser->is_clock) return;
+  sampler_ = std::make_unique<QuanserSampler>(*card_, period_s_, rig_.file.string());
+  sample_read_ = sample_waited_for_ = 0;
+}
+
+DeviceSample QuanserTransport::wait_next(std::int64_t until_ns) noexcept {
+  if (!sampler_) return {};
+  const DeviceSample next = sampler_->wait_for_another(sample_waited_for_, until_ns).when;
+  sample_waited_for_ = next.number;
+  return next;
 }
 
 RigReading QuanserTransport::read() noexcept {
   RigReading reading;
-  if (!card_) {
-    reading.fault = RigFault::link_lost;
-    return reading;
-  }
+  reading.fault = RigFault::link_lost;
+  if (!card_) return reading;
+  return sampler_ ? read_sample() : read_now();
+}
+
+RigReading QuanserTransport::read_now() noexcept {
+  RigReading reading;
   RawCounts counts;
   const std::int64_t asked_ns = now_ns();
   const hil::Error error = card_->read_counts(counts);
@@ -61,6 +77,26 @@ RigReading QuanserTransport::read() noexcept {
     reading.fault = RigFault::link_timeout;
     return reading;
   }
+  return fresh(reading, counts);
+}
+
+RigReading QuanserTransport::read_sample() noexcept {
+  RigReading reading;
+  const CardSample sample = sampler_->latest();
+  reading.time_ns = sample.when.time_ns;
+  if (sample.error < 0) {
+    reading.fault = has_expired() ? RigFault::watchdog_expired : fault_of(sample.error);
+    return reading;
+  }
+  if (sample.when.number == sample_read_) {
+    reading.fault = RigFault::link_timeout;
+    return reading;
+  }
+  sample_read_ = sample.when.number;
+  return fresh(reading, sample.counts);
+}
+
+RigReading QuanserTransport::fresh(RigReading reading, const RawCounts& counts) noexcept {
   reading.cart_counts = signed_counts(counts.cart, rig_.calibration.cart.width_bits);
   reading.pendulum_counts = signed_counts(counts.pendulum, rig_.calibration.pendulum.width_bits);
   reading.sequence = ++sequence_;
@@ -133,7 +169,8 @@ StopReport QuanserTransport::stop() noexcept {
   report.watchdog_s = watching_ ? card_->watchdog_s() : 0.0;
   report.watchdog_read_back = false;
   take_voltage_away(report);
-  if (report.done() && watching_) {
+  // One that has expired stays so, and is asked again by the next stop.
+  if (report.done() && watching_ && !has_expired()) {
     card_->stop_watchdog();
     watching_ = false;
   }

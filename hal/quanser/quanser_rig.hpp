@@ -6,6 +6,9 @@
 // late, which the loop counts as missed periods and ends at zero volts. Meanwhile the card's own watchdog
 // takes the voltage away. So a rig file should give it a time.
 //
+// With `clock: card` the card samples on its own time (quanser_sampler.hpp). A reading is its newest sample
+// then, and a reading without a new one is a reply that did not come.
+//
 // The watchdog starts with the first voltage and stops once a stop is confirmed. When it expires the card is
 // at zero volts and refuses everything until the rig is opened again: that is a confirmed zero.
 #pragma once
@@ -14,6 +17,7 @@
 
 #include "../rig_lock.hpp"
 #include "quanser_card.hpp"
+#include "quanser_sampler.hpp"
 #include "upright/hal/rig.hpp"
 #include "upright/hal/rig_file.hpp"
 
@@ -31,20 +35,28 @@ class QuanserTransport final : public Rig {
   RigFault write(double voltage_v) noexcept override;
   StopReport stop() noexcept override;
   DeviceFacts device_facts() const override;
+  bool is_clock() const noexcept override { return sampler_ != nullptr; }
+  DeviceSample wait_next(std::int64_t until_ns) noexcept override;
 
  private:
   void open_card();
+  RigReading read_now() noexcept;
+  RigReading read_sample() noexcept;
+  RigReading fresh(RigReading reading, const RawCounts& counts) noexcept;
   RigFault serve_watchdog() noexcept;
   RigFault enable_once() noexcept;
   bool has_expired() noexcept;
   void take_voltage_away(StopReport& report) noexcept;
 
   RigFile rig_;
+  double period_s_;
   std::int64_t patience_ns_;
   RigLock lock_;
   std::unique_ptr<QuanserCard> card_;
+  std::unique_ptr<QuanserSampler> sampler_;  // null: the computer is the clock
   std::uint64_t sequence_ = 0;
-  std::int64_t served_ns_ = 0;  // when the watchdog was last
+  std::uint64_t sample_read_ = 0, sample_waited_for_ = 0;  // their numbers
+  std::int64_t served_ns_ = 0;                             // when the watchdog was last
   bool watching_ = false, enabled_ = false, stopped_ = true;
 };
 

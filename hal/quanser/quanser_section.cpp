@@ -19,12 +19,14 @@ constexpr int last_channel = 255;
 constexpr std::size_t longest_board_type = 64;
 constexpr std::size_t longest_text = 1000;
 constexpr Words<2> levels = {"low", "high"};
+constexpr Words<2> clocks = {"computer", "card"};
 
 /// A name of the loader's or the card's.
 void name_key(YamlKeys& keys, const char* key, std::string& name, std::size_t longest) {
   keys.text(key, name);
-  keys.check(key, name.size() <= longest && name.find('\0') == std::string::npos, "is no name",
-             "give at most " + std::to_string(longest) + " characters");
+  keys.check(key, name.size() <= longest && name.find('\0') == std::string::npos,
+             "is too long or contains a null character",
+             "use at most " + std::to_string(longest) + " characters");
 }
 
 /// Left out, it stays as it is. An empty one is not written.
@@ -55,7 +57,7 @@ void channel_key(YamlKeys& keys, const char* key, int& channel, int there, const
   keys.integer(key, channel, 0, last_channel);
   keys.check(key, there == 0 || channel < there,
              "is " + std::to_string(channel) + ", which a " + board_type + " does not have",
-             "give 0 to " + std::to_string(there - 1));
+             "use 0 to " + std::to_string(there - 1));
 }
 
 void encoder_keys(YamlKeys& keys, const RigRoles& roles, const QuanserCardKind* kind, QuanserRig& rig) {
@@ -64,7 +66,7 @@ void encoder_keys(YamlKeys& keys, const RigRoles& roles, const QuanserCardKind* 
   if (roles.pendulum)
     channel_key(keys, "pendulum", YamlKeys::made(rig.pendulum_channel), there, rig.board_type);
   keys.check("pendulum", !rig.cart_channel || rig.cart_channel != rig.pendulum_channel,
-             "is the channel of cart", "give each encoder its own channel");
+             "is the same channel as cart", "use a different channel for each encoder");
 }
 
 /// The lowest bits of a wider counter count the same motion.
@@ -86,7 +88,7 @@ void range_key(YamlKeys& keys, QuanserOutput& output) {
   std::vector<double> ends = {output.low_v, output.high_v};
   keys.numbers("output_range_v", ends, Range::within(-largest_v, largest_v));
   keys.check("output_range_v", ends.size() == 2 && ends[0] < 0.0 && ends[1] > 0.0,
-             "is not a range around zero volts", "give the lower and the upper end, such as [-10, 10]");
+             "does not contain zero volts", "write the lower and the upper end, such as [-10, 10]");
   output.low_v = ends[0];
   output.high_v = ends[1];
   output.sets_range = true;
@@ -98,8 +100,8 @@ void limit_to_room(const YamlMap& map, const QuanserOutput& output, Amplifier& a
   if (room_v >= amplifier.limit_v) return;
   const bool has_gain = map.has("amplifier_gain");
   if (output.sets_range || has_gain)
-    map.fail(has_gain ? "amplifier_gain" : "output_range_v", "leaves no room for the amplifier's limit",
-             "give amplifier.limit_v at most " + exact_text(room_v));
+    map.fail(has_gain ? "amplifier_gain" : "output_range_v", "is too small for amplifier.limit_v",
+             "reduce amplifier.limit_v to at most " + exact_text(room_v));
   amplifier.limit_v = room_v;
 }
 
@@ -123,8 +125,8 @@ void watchdog_key(YamlKeys& keys, const QuanserCardKind* kind, QuanserRig& rig) 
   if (kind == nullptr || rig.watchdog_s <= 0.0) return;
   keys.check("watchdog_s",
              rig.watchdog_s >= kind->shortest_watchdog_s && rig.watchdog_s <= kind->longest_watchdog_s,
-             "is not a time that the watchdog of a " + rig.board_type + " can be set to",
-             "give " + exact_text(kind->shortest_watchdog_s) + " to " + exact_text(kind->longest_watchdog_s));
+             "is not a time that the watchdog of a " + rig.board_type + " supports",
+             "use " + exact_text(kind->shortest_watchdog_s) + " to " + exact_text(kind->longest_watchdog_s));
 }
 
 void quanser_keys(YamlKeys& keys, RigFile& rig, QuanserRig& quanser) {
@@ -137,6 +139,8 @@ void quanser_keys(YamlKeys& keys, RigFile& rig, QuanserRig& quanser) {
   optional_name_key(keys, "board_identifier", quanser.board_identifier);
   optional_name_key(keys, "board_options", quanser.board_options);
   const QuanserCardKind* kind = quanser_card_kind(quanser.board_type);
+  if (roles.encoders() && keys.given("clock", quanser.is_clock))
+    keys.one_of("clock", quanser.is_clock, clocks);
   if (roles.encoders())
     keys.map("encoder_channels", [&](YamlKeys& map) { encoder_keys(map, roles, kind, quanser); });
   if (kind != nullptr && keys.source()) follow_at_width_of(*kind, roles, rig.calibration);

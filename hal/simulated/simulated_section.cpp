@@ -23,7 +23,7 @@ void simulated_keys(YamlKeys& keys, SimulatedRig& rig) {
 
 BackendKind simulated_backend() {
   const auto make = [](const RigFile& rig, double) -> std::unique_ptr<Rig> {
-    throw ConfigError(rig.file.string() + ":1: backend is simulated: name a hardware backend");
+    throw ConfigError(rig.file.string() + ":1: backend is simulated: use a hardware backend");
   };
   return {"simulated", nullptr, make};
 }

@@ -61,7 +61,7 @@ Endpoint::Endpoint(const RigFile& rig, const VirtualRigOptions& options)
     listen_tcp(options.tcp_host, options.tcp_port);
   else
     open_line(*rig.modbus, options.serial_line);
-  if (!context_) throw DeviceError("no Modbus context could be made: free some memory");
+  if (!context_) throw DeviceError("no Modbus context could be created: free memory");
   configure(context_.get(), rig.modbus->unit);
 }
 
@@ -74,7 +74,8 @@ void Endpoint::listen_tcp(const std::string& host, int port) {
   address.sin_family = AF_INET;
   address.sin_port = htons(static_cast<std::uint16_t>(port));
   if (inet_pton(AF_INET, host.c_str(), &address.sin_addr) != 1)
-    throw ConfigError("'" + host + "' is no numeric IPv4 address: give --tcp one such as 127.0.0.1:1502");
+    throw ConfigError("'" + host +
+                      "' is not a numeric IPv4 address: use one such as 127.0.0.1:1502 with --tcp");
   listener_ = Descriptor(socket(AF_INET, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0));
   const int on = 1;
   setsockopt(listener_.get(), SOL_SOCKET, SO_REUSEADDR, &on, sizeof on);
@@ -82,7 +83,7 @@ void Endpoint::listen_tcp(const std::string& host, int port) {
   if (bind(listener_.get(), reinterpret_cast<sockaddr*>(&address), size) != 0 ||
       listen(listener_.get(), most_clients) != 0)
     throw DeviceError("cannot listen on " + host + ":" + std::to_string(port) + " (" + reason() +
-                      "): choose another port, or 0 for a free one");
+                      "): choose another port, or 0 for any free port");
   getsockname(listener_.get(), reinterpret_cast<sockaddr*>(&address), &size);
   name_ = host + ":" + std::to_string(ntohs(address.sin_port));
   context_.reset(modbus_new_tcp(nullptr, ntohs(address.sin_port)));
@@ -91,7 +92,7 @@ void Endpoint::listen_tcp(const std::string& host, int port) {
 void Endpoint::open_line(const ModbusRig& modbus, const std::string& line) {
   if (modbus.baud == 0)
     throw ConfigError(
-        "the rig file has no baud rate, which --rtu needs: give a rig file of backend modbus-rtu");
+        "the rig file has no baud rate, which --rtu requires: use a rig file with backend modbus-rtu");
   const char parity = modbus.parity == Parity::none ? 'N' : modbus.parity == Parity::even ? 'E' : 'O';
   context_.reset(modbus_new_rtu(line.c_str(), modbus.baud, parity, 8, modbus.stop_bits));
   const double bits = 1.0 + 8.0 + (parity == 'N' ? 0.0 : 1.0) + modbus.stop_bits;
@@ -107,7 +108,7 @@ void Endpoint::open_line(const ModbusRig& modbus, const std::string& line) {
     std::array<char, 128> far_name{};
     if (descriptor < 0 || grantpt(descriptor) != 0 || unlockpt(descriptor) != 0 ||
         ptsname_r(descriptor, far_name.data(), far_name.size()) != 0)
-      throw DeviceError("no pseudo-terminal can be had (" + reason() + "): check /dev/pts");
+      throw DeviceError("no pseudo-terminal can be opened (" + reason() + "): check /dev/pts");
     far_end_ = Descriptor(::open(far_name.data(), O_RDWR | O_NOCTTY | O_CLOEXEC));
     termios settings{};
     tcgetattr(far_end_.get(), &settings);
@@ -115,7 +116,8 @@ void Endpoint::open_line(const ModbusRig& modbus, const std::string& line) {
     tcsetattr(far_end_.get(), TCSANOW, &settings);
     unlink(line.c_str());  // a link that leads nowhere any more
     if (symlink(far_name.data(), line.c_str()) != 0)
-      throw DeviceError("cannot make " + line + " (" + reason() + "): check the folder and its permissions");
+      throw DeviceError("cannot create " + line + " (" + reason() +
+                        "): check the folder and its permissions");
     link_made_ = line;
   }
   if (pace_) ns_per_byte_ = 1e9 * bits / modbus.baud;

@@ -52,7 +52,7 @@ class Registers {
     const auto count = static_cast<unsigned>(last) + 1;
     mapping_.reset(
         modbus_mapping_new_start_address(0, 0, 0, 0, 0, count, 0, rig.input_registers ? count : 0));
-    if (!mapping_) throw DeviceError("no registers could be made: free some memory");
+    if (!mapping_) throw DeviceError("the registers could not be allocated: free memory");
   }
 
   modbus_mapping_t* mapping() const { return mapping_.get(); }
@@ -102,7 +102,7 @@ class Server {
         boot_count_(static_cast<int>(now_ns() / tick_ns & 0xffff)) {
     int pair[2];
     if (socketpair(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0, pair) != 0)
-      throw DeviceError("no socket pair can be had: raise the limit of open files");
+      throw DeviceError("no socket pair can be opened: raise the limit on open files (ulimit -n)");
     reply_in_ = Descriptor(pair[0]);
     reply_out_ = Descriptor(pair[1]);
   }
@@ -307,7 +307,7 @@ void serve_virtual_rig(const RigFile& rig, const Plant& plant, const VirtualRigO
                        const std::atomic<bool>& stopped) {
   if (!roles_of(rig, Backend::modbus_tcp).all() && !roles_of(rig, Backend::modbus_rtu).all())
     throw ConfigError(rig.file.string() + ":1: backend is " + backends_text(rig) +
-                      ": give a rig file of backend modbus-tcp or modbus-rtu alone");
+                      ": use a rig file whose only backend is modbus-tcp or modbus-rtu");
   Server server(rig, plant, options);
   const sched_param parameters{server_priority};
   pthread_setschedparam(pthread_self(), SCHED_FIFO, &parameters);  // where allowed

@@ -1,5 +1,5 @@
-// A plant under state feedback, on any engine (EventEngine<double>, CvodeEngine): sampled with a held
-// voltage, or continuous with a delay, V(t) = gains . y(t - delay). An open loop is BasicSimulator.
+// A plant with state feedback, on any engine (EventEngine<double>, CvodeEngine): sampled with a held
+// voltage, or continuous with a delay, V(t) = gains . y(t - delay). BasicSimulator is the open loop.
 #pragma once
 
 #include <algorithm>
@@ -14,12 +14,12 @@
 
 namespace upright {
 
-/// [x, theta, x_dot, theta_dot] as the plant's sensors show them (scales and offsets; no quantisation).
+/// [x, theta, x_dot, theta_dot] as output by the plant's sensors (scales and offsets; no quantisation).
 using Measured = std::array<double, 4>;
 /// Volts per unit of `Measured`, in the order of the gain file.
 using FeedbackGains = std::array<double, 4>;
 
-/// What the sensors of a plant make of its state, with a stiff drive; linear, worked out once.
+/// The sensors' outputs as a linear function of the state, with a rigid drive; computed once.
 class MeasuredState {
  public:
   explicit MeasuredState(const Dynamics<double>& dynamics) {
@@ -45,7 +45,7 @@ class MeasuredState {
     const Measured y = (*this)(s);
     return gains[0] * y[0] + gains[1] * y[1] + gains[2] * y[2] + gains[3] * y[3];
   }
-  /// The same without the offsets: for rates and higher factors of a polynomial.
+  /// The same without the offsets: for rates and the higher coefficients of a polynomial.
   double volts_of_change(const FeedbackGains& gains, const PlantState<double>& s) const {
     return gains[0] * cart_scale_ * s.cart_m + gains[1] * theta_scale_ * s.theta_rad +
            gains[2] * cart_scale_ * s.cart_mps + gains[3] * theta_scale_ * s.theta_radps;
@@ -55,7 +55,7 @@ class MeasuredState {
   double cart_scale_, theta_scale_, cart_offset_m_, theta_offset_rad_;
 };
 
-/// A controller called at a fixed rate, its voltage held in between.
+/// A sampled controller with a held voltage.
 template <class Engine>
 class SampledLoop {
  public:
@@ -69,7 +69,7 @@ class SampledLoop {
     plant_.start(state, time_s);
   }
 
-  /// One period: `law(tick, Measured)` gives the volts commanded at its beginning.
+  /// One period: `law(tick, Measured)` returns the voltage commanded at its beginning.
   template <class Law>
   void step(Law&& law) {
     voltage_v_ = law(tick_, measured_(engine().state()));
@@ -99,7 +99,7 @@ class SampledLoop {
   double voltage_v_ = 0.0;
 };
 
-/// The dense history of one signal: a polynomial per engine step, constant before the first.
+/// Dense output of one signal: a polynomial per engine step, constant before the first.
 class SignalHistory {
  public:
   void start(double time_s, double value) {
@@ -109,7 +109,7 @@ class SignalHistory {
     before_ = value;
   }
 
-  /// `at` gives the value of a state, `change` the same without its constant part.
+  /// `at` gives the signal of a state, `change` the same without its constant part.
   template <class At, class Change>
   void add(const DenseStep& step, const At& at, const Change& change) {
     Step& kept = steps_.emplace_back();
@@ -155,10 +155,10 @@ class SignalHistory {
   double before_ = 0.0;
 };
 
-/// Continuous feedback with a delay: V(t) = gains . y(t - delay), the state before the start being the
-/// start's (the constant history of the paper's equation (15)). The plant's own input delay adds to it. Steps
-/// are restarted where an event, a corner of the actuator chain or the start comes back through the delay.
-/// Work grows as 1 / delay for delays below a millisecond; below `shortest_delay_s` a delay counts as none.
+/// Continuous feedback with a delay: V(t) = gains . y(t - delay), with the initial state as constant
+/// history (equation (15) of the paper). The plant's own input delay is added. Steps are restarted where
+/// an event, a corner of the actuator chain or the start returns through the delay. Work grows as 1 /
+/// delay for delays below a millisecond; below `shortest_delay_s` the delay is neglected.
 template <class Engine>
 class ContinuousLoop {
  public:
@@ -179,7 +179,7 @@ class ContinuousLoop {
     if (delay_s_ > 0.0) restart_later(time_s, 1);
   }
 
-  /// Moves on; stops early where the engine halts.
+  /// Advances; stops early where the engine halts.
   void advance_to(double time_s) {
     if (delay_s_ > 0.0) {
       while (!engine_.halted() && engine_.time_s() < time_s) advance_delayed(time_s);
@@ -191,17 +191,17 @@ class ContinuousLoop {
   }
 
   const Engine& engine() const { return engine_; }
-  /// The command that acts now, before the actuator chain.
+  /// The command that acts at present, before the actuator chain.
   double voltage_v() const {
     return delay_s_ > 0.0 ? history_(engine_.time_s() - delay_s_) : measured_.volts(gains_, engine_.state());
   }
-  /// Delay of the feedback and of the plant's input together.
+  /// Sum of the delays of the feedback and of the plant's input.
   double total_delay_s() const { return delay_s_; }
 
   static constexpr double shortest_delay_s = 1e-6;
 
  private:
-  /// A time at which a derivative of the voltage jumps; `order` is the lowest one that does.
+  /// A time at which a derivative of the voltage is discontinuous; `order` is the lowest such derivative.
   struct Restart {
     double time_s;
     int order;

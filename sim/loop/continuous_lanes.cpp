@@ -160,6 +160,7 @@ class ContinuousRuns {
     if constexpr (has_bristles) s.bristle_m = of(&State::bristle_m);
   }
 
+  // Not split, nor find_events and watch: with contracted multiply-adds a split may change last digits.
   void step() {
     const Lanes begin_s = Lanes::load(time_s_.data()), h = Lanes::load(step_s_.data());
     if (stale_ != 0) renew_rates(begin_s);
@@ -357,7 +358,7 @@ class ContinuousRuns {
     for (; lanes != 0; lanes &= lanes - 1) {
       const auto i = static_cast<std::size_t>(std::countr_zero(lanes));
       step_s_[i] = std::max(proposed_s_[i], shortest_step_s);
-      if (cut_[i] == Cut::no) usual_s_[i] = step_s_[i];
+      if (cut_[i] == Cut::no) controlled_step_s_[i] = step_s_[i];
     }
   }
 
@@ -424,9 +425,11 @@ class ContinuousRuns {
       if (arrived) time_s_[i] = stop_s_[i];
       const std::uint32_t bit = 1u << i;
       // A step cut short says nothing against longer ones; only a breakaway is come near to with care.
-      if (cut_[i] == Cut::no) usual_s_[i] = arrived ? std::max(usual_s_[i], proposed_s_[i]) : proposed_s_[i];
+      if (cut_[i] == Cut::no)
+        controlled_step_s_[i] = arrived ? std::max(controlled_step_s_[i], proposed_s_[i]) : proposed_s_[i];
       const bool careful = cut_[i] == Cut::before_breakaway && (event_ & bit) == 0;
-      const double wanted_s = careful ? std::min(usual_s_[i], 4.0 * step_s_[i]) : usual_s_[i];
+      const double wanted_s =
+          careful ? std::min(controlled_step_s_[i], 4.0 * step_s_[i]) : controlled_step_s_[i];
       cut_[i] = Cut::no;
       if ((event_ & bit) != 0) {
         budget_[i].spent(time_s_[i]);
@@ -526,7 +529,7 @@ class ContinuousRuns {
     budget_[i].restart(0.0);
     stops_[i].start(delay_s_[i]);
     stop_s_[i] = next_stop(i);
-    usual_s_[i] = first_step_s;
+    controlled_step_s_[i] = first_step_s;
     put(theta_low_, i, infinite);
     put(theta_high_, i, -infinite);
     put(cart_low_, i, infinite);
@@ -553,7 +556,7 @@ class ContinuousRuns {
 
   State y_{}, k1_{};
   LaneHistory history_;
-  Values time_s_{}, step_s_{}, usual_s_{}, proposed_s_{}, stop_s_{}, delay_s_{};
+  Values time_s_{}, step_s_{}, controlled_step_s_{}, proposed_s_{}, stop_s_{}, delay_s_{};
   Values direction_{}, excess_n_{}, end_excess_n_{}, most_excess_n_{};
   std::array<Cut, lane_count> cut_{};
   std::array<EventBudget, lane_count> budget_;

@@ -7,8 +7,8 @@
 
 namespace upright::UPRIGHT_LANES {
 
-/// Any number of runs, side by side, each with its own clock, step and delay; a lane that ends
-/// takes the next run. A result does not depend on the runs beside it.
+/// Any number of runs, side by side, each with its own time, step and delay; a lane whose run has ended
+/// takes the next run. Results do not depend on the runs in other lanes.
 void run_continuous_on_lanes(const LoopSetup& setup, std::span<const LoopCase> cases,
                              std::span<LoopResult> results);
 

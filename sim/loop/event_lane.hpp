@@ -1,5 +1,5 @@
-// The event engine for one lane and one period, behind a wall: the vector engine is compiled with contracted
-// multiply-adds, and must not leave copies of the scalar code that are compiled so.
+// The event engine for one lane and one period, in a separate object file: the lanes are compiled with
+// contracted multiply-adds, and must not leave such copies of the scalar code.
 #pragma once
 
 #include <memory>
@@ -15,7 +15,7 @@ class EventLane {
   EventLane(const EventLane&) = delete;
   EventLane& operator=(const EventLane&) = delete;
 
-  /// Moves `state` on by `duration_s` under the command `voltage_v`, through whatever events there are.
+  /// Advances `state` by `duration_s` under the command `voltage_v`, through all events.
   void advance(PlantState<double>& state, double voltage_v, double duration_s);
 
  private:
@@ -23,7 +23,7 @@ class EventLane {
   std::unique_ptr<Work> work_;
 };
 
-/// The fastest rate of a plant's motion at any speed it is likely to have [1/s].
+/// The greatest rate of a plant's motion at realistic speeds [1/s].
 double fastest_rate_radps(const PlantModel<double>& model);
 
 }  // namespace upright

@@ -1,4 +1,4 @@
-// The lanes are compiled twice from the same text, each in a namespace of its own: UPRIGHT_LANES is
+// The lanes are compiled twice from the same source, each time in a separate namespace: UPRIGHT_LANES is
 // wide_lanes or baseline_lanes.
 #pragma once
 

@@ -1,5 +1,5 @@
-// The dense history of the feedback signal of `lane_count` continuous loops, each with a clock of its own:
-// for every step a polynomial of order 4 (the continuous extension of Dormand and Prince's method: Hairer,
+// Dense output of the feedback signal of `lane_count` continuous loops, each with its own time: a
+// polynomial of order 4 per step (the continuous extension of Dormand and Prince's method: Hairer,
 // Norsett, Wanner, Solving Ordinary Differential Equations I, II.6).
 #pragma once
 
@@ -18,7 +18,7 @@ class LaneHistory {
 
   LaneHistory() : ring_(lane_count * slots_ * fields) { piece_.fill({}); }
 
-  /// Forgets a lane. Before `time_s` the signal was `value` at all times.
+  /// Restarts a lane: before `time_s` the signal is constant, `value`.
   void start(std::size_t lane, double time_s, double value) {
     count_[lane] = oldest_[lane] = 0;
     before_end_s_[lane] = time_s;
@@ -26,10 +26,10 @@ class LaneHistory {
     show_before(lane);
   }
 
-  /// A lane that never asks for its past.
+  /// A lane without delay, whose history is not used.
   void start_without(std::size_t lane) { start(lane, always_s, 0.0); }
 
-  /// Keeps a step of some lanes.
+  /// Appends a step of some lanes.
   void add(std::uint32_t lanes, const Lanes& begin_s, const Lanes& end_s, const Lanes& per_step,
            const Polynomial& polynomial) {
     std::array<std::array<double, lane_count>, fields> values;
@@ -46,7 +46,7 @@ class LaneHistory {
     }
   }
 
-  /// The signal at a time of each lane, which must not be after its last step.
+  /// The signal at one time per lane, at most the end of its last step.
   Lanes at(const Lanes& time_s) {
     const Lanes begin = Lanes::load(piece_[0].data()), end = Lanes::load(piece_[1].data());
     const LaneMask elsewhere = (time_s > end) | (time_s < begin);
@@ -62,7 +62,7 @@ class LaneHistory {
     return field(3) + u * (field(4) + rest * (field(5) + u * (field(6) + rest * field(7))));
   }
 
-  /// What is before `time_s` will not be asked for again.
+  /// Discards the history before `time_s`.
   void forget_before(std::size_t lane, double time_s) {
     while (oldest_[lane] + 1 < count_[lane] && step_of(lane, oldest_[lane])[1] < time_s) ++oldest_[lane];
   }
@@ -107,7 +107,7 @@ class LaneHistory {
   std::array<std::uint64_t, lane_count> count_{}, oldest_{};
   std::array<std::int64_t, lane_count> shown_{};
   std::array<double, lane_count> before_end_s_{}, before_{};
-  /// The step that each lane looked at last, as `at` wants it.
+  /// The step that was evaluated last, by lane, in the layout that `at` needs.
   std::array<std::array<double, lane_count>, fields> piece_;
 };
 

@@ -1,5 +1,5 @@
-// What the engines on SIMD lanes share: a plant's model on lanes, the sets of effects that are compiled in,
-// and which way a resting cart breaks away.
+// Shared by the engines on SIMD lanes: the plant's model on lanes, the sets of effects that are compiled
+// in, and the direction in which a resting cart breaks away.
 #pragma once
 
 #include "lanes.hpp"
@@ -21,7 +21,7 @@ inline PlantModel<Lanes> on_lanes(const PlantModel<double>& model) {
   return lanes;
 }
 
-/// The effects that the derivative knows of: not those of the actuator, the sensors and the base parameters,
+/// The effects in the derivative: without those of the actuator, the sensors and the base parameters,
 /// which act once per period or at the beginning.
 inline std::uint64_t moving_effects(const EffectSet& present) {
   std::uint64_t mask = 0;
@@ -39,7 +39,7 @@ constexpr std::uint64_t coulomb_set = viscous_set | bit_of<effects::CoulombFrict
 constexpr std::uint64_t exponential_set = coulomb_set | bit_of<effects::StribeckFriction>;
 constexpr std::uint64_t dynamic_set = exponential_set | bit_of<effects::BristleFriction>;
 
-/// Calls `run` with the plant's effects: the common sets compiled in, any other looked up as it goes.
+/// Calls `run` with the plant's effects: common sets at compile time, all others at run time.
 template <class Run>
 void with_effects(const EffectSet& present, const Run& run) {
   switch (moving_effects(present)) {
@@ -56,7 +56,7 @@ void with_effects(const EffectSet& present, const Run& run) {
   }
 }
 
-/// By how much the load on a resting cart exceeds what friction holds, forward and backward [N].
+/// The load on a resting cart beyond the static friction, forward and backward [N].
 struct Excess {
   Lanes forward, backward;
 };
@@ -69,7 +69,7 @@ Excess excess_load(const Dynamics<Lanes, Present>& physics, const PlantState<Lan
           -load - physics.cart_dry_level(state.cart_m, Lanes(0.0), Lanes(-1.0))};
 }
 
-/// Which way the load moves a resting cart; 0: friction holds it.
+/// Direction in which the load moves a resting cart; 0: friction holds it.
 inline Lanes direction_of(const Excess& excess) {
   return select(excess.forward > Lanes(0.0), Lanes(1.0),
                 select(excess.backward > Lanes(0.0), Lanes(-1.0), Lanes(0.0)));

@@ -1,4 +1,4 @@
-// What runs side by side have shown so far, lane by lane.
+// Results of parallel runs so far, by lane.
 #pragma once
 
 #include <span>
@@ -18,7 +18,7 @@ class LaneResults {
     fall_time_s_.fill(std::numeric_limits<double>::quiet_NaN());
   }
 
-  /// Takes the motion at a time. Lanes that fell are put to rest upright, where they stay out of the way.
+  /// Records the motion at a time. Fallen lanes are reset to rest upright.
   void take(double time_s, PlantState<Lanes>& state) {
     if (any(!(absolute(state.theta_rad) < Lanes(fell_above_rad_)))) drop_fallen(time_s, state);
     previous_theta_ = state.theta_rad;

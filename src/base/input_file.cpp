@@ -20,7 +20,7 @@ const char* kind_of(mode_t mode) {
   if (S_ISFIFO(mode)) return "a named pipe (FIFO)";
   if (S_ISSOCK(mode)) return "a socket";
   if (S_ISCHR(mode) || S_ISBLK(mode)) return "a device";
-  return "no regular file";
+  return "not a regular file";
 }
 
 [[noreturn]] void refuse(const std::filesystem::path& file, int error) {
@@ -68,7 +68,7 @@ std::unique_ptr<InputFile> InputFile::if_there(const std::filesystem::path& file
 }
 
 void InputFile::check() const {
-  if (bad()) throw ConfigError(file_.string() + " could not be read to its end: check the disk it is on");
+  if (bad()) throw ConfigError(file_.string() + " could not be read completely: check the disk");
 }
 
 std::string whole_file(const std::filesystem::path& file, std::uintmax_t most_bytes) {

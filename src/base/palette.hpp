@@ -1,6 +1,6 @@
-// The colours of every page and plot, in one place. A colour means one thing everywhere: stable is green,
-// oscillating orange, a fall red; and no curve that means something else has one of the three. Hues are those
-// that colour-blind readers can tell apart (after Okabe and Ito), texts have a contrast of at least 4.5 on
+// The colours of all pages and plots. Each colour has one meaning: stable is green,
+// oscillating orange, a fall red; no other curve uses these. Colour-blind readers can
+// distinguish the hues (after Okabe and Ito), and texts have a contrast of at least 4.5 on
 // white.
 #pragma once
 
@@ -18,26 +18,26 @@ inline constexpr std::string_view stable = "#009e73", oscillating = "#e69f00", f
 inline constexpr std::string_view cart = "#0b62c4", angle = "#b0307f", voltage = "#5b4b8a",
                                   requested = "#8fb4dc";
 
-// A model before and after something was added to it, over what was measured.
+// A model before and after an addition, over the measurement.
 inline constexpr std::string_view measured = "#1d2733", before = "#b0307f", after = "#0b62c4";
 
 // Text, lines and grounds.
 inline constexpr std::string_view ink = "#1d2733", soft = "#5a6775", line = "#d8dee6", grid = "#e3e8ee",
                                   band = "#d6e6f2", ground = "#eef1f5";
 
-// How good the news is: the edge of a box and its ground.
+// Severity of a message: the edge of its box and the background.
 inline constexpr std::string_view good = "#00795a", good_ground = "#eaf6f2", warning = "#9a6500",
                                   warning_ground = "#fdf5e4", bad = "#b3261e", bad_ground = "#fcecea",
                                   neutral = "#56708c", neutral_ground = "#eef2f6";
 
-/// Curves that differ by nothing that has a colour of its own: the k-th of them, over again after the last.
+/// The k-th colour, cyclically, of curves without a colour of their own.
 inline constexpr std::string_view curve(std::size_t k) {
   constexpr std::array<std::string_view, 6> cycle = {"#0b62c4", "#b0307f", "#4a5560",
                                                      "#3aa0d8", "#5b4b8a", "#8c6d5a"};
   return cycle[k % cycle.size()];
 }
 
-/// The colour of an outcome by its name; a grey for any other.
+/// The colour of an outcome by its name; grey for any other.
 inline constexpr std::string_view of_outcome(std::string_view outcome) {
   return outcome == "stable"        ? stable
          : outcome == "oscillating" ? oscillating
@@ -45,7 +45,7 @@ inline constexpr std::string_view of_outcome(std::string_view outcome) {
                                     : soft;
 }
 
-/// The same as variables for a style sheet: `--stable` and so on.
+/// The colours as variables of a style sheet: `--stable` and so on.
 inline std::string css_variables() {
   std::string text = ":root{";
   const auto add = [&](std::string_view name, std::string_view value) {

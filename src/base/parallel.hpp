@@ -1,4 +1,4 @@
-// Work spread over the cores. Results must not depend on how many there are: each index writes its own place.
+// Parallel loops. Results must not depend on the number of cores: each index writes its own element.
 #pragma once
 
 #include <atomic>
@@ -8,14 +8,14 @@
 
 namespace upright {
 
-/// Work was given up because a signal asked for it.
+/// A signal interrupted the work.
 class Interrupted : public std::exception {
  public:
   const char* what() const noexcept override { return "interrupted"; }
 };
 
-/// While one lives, parallel_for gives up with Interrupted as soon as `signal` is not zero: before its next
-/// index, so within what one index takes. Null: never. One at a time.
+/// While an object exists, parallel_for ends with Interrupted when `signal` is nonzero; the flag is
+/// tested before each index. Null: never. One object at a time.
 class InterruptibleWork {
  public:
   explicit InterruptibleWork(const std::atomic<int>* signal);
@@ -24,11 +24,11 @@ class InterruptibleWork {
   InterruptibleWork& operator=(const InterruptibleWork&) = delete;
 };
 
-/// Threads to use: the machine's cores, or what UPRIGHT_THREADS says.
+/// Number of threads: the machine's cores, or the value of UPRIGHT_THREADS.
 unsigned thread_count();
 
 /// Calls work(i) for i in [0, count) on all cores; rethrows the first exception in index order. Throws
-/// Interrupted when InterruptibleWork says so; not every index was worked on then.
+/// Interrupted after a signal (see InterruptibleWork); some indices were then not processed.
 void parallel_for(std::size_t count, const std::function<void(std::size_t)>& work);
 
 }  // namespace upright

@@ -1,4 +1,4 @@
-// Work handed out in order to threads, and the first of their failures.
+// A queue of work for several threads, with the first of their exceptions.
 #pragma once
 
 #include <atomic>
@@ -10,18 +10,18 @@
 
 namespace upright {
 
-/// Numbers of pieces of work, handed out in order to whoever asks; none after one of them has failed.
+/// Distributes indices in order to threads; none after a failure.
 class WorkQueue {
  public:
-  /// `stops`, asked before each number: nothing more is handed out.
+  /// `stops` is called before each index; true ends the queue.
   explicit WorkQueue(std::size_t count, std::function<bool()> stops = {});
 
-  /// The next number; none: nothing is left to be done.
+  /// The next index; none: the queue has ended.
   std::optional<std::size_t> next();
   bool is_over() const;
-  /// Does `work` of that number. What it throws ends the queue, and is kept.
+  /// Runs `work` for an index. An exception ends the queue and is stored.
   void guard(std::size_t number, const std::function<void()>& work);
-  /// The exception of the lowest number that failed, which does not depend on how many threads there were.
+  /// Rethrows the exception of the lowest index that failed, independent of the number of threads.
   void rethrow() const;
 
  private:
@@ -36,7 +36,7 @@ class WorkQueue {
   std::exception_ptr failure_;
 };
 
-/// Calls `worker` on so many threads, of which the caller's is one, and waits for all of them.
+/// Runs `worker` on this many threads, including the calling one, and waits for all of them.
 void on_threads(std::size_t threads, const std::function<void()>& worker);
 
 }  // namespace upright

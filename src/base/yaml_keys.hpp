@@ -1,5 +1,5 @@
-// The keys of a section of a YAML file, each once: one list in the order of the file, by which a section is
-// read and written. What visits the list decides which of the two.
+// The keys of a section of a YAML file as one list, in the order of the file. A visitor of the list reads
+// the section or writes it.
 #pragma once
 
 #include <array>
@@ -19,15 +19,15 @@ namespace upright {
 
 constexpr std::nullopt_t required = std::nullopt;  ///< in place of a default
 
-/// Whether a text names a key whose value is its default.
+/// Whether the text contains keys whose value is the default.
 enum class Usual : std::uint8_t { written, left_out };
 
-/// The words of an enumeration, in its order.
+/// The names of an enumeration's values, in order.
 template <std::size_t N>
 using Words = std::array<const char*, N>;
 
-/// Visits the keys of a section. A visitor overrides what it cares for. It may change what it visits: who
-/// only writes gives it a copy.
+/// Visits the keys of a section. A visitor overrides the functions that it needs, and may change the
+/// values: pass a copy to one that only writes.
 class YamlKeys {
  public:
   using Visit = std::function<void(YamlKeys&)>;
@@ -45,16 +45,16 @@ class YamlKeys {
                     Usual /*usual*/ = Usual::written) {}
   /// Relative to the folder of the file.
   virtual void path(const char* /*key*/, std::filesystem::path& /*value*/) {}
-  /// A map of keys. In a text it stands on one line.
+  /// A map of keys, on one line when written.
   virtual void map(const char* /*key*/, const Visit& /*visit*/) {}
-  /// The same with a line for each of its keys in a text.
+  /// The same with one line per key when written.
   virtual void section(const char* key, const Visit& visit) { map(key, visit); }
 
-  /// Whether the key is there, or is to be written: then `is_set` says it.
+  /// Whether the key is present (reading), or `is_set` (writing).
   virtual bool given(const char* /*key*/, bool is_set) { return is_set; }
-  /// Whether it holds a map, or is to.
+  /// Whether the key holds a map (reading), or `is_set` (writing).
   virtual bool is_map(const char* /*key*/, bool is_set) { return is_set; }
-  /// What is being read; null where nothing is: for steps that belong to reading alone.
+  /// The map that is being read; null when writing: for steps that apply to reading only.
   virtual const YamlMap* source() const { return nullptr; }
 
   template <std::signed_integral Int>
@@ -64,7 +64,7 @@ class YamlKeys {
     whole_number(key, wide, low, high, otherwise);
     value = static_cast<Int>(wide);
   }
-  /// An enumeration by its words; false and true by two.
+  /// An enumeration by its names; for bool, the names of false and true.
   template <class Enum, std::size_t N>
   void one_of(const char* key, Enum& value, const Words<N>& words,
               std::optional<std::type_identity_t<Enum>> otherwise = required) {
@@ -73,20 +73,20 @@ class YamlKeys {
            otherwise ? std::optional(static_cast<std::size_t>(*otherwise)) : required);
     value = static_cast<Enum>(at);
   }
-  /// An integer that may be left out.
+  /// An optional integer.
   void optional_integer(const char* key, std::optional<int>& value, std::int64_t low, std::int64_t high) {
     if (given(key, value.has_value())) integer(key, made(value), low, high);
   }
-  /// A map that may be left out. `visit` takes the visitor and the value.
+  /// An optional map. `visit` receives the visitor and the value.
   template <class T, class VisitValue>
   void optional_map(const char* key, std::optional<T>& value, const VisitValue& visit) {
     if (given(key, value.has_value())) map(key, [&](YamlKeys& keys) { visit(keys, made(value)); });
   }
-  /// A map that may be left out of a file and is always written.
+  /// A map that is optional when read and always written.
   void usual_map(const char* key, const Visit& visit) {
     if (given(key, true)) map(key, visit);
   }
-  /// A section that must be there to be read, and is written where it is set.
+  /// A section that is required when read, and written where it is set.
   template <class T, class VisitValue>
   void section_of(const char* key, std::optional<T>& value, const VisitValue& visit) {
     if (source() || value) section(key, [&](YamlKeys& keys) { visit(keys, made(value)); });
@@ -99,12 +99,12 @@ class YamlKeys {
       visit(keys, values[at]);
     });
   }
-  /// Refuses the file where `holds` is false. `problem` goes on from the key.
+  /// Refuses the file where `holds` is false. `problem` continues a sentence that begins with the key.
   void check(const char* key, bool holds, const std::string& problem, const std::string& remedy) const {
     if (const YamlMap* map = source(); map && !holds) map->fail(key, problem, remedy);
   }
 
-  /// The value, made where there is none.
+  /// The value, constructed if absent.
   template <class T>
   static T& made(std::optional<T>& value) {
     return value ? *value : value.emplace();
@@ -115,11 +115,11 @@ class YamlKeys {
                             std::int64_t /*high*/, std::optional<std::int64_t> /*otherwise*/) {}
   virtual void choice(const char* /*key*/, std::size_t& /*word*/, const std::vector<std::string>& /*words*/,
                       std::optional<std::size_t> /*otherwise*/) {}
-  /// Visits item 0, 1, ... of a list of maps; `count` of them are to be written.
+  /// Visits items 0, 1, ... of a list of maps; when writing there are `count`.
   virtual void maps(const char* /*key*/, std::size_t /*count*/, const VisitItem& /*visit*/) {}
 };
 
-/// Sets the values from a map, which it does not finish. Throws ConfigError with remedy, file, line and key.
+/// Reads the values from a map without finish(). Throws ConfigError with remedy, file, line, key.
 class YamlKeyReader : public virtual YamlKeys {
  public:
   explicit YamlKeyReader(const YamlMap& map) : map_(map) {}

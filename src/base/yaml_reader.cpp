@@ -65,12 +65,12 @@ std::optional<double> parse_number(const std::string& text) {
 /// Walks a file's events before any node is built and refuses what yaml-cpp cannot be trusted with: nesting
 /// that would exhaust the stack, a second document (on some broken text yaml-cpp 0.7 finds empty documents
 /// for ever), and a zero byte, with which no name or path would be read again as it was written.
-class Gatekeeper : public YAML::EventHandler {
+class YamlEventChecker : public YAML::EventHandler {
  public:
-  explicit Gatekeeper(std::filesystem::path file) : file_(std::move(file)) {}
+  explicit YamlEventChecker(std::filesystem::path file) : file_(std::move(file)) {}
 
   void OnDocumentStart(const YAML::Mark& mark) override {
-    if (++documents_ > 1) refuse(mark, "keep one YAML document", "a second document begins here");
+    if (++documents_ > 1) refuse(mark, "keep only one YAML document", "a second document begins here");
   }
   void OnDocumentEnd() override {}
   void OnNull(const YAML::Mark&, YAML::anchor_t) override {}
@@ -80,7 +80,7 @@ class Gatekeeper : public YAML::EventHandler {
   void OnScalar(const YAML::Mark& mark, const std::string&, YAML::anchor_t,
                 const std::string& value) override {
     if (value.find('\0') != std::string::npos)
-      refuse(mark, "correct the YAML", "there is a zero byte in the file");
+      refuse(mark, "write it as plain YAML text", "the file contains a zero byte");
   }
   void OnSequenceStart(const YAML::Mark& mark, const std::string&, YAML::anchor_t,
                        YAML::EmitterStyle::value) override {
@@ -96,7 +96,8 @@ class Gatekeeper : public YAML::EventHandler {
  private:
   void enter(const YAML::Mark& mark) {
     if (++depth_ > deepest_nesting)
-      refuse(mark, "nest less deeply", "more than " + std::to_string(deepest_nesting) + " levels");
+      refuse(mark, "nest less deeply",
+             "the nesting has more than " + std::to_string(deepest_nesting) + " levels");
   }
   [[noreturn]] void refuse(const YAML::Mark& mark, const std::string& remedy,
                            const std::string& problem) const {
@@ -111,12 +112,12 @@ class Gatekeeper : public YAML::EventHandler {
 void refuse_what_cannot_be_built(const std::string& text, const std::filesystem::path& file) {
   // yaml-cpp takes a zero byte that is not escaped for the end of a value.
   if (const std::size_t at = text.find('\0'); at != std::string::npos)
-    refuse_at(file, 1 + std::count(text.data(), text.data() + at, '\n'), "correct the YAML",
-              "there is a zero byte in the file");
+    refuse_at(file, 1 + std::count(text.data(), text.data() + at, '\n'), "write it as plain YAML text",
+              "the file contains a zero byte");
   std::istringstream stream(text);
   YAML::Parser parser(stream);
-  Gatekeeper gatekeeper(file);
-  while (parser.HandleNextDocument(gatekeeper)) {
+  YamlEventChecker checker(file);
+  while (parser.HandleNextDocument(checker)) {
   }
 }
 
@@ -209,13 +210,14 @@ struct YamlMap::Node {
 
   double number(const YAML::Node& node, const std::string& key, const Range& range,
                 const std::string& what = "a number ") const {
-    const std::string remedy = "give " + key + " " + what + range.text();
+    const std::string remedy = "set " + key + " to " + what + range.text();
     if (!node.IsScalar()) fail(node, key, "is not a number", remedy);
     const std::optional<double> value = parse_number(node.Scalar());
     if (!value || node.Tag() == "!")
-      fail(node, key, "is not a number but '" + shown(node.Scalar()) + "'", remedy);
+      fail(node, key, "is '" + shown(node.Scalar()) + "', which is not a number", remedy);
     if (!std::isfinite(*value)) fail(node, key, "is not finite", remedy);
-    if (!range.contains(*value)) fail(node, key, "is " + shown(node.Scalar()), remedy);
+    if (!range.contains(*value))
+      fail(node, key, "is " + shown(node.Scalar()) + ", which is out of range", remedy);
     return *value;
   }
 
@@ -233,7 +235,7 @@ void refuse_bad_keys(const YAML::Node& map, const std::filesystem::path& file, c
     if (!entry.first.IsScalar())
       throw ConfigError(where + "a key is not a plain word: use plain words as keys");
     if (!seen.insert(entry.first.Scalar()).second)
-      throw ConfigError(where + shown(entry.first.Scalar()) + " stands twice: keep one of them");
+      throw ConfigError(where + shown(entry.first.Scalar()) + " appears twice: keep one of them");
   }
 }
 
@@ -256,7 +258,7 @@ YamlMap YamlMap::from_text(const std::string& text, const std::filesystem::path&
     refuse_what_cannot_be_built(text, file);
     node->yaml.reset(YAML::Load(text));
   } catch (const YAML::Exception& problem) {
-    refuse_at(file, std::max(problem.mark.line, 0) + 1, "correct the YAML", shown(problem.msg));
+    refuse_at(file, std::max(problem.mark.line, 0) + 1, "correct the YAML syntax", shown(problem.msg));
   }
   if (!node->yaml.IsMap())
     throw ConfigError(file.string() + ":1: the top level is not a map: write 'key: value' lines");
@@ -290,7 +292,8 @@ std::int64_t YamlMap::integer(const std::string& key, std::int64_t low, std::int
   const YAML::Node node = node_->require(key, what);
   const double value = node_->number(node, key, range, "a whole number ");
   if (value != std::floor(value))
-    node_->fail(node, key, "is " + shown(node.Scalar()), "give " + key + " " + what);
+    node_->fail(node, key, "is " + shown(node.Scalar()) + ", which is not a whole number",
+                "set " + key + " to " + what);
   return static_cast<std::int64_t>(value);
 }
 
@@ -304,20 +307,20 @@ bool YamlMap::flag_or(const std::string& key, bool fallback) const {
   if (!node.IsDefined()) return fallback;
   if (node.IsScalar() && node.Scalar() == "true") return true;
   if (node.IsScalar() && node.Scalar() == "false") return false;
-  node_->fail(node, key, "is neither", "write true or false");
+  node_->fail(node, key, "is neither true nor false", "set " + key + " to true or false");
 }
 
 std::string YamlMap::text(const std::string& key) const {
-  const YAML::Node node = node_->require(key, "a text");
+  const YAML::Node node = node_->require(key, "text");
   if (!node.IsScalar() || node.Scalar().empty())
-    node_->fail(node, key, "is not a text", "give " + key + " a text");
+    node_->fail(node, key, "is not text", "set " + key + " to text");
   return node.Scalar();
 }
 
 std::string YamlMap::text_or(const std::string& key, const std::string& fallback) const {
   const YAML::Node node = node_->find(key);
   if (!node.IsDefined()) return fallback;
-  if (!node.IsScalar()) node_->fail(node, key, "is not a text", "give " + key + " a text");
+  if (!node.IsScalar()) node_->fail(node, key, "is not text", "set " + key + " to text");
   return node.Scalar();
 }
 
@@ -328,13 +331,13 @@ std::string YamlMap::choice(const std::string& key, const std::vector<std::strin
   std::string value = node.IsScalar() ? node.Scalar() : "";
   if (std::find(names.begin(), names.end(), value) != names.end()) return value;
   const std::string near = nearest_name(value, names);
-  node_->fail(node, key, "is '" + shown(value) + "'",
+  node_->fail(node, key, "is '" + shown(value) + "', which is not a known value",
               near.empty() ? "use one of " + list : "did you mean " + near + "? use one of " + list);
 }
 
 std::vector<double> YamlMap::numbers(const std::string& key, const Range& range) const {
   const YAML::Node node = node_->require(key, "a list of numbers");
-  if (!node.IsSequence()) node_->fail(node, key, "is not a list", "give " + key + " a list of numbers");
+  if (!node.IsSequence()) node_->fail(node, key, "is not a list", "set " + key + " to a list of numbers");
   std::vector<double> values;
   for (const auto& item : node) values.push_back(node_->number(item, key, range));
   return values;
@@ -342,7 +345,8 @@ std::vector<double> YamlMap::numbers(const std::string& key, const Range& range)
 
 YamlMap YamlMap::map(const std::string& key) const {
   const YAML::Node node = node_->require(key, "a map");
-  if (!node.IsMap()) node_->fail(node, key, "is not a map", "give " + key + " as a map of key: value");
+  if (!node.IsMap())
+    node_->fail(node, key, "is not a map", "write " + key + " as a map of 'key: value' pairs");
   return YamlMap(node_->child(node, node_->full_key(key)));
 }
 
@@ -352,7 +356,7 @@ std::optional<YamlMap> YamlMap::optional_map(const std::string& key) const {
 
 std::vector<YamlMap> YamlMap::maps(const std::string& key) const {
   const YAML::Node node = node_->require(key, "a list of maps");
-  if (!node.IsSequence()) node_->fail(node, key, "is not a list", "give " + key + " as a list");
+  if (!node.IsSequence()) node_->fail(node, key, "is not a list", "write " + key + " as a list");
   std::vector<YamlMap> result;
   for (std::size_t i = 0; i < node.size(); ++i) {
     const YAML::Node item = node[i];

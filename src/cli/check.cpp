@@ -82,7 +82,8 @@ const FileKind& kind_of(const YamlMap& document) {
       document.fail(key, "is not a known key", "did you mean " + near + "? otherwise remove it");
   }
   throw ConfigError(document.file().string() +
-                    ":1: no top-level key says what kind of file it is: give it one of " + list);
+                    ":1: the kind of file is unknown, because no top-level key identifies it: add one of " +
+                    list);
 }
 
 Finding check(const std::string& file) {
@@ -152,7 +153,7 @@ void print(const Finding& finding, bool as_json) {
 
 void print(const Agreement& agreement) {
   for (const std::string& error : agreement.errors)
-    std::cerr << "upright: the files do not go together: " << error << "\n";
+    std::cerr << "upright: the files do not fit together: " << error << "\n";
   for (const std::string& warning : agreement.warnings) std::cerr << "upright: warning: " << warning << "\n";
 }
 
@@ -187,12 +188,12 @@ void add_check(CommandLine& line) {
       "Examples:\n"
       "  upright check config/plants/*.yaml config/gains/*.yaml config/rigs/*.yaml\n"
       "  upright check my-rig.yaml my-gains.yaml my-plant.yaml\n"
-      "A rig, a gain and a plant file, one of each, are checked against each other too: rate and "
-      "link,\nwatchdogs and period, gains and plant.");
+      "If there is at most one rig, one gain and one plant file, the command also checks that they fit\n"
+      "together: sample rate and link, watchdogs and control period, gains and plant.");
   const auto files = std::make_shared<std::vector<std::string>>();
   const auto as_json = std::make_shared<bool>(false);
-  command.option("files", *files, "The files to read").required();
-  command.flag("--json", *as_json, "One JSON document");
+  command.option("files", *files, "Plant, gain, rig, sweep, experiment or dataset files").required();
+  command.flag("--json", *as_json, "Print one JSON document");
   command.does([files, as_json] { return check_all(*files, *as_json) ? ExitCode::done : ExitCode::usage; });
 }
 

@@ -59,13 +59,13 @@ std::string sentence_for(const CLI::ParseError& error, CLI::App& app, const std:
     if (word.starts_with("-")) {
       const std::string flag = word.substr(0, word.find('='));
       const std::string bare = flag.substr(std::min(flag.find_first_not_of('-'), flag.size()));
-      return name + " has no flag " + flag + ": " + remedy_for(bare, flag_names(command), "--", name);
+      return name + " has no option " + flag + ": " + remedy_for(bare, flag_names(command), "--", name);
     }
     if (at_top)
       return name + " has no command " + word + ": " + remedy_for(word, command_names(app), "", name);
     return name + " does not expect '" + word + "': remove it, or see " + name + " --help";
   }
-  if (at_top) return "no command was given: name one, see " + name + " --help";
+  if (at_top) return "no command was given: choose one, see " + name + " --help";
   std::string problem = error.what();
   for (char& c : problem)
     if (c == '\n') c = ' ';
@@ -85,7 +85,7 @@ const Option& Option::in(const Range& range) const {
     const char* end = text.data() + text.size();
     const auto result = std::from_chars(text.data(), end, value);
     const bool good = result.ec == std::errc{} && result.ptr == end && std::isfinite(value);
-    return good && range.contains(value) ? std::string() : "it needs a number " + range.text();
+    return good && range.contains(value) ? std::string() : "must be a number " + range.text();
   };
   option_.check(CLI::Validator(check, ""));
   return *this;
@@ -126,8 +126,8 @@ std::string fault_of_whole_number(const std::string& text) {
   const auto result = std::from_chars(text.data(), end, value);
   const bool good = result.ec == std::errc{} && result.ptr == end;
   return good ? std::string()
-              : "it needs a whole number from 0 to " + std::to_string(std::numeric_limits<Whole>::max()) +
-                    ", and is " + printable(text);
+              : "must be a whole number from 0 to " + std::to_string(std::numeric_limits<Whole>::max()) +
+                    ", but is " + printable(text);
 }
 
 /// CLI11 alone takes nan and inf, which pass every comparison with a limit or none.
@@ -137,7 +137,7 @@ std::string fault_of_number(const std::string& text) {
   const char* begin = text.data() + (text.starts_with('+') ? 1 : 0);
   const auto result = std::from_chars(begin, end, value);
   const bool good = result.ec == std::errc{} && result.ptr == end && std::isfinite(value);
-  return good ? std::string() : "it needs a finite number, and is " + printable(text);
+  return good ? std::string() : "must be a finite number, but is " + printable(text);
 }
 
 template <class Value>

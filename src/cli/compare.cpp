@@ -84,9 +84,11 @@ std::string cell(const RunBehaviour& run, std::size_t quantity) {
 
 void print(const std::vector<RunBehaviour>& runs) {
   for (const std::string& sentence : comparison_sentences(runs)) std::cout << sentence << "\n";
-  std::printf("\nOver the last third, with 95 percent intervals:\n%-5s %-22s %-22s %-22s %-22s %-24s %s\n",
-              "run", "cart [mm p-p]", "angle [deg p-p]", "voltage [V rms]", "steps [V rms]",
-              "late [us] 50, 99 %, most", "folder");
+  std::printf(
+      "\nLast third of each run, with 95 percent confidence intervals:\n%-5s %-22s %-22s %-22s %-22s %-24s "
+      "%s\n",
+      "run", "cart [mm p-p]", "angle [deg p-p]", "voltage [V rms]", "steps [V rms]",
+      "late [us] 50, 99 %, max", "folder");
   for (std::size_t k = 0; k < runs.size(); ++k) {
     const RunBehaviour& run = runs[k];
     std::string late = "virtual time";
@@ -136,8 +138,8 @@ ExitCode compare_rounds(const fs::path& experiment, const std::string& page, boo
   const std::vector<PieceComparison> pieces = paired_comparisons(experiment);
   if (pieces.empty())
     throw ConfigError("no run of " + experiment.string() +
-                      " was made by controllers that take turns: name its run directories instead, or "
-                      "give one of its pieces several gains");
+                      " belongs to a piece that compares controllers: name run directories instead, or "
+                      "list several gains in a piece of the experiment");
   if (!page.empty()) write_paired_report(experiment, pieces, page);
   if (as_json) {
     Json list = Json::array();
@@ -168,9 +170,10 @@ ExitCode compare(const CompareFlags& flags) {
   for (const std::string& path : flags.runs) {
     if (!holds_experiment(path)) continue;
     if (flags.runs.size() > 1)
-      throw ConfigError(path +
-                        " is an experiment, whose runs are compared with each other: name it alone, or name "
-                        "run directories");
+      throw ConfigError(
+          path +
+          " is an experiment folder, which cannot be compared with other paths: name it alone, or name "
+          "run directories");
     return compare_rounds(path, page, flags.as_json);
   }
   std::vector<RunBehaviour> runs;
@@ -190,17 +193,18 @@ ExitCode compare(const CompareFlags& flags) {
 
 void add_compare(CommandLine& line) {
   const Command command =
-      line.command("compare", "What differs between runs: hunting, voltage, chatter, falls, lateness",
+      line.command("compare", "Compare runs: hunting, voltage, chatter, falls, lateness",
                    "Example:  upright compare runs/20260101T120000Z-before runs/20260101T120500Z-after\n"
-                   "The first run is the one that the others are held against. Over the last third of each.\n"
-                   "An experiment in which controllers took turns, alone, is compared round by round.");
+                   "The first run is the reference for the others. Only the last third of each run counts.\n"
+                   "For the folder of an experiment in which controllers took turns, the command compares\n"
+                   "the controllers round by round.");
   const auto flags = std::make_shared<CompareFlags>();
   command
       .option("runs", flags->runs,
-              "Run directories, also of runs that were cut short; or one experiment's folder")
+              "Run directories, also of interrupted runs; or the folder of one experiment")
       .required();
-  command.option("--out", flags->out, "The page to write (compare.html; with --json none)");
-  command.flag("--json", flags->as_json, "One JSON document");
+  command.option("--out", flags->out, "HTML page to write (default: compare.html; with --json: none)");
+  command.flag("--json", flags->as_json, "Print one JSON document");
   command.does([flags] { return compare(*flags); });
 }
 

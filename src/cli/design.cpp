@@ -75,11 +75,11 @@ void print(const GainDesign& design, const std::optional<SampledDesign>& sampled
   std::printf("Riccati residual %.1e (relative)\n", design.residual);
   if (sampled)
     std::printf(
-        "delay line of %d periods and velocity filter as states: residual %.1e, its gains and these "
-        "agree to %.1e\n",
+        "check with the delay line of %d periods and the velocity filter as states: residual %.1e, gains "
+        "differ by %.1e\n",
         sampled->delay_periods, sampled->delay_line_residual, sampled->delay_line_difference);
   for (const EliminatedState& state : design.eliminated)
-    std::printf("eliminated: %s\n", state.explanation.c_str());
+    std::printf("eliminated state: %s\n", state.explanation.c_str());
   for (const std::string& note : design.notes) std::printf("note: %s\n", note.c_str());
   std::fflush(stdout);
 }
@@ -94,7 +94,8 @@ std::string path_from(const std::filesystem::path& file, const std::filesystem::
 
 void refuse_replacing(const DesignOptions& options) {
   if (std::filesystem::exists(options.out) && !options.force)
-    throw ConfigError(options.out + " exists already: give another --out or add --force");
+    throw ConfigError(options.out +
+                      " already exists: choose another file with --out, or replace it with --force");
 }
 
 DesignWeights weights_of(const DesignOptions& options, DesignWeights weights) {
@@ -143,10 +144,11 @@ Json json_of(const EstimatorDesign& design) {
 }
 
 void print(const ParameterTrials& trials, double uncertainty) {
-  std::printf("%d simulated runs with parameters %.3g percent off, alone and together: none fell\n",
+  std::printf("%d simulated runs with parameters %.3g percent wrong, alone and together: no fall\n",
               trials.runs, 100.0 * uncertainty);
   std::printf(
-      "  the cart hunts %.1f mm with the plant file as it is, %.1f mm at most; most sensitive to %s\n",
+      "  hunting of the cart: %.1f mm with the plant file as it is, %.1f mm in the worst run; most sensitive "
+      "to %s\n",
       1e3 * trials.hunting_m, 1e3 * trials.largest_hunting_m, trials.most_sensitive_to.c_str());
 }
 
@@ -196,7 +198,7 @@ void design(const DesignOptions& options) {
     return;
   }
   if (options.uncertainty)
-    throw ConfigError("--uncertainty is for the design of an estimator: add --estimator, or leave it out");
+    throw ConfigError("--uncertainty needs an estimator: add --estimator, or remove --uncertainty");
   const DesignWeights weights = weights_of(options, {});
   std::optional<SampledDesign> sampled;
   GainDesign gains;
@@ -227,49 +229,58 @@ void design(const DesignOptions& options) {
 
 void add_design(CommandLine& line) {
   const Command command = line.command(
-      "design", "Design gains for a plant (linear-quadratic)",
+      "design", "Design gains for a plant by linear-quadratic regulation (LQR)",
       "Examples:\n"
       "  upright design config/plants/exponential.yaml --q 5000,3000,20,20 --r 1 --out gains.yaml\n"
       "  upright design config/plants/viscous.yaml --delay 0.1 --rate 1000 --out compensated.yaml\n"
       "  upright design config/plants/viscous.yaml --estimator kalman --out quiet.yaml\n"
       "  upright design config/plants/exponential.yaml --estimator extended_kalman --out quieter.yaml\n"
-      "With --delay the gains feed back the state predicted to when the voltage acts (delay_compensation: "
-      "predictor).");
+      "With --delay, the gain file has a predictor: the gains act on the state that is predicted for the\n"
+      "moment when the voltage acts.");
   const auto options = std::make_shared<DesignOptions>();
   command.option("plant", options->plant, "Plant file").required();
   command
       .option("--q", options->q,
-              "Weights on x, theta, x_dot, theta_dot (5000,3000,20,20; with --estimator 2500,1000,20,20)")
+              "Weights on x, theta, x_dot, theta_dot (default: 5000,3000,20,20; with --estimator "
+              "2500,1000,20,20)")
       .list_of(4)
       .in(Range::not_negative());
-  command.option("--r", options->r, "Weight on the voltage (1)").in(Range::positive());
+  command.option("--r", options->r, "Weight on the voltage (default: 1)").in(Range::positive());
   command
       .option(
           "--estimator", options->estimator,
-          "none: velocity filter; kalman: a Kalman filter on the plant file, which also estimates and takes "
-          "away the force that the file does not know, its dry friction included; extended_kalman: one that "
-          "predicts with the file's friction and every other effect, and takes the friction away too")
+          "none: velocity filter (default). kalman: linear Kalman filter; it also estimates the force on the "
+          "cart that the linear model lacks, dry friction included, and compensates for it. extended_kalman: "
+          "predicts with every effect of the plant file, and compensates for its friction too")
       .one_of({no_estimator, "kalman", extended_estimator});
   command
       .option(
           "--uncertainty", options->uncertainty,
-          "With --estimator: share by which the parameters may be off without a fall (0.05); a design that "
-          "does not hold then is refused")
+          "With --estimator: relative parameter error that the loop must survive without a fall (default: "
+          "0.05). A design that does not is refused")
       .in(Range::within(0.0, 0.5));
-  command.option("--smoothing", options->smoothing, "sgn(v) is taken as tanh(smoothing v)")
+  command
+      .option("--smoothing", options->smoothing,
+              "To linearize, replace sgn(v) by tanh(SMOOTHING v) (default: 100)")
       .in(Range::positive());
   command
-      .option("--delay", options->delay_s, "Loop delay to design for [s]: sampled design, for the predictor")
+      .option("--delay", options->delay_s,
+              "Loop delay to compensate with a predictor [s]; the design is then discrete-time")
       .in(Range::within(0.0, 10.0));
-  command.option("--rate", options->rate_hz, "Sample rate [Hz]; with --delay, and for the gain file")
+  command
+      .option("--rate", options->rate_hz,
+              "Sample rate [Hz] of the gain file and of discrete-time designs (default: 1000)")
       .in(Range::within(lowest_sample_rate_hz, highest_sample_rate_hz));
-  command.option("--cutoff", options->cutoff_hz, "Velocity filter in the gain file: cutoff [Hz]")
+  command
+      .option("--cutoff", options->cutoff_hz,
+              "Velocity filter of the gain file: cutoff frequency [Hz] (default: 50)")
       .in(Range::positive());
-  command.option("--damping", options->damping, "Velocity filter in the gain file: damping")
+  command
+      .option("--damping", options->damping, "Velocity filter of the gain file: damping ratio (default: 0.9)")
       .in(Range::positive());
-  command.option("--out", options->out, "Write a gain file");
-  command.flag("--force", options->force, "Replace the gain file if it exists");
-  command.flag("--json", options->as_json, "One JSON document");
+  command.option("--out", options->out, "Gain file to write");
+  command.flag("--force", options->force, "Replace an existing gain file");
+  command.flag("--json", options->as_json, "Print one JSON document");
   command.does([options] {
     design(*options);
     return ExitCode::done;

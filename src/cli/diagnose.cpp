@@ -61,7 +61,7 @@ void print_steps(const Diagnosis& d) {
         return std::any_of(step.effects.begin(), step.effects.end(), lost);
       }))
     return;
-  std::printf("Steps of the search (with --trials: every fit):\n");
+  std::printf("Steps of the search (--trials lists every fit):\n");
   for (std::size_t i = 0; i < d.steps.size(); ++i) {
     std::printf("  %zu.", i + 1);
     for (const Step::Effect& effect : d.steps[i].effects) {
@@ -75,7 +75,7 @@ void print_steps(const Diagnosis& d) {
 
 void print_next_best(const NextBest& best) {
   for (const Trial* other : best.others) {
-    std::printf("      next best: %s, with %.4g of the evidence of %.4g:", kind_of(other->effect).c_str(),
+    std::printf("      next best candidate: %s, evidence %.4g against %.4g:", kind_of(other->effect).c_str(),
                 other->evidence, best.taken->evidence);
     print_values(other->parameters);
     std::printf("\n");
@@ -84,26 +84,27 @@ void print_next_best(const NextBest& best) {
 
 void print_verdict(const Diagnosis& d) {
   if (d.interrupted)
-    std::printf("INTERRUPTED: the search was not finished. %s\n",
-                d.examined ? "What it had found was examined, what else it could be was not looked into."
-                           : "This is the best answer so far, and nothing says that it is right.");
+    std::printf("INTERRUPTED: the search is not finished. %s\n",
+                d.examined ? "The effects below were tested, but alternatives were not."
+                           : "This is the best answer so far. It was not tested.");
   if (d.bound_reached)
-    std::printf("SEARCH BOUND REACHED: the search was not finished. %s\n",
-                d.examined ? "What it had found was examined; --effort gives it more."
-                           : "This is the best answer so far; --effort gives it more.");
+    std::printf("SEARCH BOUND REACHED: the search is not finished. %s\n",
+                d.examined
+                    ? "The effects below were tested. To search longer, raise --effort."
+                    : "This is the best answer so far. It was not tested. To search longer, raise --effort.");
   if (!d.examined) return;
   switch (d.verdict) {
     case Verdict::explained:
-      std::printf("Explained: the model lacked what is listed here.\n");
+      std::printf("Explained: with the effects below, the model explains the data.\n");
       break;
     case Verdict::no_discrepancy:
-      std::printf("No discrepancy: the model says what the data say.\n");
+      std::printf("No discrepancy: the model agrees with the data.\n");
       break;
     case Verdict::unexplained:
-      std::printf("Unexplained: something is missing that no known effect accounts for.\n");
+      std::printf("Unexplained: the model lacks something that no known effect explains.\n");
       break;
     case Verdict::not_excited:
-      std::printf("Not excited: too little moves in these data to show anything.\n");
+      std::printf("Not excited: these data contain too little motion to judge the model.\n");
       break;
   }
 }
@@ -117,7 +118,7 @@ std::string gap_text(double gap) {
 
 void print(const Diagnosis& d, const std::string& out) {
   print_verdict(d);
-  std::printf("Gap on held-out data, in units of the noise: %s before, %s after.\n",
+  std::printf("Gap (open-loop error on held-out data / noise floor): %s before, %s after.\n",
               gap_text(d.gap_before).c_str(), gap_text(d.gap_after).c_str());
   for (const FoundEffect& effect : d.effects) {
     std::printf("  %-28s", kind_of(effect.effect).c_str());
@@ -130,14 +131,14 @@ void print(const Diagnosis& d, const std::string& out) {
       std::string names;
       for (const std::size_t other : effect.indistinguishable_from)
         names += (names.empty() ? "" : ", ") + kind_of(other);
-      std::printf("      these data cannot tell it from: %s\n", names.c_str());
+      std::printf("      these data do not distinguish it from: %s\n", names.c_str());
     }
     print_next_best(next_best(d, effect));
   }
   print_steps(d);
-  std::printf("Remaining: %s.\n", d.residual.c_str());
+  std::printf("Residual: %s.\n", d.residual.c_str());
   if (d.next_experiment)
-    std::printf("Next run, to tell them apart: upright experiment %s --rig RIG\n  %s\n",
+    std::printf("Next experiment, to distinguish them: upright experiment %s --rig RIG\n  %s\n",
                 d.next_experiment->file.c_str(), d.next_experiment->description.c_str());
   for (const std::string& note : d.notes) std::printf("Note: %s.\n", note.c_str());
   if (!out.empty()) std::printf("Written: %s\n", out.c_str());
@@ -176,8 +177,7 @@ void write_residuals(const Diagnosis& d, const fs::path& file) {
   const std::size_t stride = 1 + count / most_rows;
   std::ofstream out(file);
   out << "segment,run,time_s,cart_m,cart_velocity_mps,voltage_v,force_before_n,force_after_n,torque_before_"
-         "nm,"
-         "torque_after_nm\n";
+         "nm,torque_after_nm\n";
   for (std::size_t s = 0; s < d.residual_before.size(); ++s) {
     const ResidualTrace& before = d.residual_before[s];
     const ResidualTrace& after = d.residual_after[s];
@@ -193,7 +193,7 @@ void write_residuals(const Diagnosis& d, const fs::path& file) {
   out.close();
   if (!out)
     throw ConfigError("cannot write " + file.string() +
-                      ": free some space or choose another folder with --out");
+                      ": free some space, or choose another folder with --out");
 }
 
 /// Measured and simulated on held-out segments, with the plant file as given and with the model that was
@@ -230,7 +230,7 @@ void write_traces(const Diagnosis& d, const Plant& given, const std::vector<Meas
   out.close();
   if (!out)
     throw ConfigError("cannot write " + file.string() +
-                      ": free some space or choose another folder with --out");
+                      ": free some space, or choose another folder with --out");
 }
 
 void write_results(const Diagnosis& d, const Plant& given, const std::vector<Measurement>& runs,
@@ -238,7 +238,7 @@ void write_results(const Diagnosis& d, const Plant& given, const std::vector<Mea
   std::error_code problem;
   fs::create_directories(flags.out, problem);
   if (problem)
-    throw ConfigError("cannot make " + flags.out + " (" + problem.message() +
+    throw ConfigError("cannot create " + flags.out + " (" + problem.message() +
                       "): choose another folder with --out");
   write_plant_file(d.model, fs::path(flags.out) / "model.yaml", provenance(d, flags));
   write_plant_file(given, fs::path(flags.out) / "given.yaml", {"The plant file as given: " + flags.model});
@@ -250,7 +250,7 @@ void write_results(const Diagnosis& d, const Plant& given, const std::vector<Mea
   json.close();
   if (!json)
     throw ConfigError("cannot write " + file.string() +
-                      ": free some space or choose another folder with --out");
+                      ": free some space, or choose another folder with --out");
 }
 
 ExitCode run_diagnose(const DiagnoseFlags& flags) {
@@ -262,7 +262,7 @@ ExitCode run_diagnose(const DiagnoseFlags& flags) {
   if (!flags.trust_data) refuse_mistakes(runs, plant);
   runs = within_samples(std::move(runs), most_diagnosed_samples);
   if (!flags.out.empty() && fs::exists(fs::path(flags.out) / "diagnosis.json"))
-    throw ConfigError(flags.out + " holds a diagnosis already: choose another folder with --out");
+    throw ConfigError(flags.out + " already holds a diagnosis: choose another folder with --out");
   DiagnosisOptions options;
   options.signal = &answer_on_signal();
   options.search_bound = flags.effort;
@@ -288,22 +288,27 @@ ExitCode run_diagnose(const DiagnoseFlags& flags) {
 
 void add_diagnose(CommandLine& line) {
   const Command command = line.command(
-      "diagnose", "Find the effect that a model lacks, from measured runs",
+      "diagnose", "Find the effects that a plant model lacks, from measured runs",
       "Example:  upright diagnose --model config/plants/viscous.yaml --data runs/a runs/b --out diagnosis\n"
-      "Ctrl-C ends it with the best answer so far and exit code 3; a second Ctrl-C ends it at once.");
+      "Ctrl-C stops the search and gives the best answer so far, with exit code 3. A second Ctrl-C ends the\n"
+      "program at once.");
   const auto flags = std::make_shared<DiagnoseFlags>();
-  command.option("--model", flags->model, "Plant file: what is believed of the rig").required();
-  command.option("--data", flags->data, "Runs: experiment folders, run directories, CSV or dataset files")
+  command.option("--model", flags->model, "Plant file: the model to test against the data").required();
+  command
+      .option("--data", flags->data,
+              "Measured runs: experiment folders, run directories, CSV or dataset files")
       .required();
-  command.option("--out", flags->out, "Folder for diagnosis.json and model.yaml");
+  command.option("--out", flags->out,
+                 "Folder for the results: diagnosis.json, the improved model.yaml, and CSV files");
   command.flag("--trust-data", flags->trust_data,
-               "Search though signs, zeros or units of the data contradict the plant file");
-  command.flag("--trials", flags->trials, "Show every fit of the search, and which were taken");
+               "Continue even if signs, zeros or units of the data contradict the plant file");
+  command.flag("--trials", flags->trials, "List every fit of the search; + marks those that were accepted");
   command
       .option("--effort", flags->effort,
-              "How often the search may follow each sample at most, before it gives the best answer so far")
+              "Search bound: number of passes over the data after which the search stops with the best "
+              "answer so far (default: 10000)")
       .in(Range::positive());
-  command.flag("--json", flags->as_json, "One JSON document on stdout");
+  command.flag("--json", flags->as_json, "Print one JSON document");
   command.does([flags] { return run_diagnose(*flags); });
 }
 

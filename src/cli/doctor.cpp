@@ -79,14 +79,14 @@ void ask_operator(const std::string& words) {
 }
 
 /// The rig that is examined, at zero volts, and who asks for it to end.
-struct Bedside {
+struct ExaminedRig {
   const RigFile& file;
   Rig& rig;
   Clock& clock;
   const SignalFlag& signal;
 };
 
-void examine_signs(const Arguments& arguments, const Bedside& at, Page& page) {
+void examine_signs(const Arguments& arguments, const ExaminedRig& at, Page& page) {
   if (arguments.by_hand)
     append(page.findings, examine_signs_by_hand(at.rig, at.clock, calibration_in_use(at.file),
                                                 arguments.hand_s, at.signal, ask_operator));
@@ -95,7 +95,7 @@ void examine_signs(const Arguments& arguments, const Bedside& at, Page& page) {
                              "switch the amplifier off and run it with --by-hand"});
 }
 
-void examine_lines(const Arguments& arguments, const Bedside& at, const LinkProbe& probe, Page& page) {
+void examine_lines(const Arguments& arguments, const ExaminedRig& at, const LinkProbe& probe, Page& page) {
   const SafetyInputs inputs = at.rig.safety_inputs();
   append(page.findings, arguments.by_hand ? examine_safety_inputs_by_hand(at.rig, at.clock, arguments.hand_s,
                                                                           at.signal, ask_operator)
@@ -152,7 +152,7 @@ void examine_rig(const Arguments& arguments, const RigFile& file, Page& page) {
   progress.end();
   page.findings.push_back(judge_link(*page.link, page.rate_hz));
   page.findings.push_back(judge_zero(page.link->counts, calibration_in_use(file)));
-  const Bedside at{file, *rig, clock, signal};
+  const ExaminedRig at{file, *rig, clock, signal};
   examine_signs(arguments, at, page);
   examine_lines(arguments, at, *page.link, page);
   rig->stop();
@@ -180,15 +180,19 @@ Json json_of(const Page& page, Health verdict) {
     document["link"] = histogram_json(page.link->round_trip);
     document["link"]["failed"] = page.link->failed;
     document["link"]["highest_rate_hz"] = highest_rate_hz(page.link->round_trip);
+    if (page.link->device_clock)
+      for_each_fact(*page.link->device_clock,
+                    [&](const char* name, auto value) { document["link"]["device_clock"][name] = value; });
   }
   return document;
 }
 
 void print_histograms(const Page& page) {
   std::vector<NamedHistogram> histograms{{"late, idle", page.idle}, {"late, loaded", page.loaded}};
-  if (page.link) histograms.push_back({"link round trip", page.link->round_trip});
-  std::printf("\nWake-ups at %.4g Hz%s, how many took how long (bars: logarithm of the count)\n",
-              page.rate_hz, page.link ? " and round trips of the link" : "");
+  const bool has_trips = page.link && page.link->round_trip.count() > 0;
+  if (has_trips) histograms.push_back({"link round trip", page.link->round_trip});
+  std::printf("\nHistogram of wake-up lateness at %.4g Hz%s (bars: logarithm of the count)\n", page.rate_hz,
+              has_trips ? " and of link round trips" : "");
   for (const std::string& line : histogram_lines(histograms)) std::printf("%s\n", line.c_str());
   std::printf("\n");
 }
@@ -223,22 +227,26 @@ ExitCode run(const Arguments& arguments) {
 
 void add_doctor(CommandLine& line) {
   const Command command =
-      line.command("doctor", "What this machine and a rig's link are good for",
+      line.command("doctor", "Test the timing of this machine and, with --rig, the link and wiring of a rig",
                    "Example:  upright doctor --rig config/rigs/modbus-tcp.yaml --rate 500\n"
-                   "Writes no voltage. Each line has its remedy; exit code 4 when the verdict is bad.");
+                   "It keeps the motor at zero volts. Every problem comes with a remedy.\n"
+                   "Exit code 4 means that the verdict is bad.");
   const auto a = std::make_shared<Arguments>();
-  command.option("--rig", a->rig, "Rig file, to examine its link too");
-  command.option("--gains", a->gains, "Gain file, for its sample rate");
+  command.option("--rig", a->rig, "Rig file; its link and wiring are tested too");
+  command.option("--gains", a->gains, "Gain file; its sample rate is tested");
   command
-      .option("--rate", a->rate_hz, "Sample rate to examine [Hz] (the gain file's, or what suits the link)")
+      .option("--rate", a->rate_hz,
+              "Sample rate to test [Hz] (default: that of --gains, else 1000 or what the link allows)")
       .in(Range::within(lowest_sample_rate_hz, highest_sample_rate_hz));
   constexpr double longest_s = 3600.0;
-  command.option("--seconds", a->seconds, "How long to measure each [s] (10)").in({0.0, longest_s, true});
-  command.flag("--by-hand", a->by_hand,
-               "Check encoders' signs, emergency stop and limit switches: asks you to move and press them");
-  command.option("--hand-wait", a->hand_s, "How long to wait for each move [s] (30)")
+  command.option("--seconds", a->seconds, "Duration of each measurement [s] (default: 10)")
       .in({0.0, longest_s, true});
-  command.flag("--json", a->as_json, "One JSON document");
+  command.flag(
+      "--by-hand", a->by_hand,
+      "Test encoder signs, emergency stop and limit switches; asks you to move or press them by hand");
+  command.option("--hand-wait", a->hand_s, "How long to wait for each movement by hand [s] (default: 30)")
+      .in({0.0, longest_s, true});
+  command.flag("--json", a->as_json, "Print one JSON document");
   command.does([a] { return run(*a); });
 }
 

@@ -61,10 +61,10 @@ void print_all(bool as_json) {
 }  // namespace
 
 void add_effects(CommandLine& line) {
-  const Command command =
-      line.command("effects", "List every effect a plant can have", "Example:  upright effects --json");
+  const Command command = line.command("effects", "List every effect that a plant file can contain",
+                                       "Example:  upright effects --json");
   const auto as_json = std::make_shared<bool>(false);
-  command.flag("--json", *as_json, "One JSON document");
+  command.flag("--json", *as_json, "Print one JSON document");
   command.does([as_json] {
     print_all(*as_json);
     return ExitCode::done;

@@ -59,8 +59,8 @@ void refuse_without_hands(const ExperimentSetup& setup, const std::vector<Piece>
   if (is_simulated(setup.rig) || ready || ::isatty(STDIN_FILENO) != 0) return;
   const auto at = std::find_if(pieces.begin(), pieces.end(), needs_hands);
   if (at != pieces.end())
-    throw ConfigError("the piece " + at->label + " needs somebody to " + at->operator_does +
-                      ": start it on a terminal, or give --ready when it is done");
+    throw ConfigError("the piece " + at->label + " needs an operator to " + at->operator_does +
+                      ": start the command in a terminal, or do it first and add --ready");
 }
 
 std::string utc_name(const std::string& name) {
@@ -80,7 +80,7 @@ fs::path folder_of(const Arguments& arguments, const ExperimentSetup& setup,
     const std::vector<TrialResult> done = read_trials(arguments.out, setup, pieces);
     const std::string missing = missing_transitions(pieces, done);
     if (!done.empty() && !next_trial(pieces, done))
-      throw ConfigError(arguments.out + " holds this experiment with every run made" +
+      throw ConfigError(arguments.out + " already holds this experiment, with all runs finished" +
                         (missing.empty() ? "" : " (" + missing + ")") + ": choose another folder with --out");
     return arguments.out;
   }
@@ -191,7 +191,8 @@ void announce(const Piece& piece, const ExperimentTrial& trial, bool simulated, 
   std::fprintf(stderr, "  %s, then press Enter: ", piece.operator_does.c_str());
   std::string line;
   if (!std::getline(std::cin, line))
-    throw Error(ExitCode::stopped, "nobody pressed Enter: start the same command again to go on");
+    throw Error(ExitCode::stopped,
+                "the input ended before Enter was pressed: start the same command again to continue");
 }
 
 void show_live(const LiveStatus& live, ScriptPhase phase) {
@@ -294,7 +295,7 @@ ExperimentResult perform(const Arguments& arguments, const ExperimentSetup& setu
   if (view != nullptr)
     view->end({result.complete && result.stop.done() ? LiveState::Kind::completed : LiveState::Kind::stopped,
                (result.stop.done() ? "" : sentence_of(result.stop) + ". ") +
-                   (result.complete ? "every piece is done" : result.sentence) + ". The runs are in " +
+                   (result.complete ? "all pieces are done" : result.sentence) + ". The runs are in " +
                    folder.string()});
   return result;
 }
@@ -305,8 +306,8 @@ ExitCode run(const Arguments& arguments) {
   const bool simulated = is_simulated(setup.rig);
   if (!simulated) {
     const std::string why = arguments.rig + " is not a simulated rig: remove ";
-    if (arguments.fast) throw ConfigError(why + "--fast, or name a simulated rig");
-    if (arguments.seed) throw ConfigError(why + "--seed, or name a simulated rig");
+    if (arguments.fast) throw ConfigError(why + "--fast, or use a simulated rig");
+    if (arguments.seed) throw ConfigError(why + "--seed, or use a simulated rig");
   }
   if (!arguments.force) refuse_unstable(setup);
   Progress progress("planning");
@@ -348,26 +349,32 @@ ExitCode run(const Arguments& arguments) {
 
 void add_experiment(CommandLine& line) {
   const Command command = line.command(
-      "experiment", "Run a list of measurements on a rig, unattended",
+      "experiment", "Run a list of measurements on a rig",
       "Example:  upright experiment config/experiments/friction.yaml --rig config/rigs/simulated.yaml "
       "--fast\n"
-      "Every piece is planned and rehearsed on a simulated rig before anything moves; --dry-run ends there.\n"
-      "The same command goes on where an interrupted one stopped.");
+      "Every piece is planned and rehearsed in simulation before anything moves; --dry-run stops there.\n"
+      "The same command resumes an experiment that was interrupted.");
   const auto a = std::make_shared<Arguments>();
   command.option("file", a->file, "Experiment file").required();
   command.option("--rig", a->rig, "Rig file").required();
-  command.option("--plant", a->plant, "Plant file to plan with (the experiment's, the simulated rig's)");
-  command.option("--rate", a->rate_hz, "Sample rate [Hz] (the experiment's, the gain file's, 1000)")
+  command.option("--plant", a->plant,
+                 "Plant file to plan with (default: that of the simulated rig, else that of the experiment)");
+  command
+      .option("--rate", a->rate_hz,
+              "Sample rate [Hz] (default: that of the experiment, else that of the gain file, else 1000)")
       .in(Range::within(lowest_sample_rate_hz, highest_sample_rate_hz));
   add_simulated(command, a->seed, a->fast);
-  command.flag("--dry-run", a->dry_run, "Plan and rehearse, then stop: nothing moves");
+  command.flag("--dry-run", a->dry_run, "Plan and rehearse only; nothing moves");
   command.flag("--force", a->force,
-               "Plan with gains that do not stabilize the plant; the rehearsal decides then");
-  command.flag("--ready", a->ready, "What pieces ask of an operator is done: do not wait for Enter");
-  command.option("--out", a->out, "Folder of this experiment (runs/<UTC start>-<name>)");
+               "Accept gains that do not stabilize the plant, if the rehearsal succeeds with them");
+  command.flag("--ready", a->ready,
+               "Do not wait for Enter: the operator has already done what the pieces ask for");
+  command.option(
+      "--out", a->out,
+      "Folder of this experiment (default: an unfinished one in runs, else runs/<UTC start>-<name>)");
   add_realtime(command, a->realtime);
   add_live(command, a->live_port);
-  command.flag("--json", a->as_json, "One JSON document");
+  command.flag("--json", a->as_json, "Print one JSON document");
   command.does([a] { return run(*a); });
 }
 

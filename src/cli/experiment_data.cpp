@@ -75,8 +75,7 @@ void add_experiment(const fs::path& folder, NamedRuns& named) {
         " is left out: " + (never_began(run / "samples.csv") ? "its piece never began" : how_it_ended(run)));
   if (named.runs.size() == before)
     throw ConfigError(folder.string() +
-                      " holds no piece that is whole: start its experiment again, which goes "
-                      "on where it was interrupted");
+                      " holds no completed piece: start its experiment again to continue it");
 }
 
 }  // namespace

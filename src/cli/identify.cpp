@@ -47,8 +47,8 @@ Plant base_of(const IdentifyFlags& flags) {
     if (document.has("plant")) return read_plant(document);
   }
   throw ConfigError(
-      "no plant file was named, and its masses and the motor's force per volt are needed: name one with "
-      "--plant; its friction is not used");
+      "the masses and the motor constants are unknown: name a plant file with --plant (its friction is not "
+      "used)");
 }
 
 Json number(double value) {
@@ -113,46 +113,46 @@ Json json_of(const Identification& id, const IdentifyFlags& flags) {
 void print_verdict(const Identification& id, const IdentifyFlags& flags) {
   if (id.interrupted) {
     std::printf(
-        "INTERRUPTED: the work was not finished. Nothing says that the numbers below are the rig's: they are "
-        "the best so far.\n");
+        "INTERRUPTED: the fit is not finished. The values below are the best so far. They were not "
+        "tested.\n");
     return;
   }
   switch (id.verdict) {
     case Verdict::explained:
-      std::printf("Explained: these numbers account for the data, of runs that their fit did not see too.\n");
+      std::printf("Explained: the identified values explain the data, including held-out runs.\n");
       break;
     case Verdict::not_excited:
-      std::printf("NOT EXCITED: the data cannot show the numbers (%s). Those below are not the rig's.\n",
+      std::printf("NOT EXCITED: the data do not determine the values (%s). Do not use the values below.\n",
                   id.residual.c_str());
       break;
     default:
       std::printf(
-          "UNEXPLAINED: something moves this rig that identify does not know. The numbers below make up for "
-          "it "
-          "and are not the rig's.\n"
-          "What is missing, says:  %s\n",
+          "UNEXPLAINED: the rig has an effect that identify does not model, so the values below are biased. "
+          "Do not use them.\n"
+          "To find the missing effect:  %s\n",
           next_command(flags).c_str());
       break;
   }
   if (std::isfinite(id.gap_after))
-    std::printf("Gap on held-out data, in units of the noise: %.2f with the plant file, %.2f identified.\n",
-                id.gap_before, id.gap_after);
-  if (id.verdict != Verdict::not_excited) std::printf("Remaining: %s.\n", id.residual.c_str());
+    std::printf(
+        "Gap (open-loop error on held-out data / noise floor): %.2f with the plant file, %.2f identified.\n",
+        id.gap_before, id.gap_after);
+  if (id.verdict != Verdict::not_excited) std::printf("Residual: %s.\n", id.residual.c_str());
 }
 
 void print(const Identification& id, const IdentifyFlags& flags) {
   print_verdict(id, flags);
-  if (!id.is_trustworthy() && !id.parameters.empty()) std::printf("Not to be used:\n");
+  if (!id.is_trustworthy() && !id.parameters.empty()) std::printf("Not usable:\n");
   for (const IdentifiedParameter& p : id.parameters)
     std::printf("  %-44s %11.5g %-10s (95%%: %.5g to %.5g)  %s\n", p.name.c_str(), p.value, p.unit.c_str(),
                 p.low, p.high, p.source.c_str());
   if (id.balance)
     std::printf(
-        "Balance of forces alone: mass %.5g kg, damping %.5g N/(m/s), Coulomb %.4g N, constant %.4g N; "
-        "%.2g %% of the force is left.\n",
+        "Force balance only: mass %.5g kg, damping %.5g N/(m/s), Coulomb %.4g N, constant %.4g N; "
+        "residual %.2g %% of the force.\n",
         id.balance->mass_kg, id.balance->damping_n_per_mps, id.balance->coulomb_n, id.balance->constant_n,
         100.0 * id.balance->relative_error);
-  std::printf("Read directly: %zu breakaways, %zu steady speeds. Innovations %.2f of the noise.\n",
+  std::printf("Measured directly: %zu breakaways, %zu steady speeds. RMS innovation: %.2f times the noise.\n",
               id.breakaways.size(), id.steady_points.size(), id.rms);
   for (const std::string& note : id.notes) std::printf("Note: %s.\n", note.c_str());
 }
@@ -162,7 +162,7 @@ void write_results(const Identification& id, const std::vector<Measurement>& run
   std::error_code problem;
   fs::create_directories(flags.out, problem);
   if (problem)
-    throw ConfigError("cannot make " + flags.out + " (" + problem.message() +
+    throw ConfigError("cannot create " + flags.out + " (" + problem.message() +
                       "): choose another folder with --out");
   // A plant file says that these are the rig's numbers.
   if (id.is_trustworthy()) {
@@ -176,7 +176,7 @@ void write_results(const Identification& id, const std::vector<Measurement>& run
   json.close();
   if (!json)
     throw ConfigError("cannot write " + file.string() +
-                      ": free some space or choose another folder with --out");
+                      ": free some space, or choose another folder with --out");
   // Drawing takes longer than whoever interrupts wants to wait.
   if (!id.interrupted) write_identification_report(id, runs, fs::path(flags.out) / "report.html");
 }
@@ -191,7 +191,7 @@ ExitCode run_identify(const IdentifyFlags& flags) {
   if (!flags.trust_data) refuse_mistakes(runs, base);
   runs = within_samples(std::move(runs), most_identified_samples);
   if (!flags.out.empty() && fs::exists(fs::path(flags.out) / "identification.json"))
-    throw ConfigError(flags.out + " holds an identification already: choose another folder with --out");
+    throw ConfigError(flags.out + " already holds an identification: choose another folder with --out");
   IdentificationOptions options;
   options.signal = &answer_on_signal();
   progress.begin("identify");
@@ -217,21 +217,25 @@ ExitCode run_identify(const IdentifyFlags& flags) {
 
 void add_identify(CommandLine& line) {
   const Command command = line.command(
-      "identify", "Friction and motor constants from measured runs",
+      "identify", "Identify friction and motor constants from measured runs",
       "Example:  upright identify --data runs/20260101T120000Z-friction --plant config/plants/viscous.yaml "
       "--out identified\n"
-      "Of the plant file the masses, the length and the motor are used; its friction is found anew.\n"
-      "Whether the numbers account for the data is its verdict; the exit code is 0 whatever that is.\n"
-      "Ctrl-C ends it with the best numbers so far and exit code 3; a second Ctrl-C ends it at once.");
+      "Masses, length and motor come from the plant file. Its friction is not used but identified.\n"
+      "The verdict says whether the values explain the data. It does not change the exit code.\n"
+      "Ctrl-C stops the fit and gives the best values so far, with exit code 3. A second Ctrl-C ends the\n"
+      "program at once.");
   const auto flags = std::make_shared<IdentifyFlags>();
-  command.option("--data", flags->data, "Experiment folders, run directories, CSV or dataset files")
+  command
+      .option("--data", flags->data,
+              "Measured runs: experiment folders, run directories, CSV or dataset files")
       .required();
-  command.option("--plant", flags->plant, "Plant file with masses and motor (a simulated run's own)");
+  command.option("--plant", flags->plant,
+                 "Plant file with masses and motor (default: the plant of a simulated run)");
   command.option("--out", flags->out,
-                 "Folder for identification.json, report.html and, where the data are explained, plant.yaml");
+                 "Folder for identification.json, report.html and, if the data are explained, plant.yaml");
   command.flag("--trust-data", flags->trust_data,
-               "Go on though signs, zeros or units of the data contradict the plant file");
-  command.flag("--json", flags->as_json, "One JSON document on stdout");
+               "Continue even if signs, zeros or units of the data contradict the plant file");
+  command.flag("--json", flags->as_json, "Print one JSON document");
   command.does([flags] { return run_identify(*flags); });
 }
 

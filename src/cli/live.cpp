@@ -31,20 +31,22 @@ double pendulum_length_m(const Plant* plant) {
 }  // namespace
 
 void add_live(const Command& command, std::string& port) {
-  command.flag_or_text("--live", usual_port, port,
-                       std::string("Serve a page that shows the run and can stop it, on this machine only "
-                                   "(--live PORT; 0: any free port; ") +
-                           usual_port + ")");
+  command.flag_or_text(
+      "--live", usual_port, port,
+      std::string("Serve a web page that shows the run and can stop it, for this machine only. "
+                  "--live PORT chooses the port, 0 any free one (default: ") +
+          usual_port + ")");
 }
 
 std::unique_ptr<LiveView> open_live(const std::string& port, const LiveSubject& subject, std::FILE* out) {
   if (port.empty()) return nullptr;
   const std::optional<int> number = port_number(port);
   if (!number)
-    throw ConfigError("'" + port + "' is no port: give --live one from 0 to 65535, as in --live 8090");
+    throw ConfigError("'" + port + "' is not a port: use a number from 0 to 65535, as in --live 8090");
   if (subject.fast)
     throw ConfigError(
-        "in virtual time there is nothing to watch: remove --fast or --live; a report shows the run");
+        "--live needs real time and --fast is virtual time: remove one of them (upright report shows a "
+        "finished run)");
   LiveScene scene;
   scene.title = subject.title;
   scene.track_limit_m = subject.rig->track_limit_m;

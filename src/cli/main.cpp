@@ -23,7 +23,8 @@ ExitCode run(int argc, char** argv) {
       "upright", UPRIGHT_VERSION, "Real-time controller for the Quanser IP02 cart with inverted pendulum",
       "Start here:  scripts/demo.sh   (needs no hardware)\n"
       "Each command shows an example:  upright COMMAND --help\n"
-      "Exit codes: 0 done; 2 usage or configuration; 3 safety stop or fall; 4 link or device");
+      "Exit codes: 0 success, 2 usage or configuration error, 3 stopped or fallen, "
+      "4 link or device error");
   for (upright::cli::AddCommand* add : upright::cli::all_commands) add(line);
   const ExitCode code = line.run(argc, argv);
   upright::cli::finish_output();
@@ -40,8 +41,9 @@ int main(int argc, char** argv) {
   } catch (const upright::Error& error) {
     return fail(error.code(), error.what());
   } catch (const std::bad_alloc&) {
-    return fail(ExitCode::usage, "out of memory: give smaller input or more memory");
+    return fail(ExitCode::usage, "out of memory: use smaller input or a machine with more memory");
   } catch (const std::exception& error) {
-    return fail(ExitCode::device, std::string("report this as a bug: unexpected error: ") + error.what());
+    return fail(ExitCode::device,
+                std::string("unexpected error (") + error.what() + "): please report this as a bug");
   }
 }

@@ -145,30 +145,31 @@ void print(const Margins& margins, const ControlConfig& config) {
   std::printf("Verdict: %s.\n\n", verdict_for(margins, config).c_str());
   const std::string without = "without any delay";
   const std::string at = predicts(config)
-                             ? "at the " + milliseconds(config.delay_s) + " that its predictor makes up for"
+                             ? "at the " + milliseconds(config.delay_s) + " that its predictor compensates"
                              : without;
   const std::string estimator = config.has_state_estimator() ? "state estimator" : "velocity estimator";
   const std::string parts = "hold, " + estimator + ", delay line" + (predicts(config) ? ", predictor" : "");
-  print("sampled loop while the cart slides (" + parts + "; no dry friction): this one decides",
+  print("sampled loop while the cart slides (" + parts + "; no dry friction); the verdict uses this loop",
         margins.sliding, at);
   print("sampled loop near rest (" + parts + "; dry friction smoothed)", margins.sampled, at);
   if (!margins.sampled.stable_without_delay && !margins.limit.tolerance->exceeded())
-    std::printf("  the loop holds the pendulum and does not come to rest: it sticks and slips\n");
-  print(predicts(config) ? "continuous loop of the gains alone, without their predictor: not what runs"
+    std::printf("  the loop balances, but it does not come to rest: it shows stick-slip\n");
+  print(predicts(config) ? "continuous loop of the gains without the predictor (not the loop that runs)"
         : config.has_state_estimator()
-            ? "continuous loop near rest (no hold; its estimator without a period; dry friction smoothed)"
+            ? "continuous loop near rest (no hold; continuous-time estimator; dry friction smoothed)"
             : "continuous loop near rest (no hold, no estimator; dry friction smoothed)",
         margins.continuous, without);
   if (margins.unmodelled)
-    print("the same of an actuator later than the estimator believes (on top of the gain file's delay)",
-          *margins.unmodelled, at);
+    print(
+        "sampled loop with an actuator delay that the estimator does not know (in addition to the gain "
+        "file's delay)",
+        *margins.unmodelled, at);
   if (config.state_estimator.kind == StateEstimatorKind::extended_kalman) std::printf("%s\n", extended_note);
   const PhysicalLimits& physics = margins.physics;
   std::printf(
-      "Limits of physics: feedback of angle and rate bears at most %s on this pendulum (Stepan), with "
-      "acceleration %s (Insperger, Milton, Stepan); no linear controller that also holds it without delay "
-      "bears "
-      "more than %s (Middleton, Miller).\n",
+      "Theoretical limits of the delay for this pendulum: %s with feedback of angle and rate (Stepan); %s "
+      "with acceleration as well (Insperger, Milton, Stepan); %s for any linear controller that also "
+      "stabilizes the loop without delay (Middleton, Miller).\n",
       milliseconds(physics.proportional_derivative_s).c_str(),
       milliseconds(physics.with_acceleration_s).c_str(), milliseconds(physics.linear_controller_s).c_str());
   std::fflush(stdout);
@@ -198,14 +199,16 @@ void margin(const MarginOptions& options) {
 
 void add_margin(CommandLine& line) {
   const Command command =
-      line.command("margin", "How much delay a plant with its gains bears",
+      line.command("margin", "Compute how much delay the closed loop tolerates",
                    "Example:  upright margin config/plants/exponential.yaml config/gains/exponential.yaml");
   const auto options = std::make_shared<MarginOptions>();
   command.option("plant", options->plant, "Plant file").required();
   command.option("gains", options->gains, "Gain file").required();
-  command.option("--smoothing", options->smoothing, "sgn(v) is taken as tanh(smoothing v)")
+  command
+      .option("--smoothing", options->smoothing,
+              "To linearize, replace sgn(v) by tanh(SMOOTHING v) (default: 100)")
       .in(Range::positive());
-  command.flag("--json", options->as_json, "One JSON document");
+  command.flag("--json", options->as_json, "Print one JSON document");
   command.does([options] {
     margin(*options);
     return ExitCode::done;

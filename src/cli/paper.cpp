@@ -19,15 +19,16 @@ void add_paper(CommandLine& line) {
   const auto out = std::make_shared<std::string>("runs/paper");
   const auto config = std::make_shared<std::string>("config");
   const auto overwrite = std::make_shared<bool>(false);
-  command.option("--out", *out, "Folder for paper.md and its plots; runs/paper when not given");
-  command.option("--config", *config, "The folder with gains, plants and rigs");
-  command.option("--threads", options->threads, "Threads; one per processor when not given")
+  command.option("--out", *out, "Folder for paper.md and its plots (default: runs/paper)");
+  command.option("--config", *config, "Folder with gains, plants and rigs (default: config)");
+  command.option("--threads", options->threads, "Number of threads (default: one per processor)")
       .from_to(1u, 1024u);
-  command.flag("--overwrite", *overwrite, "Replace the document that is in the folder");
+  command.flag("--overwrite", *overwrite, "Replace an existing paper.md in the folder");
   command.does([=] {
     const std::filesystem::path file = std::filesystem::path(*out) / "paper.md";
     if (std::filesystem::exists(file) && !*overwrite)
-      throw ConfigError(file.string() + " exists: give another --out, or --overwrite to replace it");
+      throw ConfigError(file.string() +
+                        " already exists: choose another folder with --out, or replace it with --overwrite");
     options->config = *config;
     Progress progress("paper");
     options->progress = progress.callback();

@@ -55,7 +55,7 @@ Progress::Progress(std::string step, double takes_s)
     : on_terminal_(::isatty(STDERR_FILENO) != 0),
       started_(std::chrono::steady_clock::now()),
       step_began_(started_),
-      takes_s_(takes_s),
+      expected_s_(takes_s),
       step_(std::move(step)),
       first_report_(started_) {
   try {
@@ -88,7 +88,7 @@ void Progress::aside(const std::function<void()>& speak) {
 void Progress::begin(std::string step, double takes_s) {
   const std::lock_guard lock(mutex_);
   step_began_ = std::chrono::steady_clock::now();
-  takes_s_ = takes_s;
+  expected_s_ = takes_s;
   step_ = std::move(step);
   detail_.clear();
   share_ = first_share_ = unknown;
@@ -118,11 +118,11 @@ ProgressCallback Progress::callback() {
 }
 
 /// Of a step whose length is known.
-void Progress::follow_the_time(Time now) {
-  if (!(takes_s_ > 0.0)) return;
+void Progress::update_estimate(Time now) {
+  if (!(expected_s_ > 0.0)) return;
   first_share_ = 0.0;
   first_report_ = step_began_;
-  share_ = std::min(1.0, std::chrono::duration<double>(now - step_began_).count() / takes_s_);
+  share_ = std::min(1.0, std::chrono::duration<double>(now - step_began_).count() / expected_s_);
 }
 
 std::string Progress::time_left(Time now) const {
@@ -156,7 +156,7 @@ void Progress::draw_until_closed() {
   while (!changed_.wait_until(lock, next, [this] { return closing_; })) {
     const Time now = std::chrono::steady_clock::now();
     next = std::max(next + pause, now);
-    follow_the_time(now);
+    update_estimate(now);
     if (!on_terminal_) {
       std::fprintf(stderr, "upright: %s\n", line(now, longest_line).c_str());
       continue;

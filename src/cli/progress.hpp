@@ -46,7 +46,7 @@ class Progress {
   using Time = std::chrono::steady_clock::time_point;
 
   void draw_until_closed();
-  void follow_the_time(Time now);
+  void update_estimate(Time now);
   std::string line(Time now, std::size_t columns) const;
   std::string time_left(Time now) const;
   void clear_line();
@@ -54,7 +54,7 @@ class Progress {
   const bool on_terminal_;
   const Time started_;
   Time step_began_;
-  double takes_s_;  ///< of this step
+  double expected_s_;  ///< of this step
   std::mutex mutex_;
   std::condition_variable changed_;
   bool closing_ = false;

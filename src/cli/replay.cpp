@@ -39,7 +39,7 @@ Json json_of(const RunRecord& run, const ReplayResult& result, bool truncated) {
 void print(const ReplayResult& result, bool truncated) {
   if (result.first_mismatch) {
     const ReplayMismatch& m = *result.first_mismatch;
-    std::cout << "Differs first at tick " << m.tick << ": the log has " << exact_text(m.logged_v)
+    std::cout << "First difference at tick " << m.tick << ": the log has " << exact_text(m.logged_v)
               << " V (requested " << exact_text(m.logged_requested_v) << " V), the controller gives "
               << exact_text(m.computed_v) << " V (requested " << exact_text(m.computed_requested_v)
               << " V).\n";
@@ -47,8 +47,8 @@ void print(const ReplayResult& result, bool truncated) {
       std::cout << "The log lost rows before tick " << *result.first_lost_tick << ".\n";
     return;
   }
-  std::cout << "All " << result.rows << " voltages came out bit for bit.\n";
-  if (truncated) std::cout << "The last line of the log was cut and left out.\n";
+  std::cout << "All " << result.rows << " voltages agree bit for bit.\n";
+  if (truncated) std::cout << "The last line of the log is incomplete and was ignored.\n";
 }
 
 ExitCode replay_run(const std::string& directory, bool as_json) {
@@ -71,13 +71,13 @@ ExitCode replay_run(const std::string& directory, bool as_json) {
 
 void add_replay(CommandLine& line) {
   const Command command = line.command(
-      "replay", "Feed a run's counts through its controller: the voltages must come out bit for bit",
+      "replay", "Feed a run's logged counts through its controller and compare the voltages bit for bit",
       "Example:  upright replay runs/20260101T120000Z-run\n"
-      "Exit code 3 when a voltage differs.");
+      "Exit code 3 means that a voltage differs.");
   const auto directory = std::make_shared<std::string>();
   const auto as_json = std::make_shared<bool>(false);
-  command.option("run", *directory, "The run directory").required();
-  command.flag("--json", *as_json, "One JSON document");
+  command.option("run", *directory, "Run directory").required();
+  command.flag("--json", *as_json, "Print one JSON document");
   command.does([directory, as_json] { return replay_run(*directory, *as_json); });
 }
 

@@ -37,10 +37,10 @@ fs::path write_report(const fs::path& path, const ProgressCallback& progress) {
   if (is_experiment_folder(path)) return write_experiment_report(path);
   if (is_sweep_folder(path)) return write_sweep_report(path);
   if (!fs::exists(path, ignored))
-    throw ConfigError("there is no " + path.string() + ": check the path, or use --latest");
+    throw ConfigError(path.string() + " does not exist: check the path, or use --latest");
   throw ConfigError(path.string() +
-                    " holds neither run.yaml nor sweep.csv nor diagnosis.json nor trials.csv: name a folder "
-                    "that `upright run`, `experiment`, `sweep` or `diagnose` made");
+                    " contains no run.yaml, sweep.csv, diagnosis.json or trials.csv: name a folder that "
+                    "`upright run`, `experiment`, `sweep` or `diagnose` wrote");
 }
 
 /// The run that began last in a folder of runs. Their names begin with the second of their start; within a
@@ -58,7 +58,9 @@ fs::path newest_run_in(const fs::path& folder) {
                   fs::last_write_time(file, ignored), entry.path()};
     if (!newest || *newest < age) newest = age;
   }
-  if (!newest) throw ConfigError(folder.string() + " holds no run: name the folder of the runs with --out");
+  if (!newest)
+    throw ConfigError(folder.string() +
+                      " contains no run: name the folder that contains the runs with --out");
   return std::get<fs::path>(*newest);
 }
 
@@ -67,7 +69,7 @@ fs::path newest_run_in(const fs::path& folder) {
 ExitCode write_reports(const ReportFlags& flags) {
   std::vector<fs::path> paths(flags.paths.begin(), flags.paths.end());
   if (flags.latest) paths.push_back(newest_run_in(flags.out));
-  if (paths.empty()) throw ConfigError("no path was given: name a run, or use --latest");
+  if (paths.empty()) throw ConfigError("no path was given: name a run directory, or use --latest");
   ExitCode code = ExitCode::done;
   Progress progress("report");
   double written = 0.0;
@@ -93,15 +95,15 @@ ExitCode write_reports(const ReportFlags& flags) {
 }  // namespace
 
 void add_report(CommandLine& line) {
-  const Command command =
-      line.command("report", "One self-contained HTML file for each run, experiment, sweep or diagnosis",
-                   "Example:  upright report --latest\n"
-                   "          upright report runs/*-run\n"
-                   "Prints the path of each report.");
+  const Command command = line.command(
+      "report", "Write one self-contained HTML file for each run, experiment, sweep or diagnosis",
+      "Example:  upright report --latest\n"
+      "          upright report runs/*-run\n"
+      "Prints the path of each report.");
   const auto flags = std::make_shared<ReportFlags>();
   command.option("path", flags->paths, "Run directories, or folders of experiments, sweeps or diagnoses");
-  command.flag("--latest", flags->latest, "The run that began last");
-  command.option("--out", flags->out, "The folder of runs in which --latest looks (runs)");
+  command.flag("--latest", flags->latest, "Report on the run that started last");
+  command.option("--out", flags->out, "Folder in which --latest looks for runs (default: runs)");
   command.does([flags] { return write_reports(*flags); });
 }
 

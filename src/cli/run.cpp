@@ -47,7 +47,7 @@ struct Arguments {
 
 void refuse_what_only_simulation_can(const Arguments& arguments) {
   const std::string why = arguments.rig + " is not a simulated rig: remove ",
-                    or_else = ", or name a simulated rig";
+                    or_else = ", or use a simulated rig";
   if (arguments.fast) throw ConfigError(why + "--fast" + or_else);
   if (arguments.theta0_deg) throw ConfigError(why + "--theta0-deg" + or_else);
   if (arguments.seed) throw ConfigError(why + "--seed" + or_else);
@@ -55,10 +55,10 @@ void refuse_what_only_simulation_can(const Arguments& arguments) {
 
 void refuse_what_only_hardware_can(const Arguments& arguments, const RigFile& rig) {
   if (arguments.wait_s)
-    throw ConfigError("nobody lifts the pendulum of " + arguments.rig +
-                      ", which is simulated and starts where it is told to: remove --wait");
+    throw ConfigError(arguments.rig +
+                      " is a simulated rig, which starts upright without an operator: remove --wait");
   if (!arguments.plant.empty())
-    throw ConfigError("the plant of " + arguments.rig + ", which is simulated, is the one it names (" +
+    throw ConfigError(arguments.rig + " is a simulated rig and names its own plant (" +
                       rig.simulated->plant.string() +
                       "): remove --plant, or name the other plant in a copy of the rig file");
 }
@@ -105,7 +105,7 @@ std::string delay_line(const ControlConfig& control) {
   const std::string amount = "Delay: " + exact_text(control.delay_s * 1e3) + " ms, ";
   if (delay.exact()) return amount + std::to_string(delay.whole_periods()) + " periods, exact to the sample";
   return amount + exact_text(static_cast<double>(delay.whole_periods()) + delay.fraction()) +
-         " periods: linear between two samples, for it is no whole number of them";
+         " periods, interpolated linearly between samples";
 }
 
 std::unique_ptr<Rig> make(const RunSetup& setup, Clock& clock) {
@@ -125,7 +125,7 @@ std::string seconds(double value_s) {
 
 void show_wait(const WaitStatus& wait, bool on_terminal, bool first) {
   constexpr const char* request =
-      "lift the pendulum upright, hold it still and keep the cart off the ends: waiting at zero volts";
+      "lift the pendulum upright, hold it still and keep the cart away from the ends: waiting at zero volts";
   if (on_terminal)
     std::fprintf(stderr, "\r%s, %3.0f s left (angle %+7.2f deg, x %+.3f m; counts %lld, %lld) ", request,
                  wait.left_s, wait.pose.theta_rad * degrees_per_rad, wait.pose.cart_m,
@@ -134,7 +134,7 @@ void show_wait(const WaitStatus& wait, bool on_terminal, bool first) {
     std::fprintf(stderr, "upright: %s for %.0f s\n", request, wait.left_s);
 }
 
-/// On a real rig the operator lifts the pendulum first.
+/// On a real rig the operator lifts the pendulum first. Seven parameters: all that a run has open by then.
 void wait_for_operator(const Arguments& arguments, Rig& rig, Clock& clock, const RigFile& file,
                        const SignalFlag& caught_signal, bool on_terminal, LiveView* view) {
   const double wait_s = arguments.wait_s.value_or(WaitOptions{}.patience_s);
@@ -191,6 +191,9 @@ Json json_of(const SessionResult& result, const LoopLimits& limits, const Overru
   document["rows_dropped"] = result.log.rows_dropped;
   document["counts"] = json_of_counts(o.counts);
   document["link"] = json_of_counts(o.counts.link);
+  if (o.device_clock)
+    for_each_fact(*o.device_clock,
+                  [&](const char* name, auto value) { document["device_clock"][name] = value; });
   for_each_timing(o, [&](const char* name, const DurationHistogram& durations) {
     document["timing"][name] = histogram_json(durations);
   });
@@ -208,23 +211,31 @@ void print_link(const LoopOutcome& o) {
   if (o.counts.writes_failed > 0)
     troubles += (troubles.empty() ? "" : "; ") + std::to_string(o.counts.writes_failed) + " failed writes";
   if (troubles.empty()) return;
-  std::printf("Link: %s%s.\n", o.reason == StopReason::duration ? "went on after " : "", troubles.c_str());
+  std::printf("Link: %s%s.\n", o.reason == StopReason::duration ? "the run continued after " : "",
+              troubles.c_str());
+}
+
+void print_device_clock(const DeviceTiming& timing) {
+  std::printf("Clock: the device's; its period was %+.0f ppm off, %llu of %llu samples were lost.\n",
+              timing.drift_ppm, static_cast<unsigned long long>(timing.lost),
+              static_cast<unsigned long long>(timing.lost + timing.samples));
 }
 
 void print_timing(const SessionResult& result) {
   const LoopOutcome& o = result.outcome;
   const LoopCounts& c = o.counts;
-  std::printf("Timing: woke late by %.0f us (99.9 %%), %.0f us at worst; a cycle took %.0f us at worst.\n",
-              o.wake_late.quantile_us(0.999), o.wake_late.max_us(), o.cycle.max_us());
-  std::printf("How many periods (bars: logarithm of the count)\n");
-  for (const std::string& line : histogram_lines({{"woke late by", o.wake_late}, {"took", o.cycle}}))
+  std::printf(
+      "Timing: wake-ups late by %.0f us (99.9 %%), at most %.0f us; the longest cycle took %.0f us.\n",
+      o.wake_late.quantile_us(0.999), o.wake_late.max_us(), o.cycle.max_us());
+  std::printf("Histogram over the periods (bars: logarithm of the count)\n");
+  for (const std::string& line : histogram_lines({{"wake-up late by", o.wake_late}, {"cycle took", o.cycle}}))
     std::printf("%s\n", line.c_str());
-  std::printf("Overruns: %llu waking, %llu reading, %llu computing, %llu writing; %llu periods missed.\n",
-              static_cast<unsigned long long>(c.overruns_wake),
-              static_cast<unsigned long long>(c.overruns_read),
-              static_cast<unsigned long long>(c.overruns_compute),
-              static_cast<unsigned long long>(c.overruns_write), static_cast<unsigned long long>(c.missed));
-  std::printf("Scheduling: %s; %llu page faults while it ran.\n", result.scheduling.note.c_str(),
+  std::printf(
+      "Overruns: %llu on waking, %llu on reading, %llu on computing, %llu on writing; %llu periods missed.\n",
+      static_cast<unsigned long long>(c.overruns_wake), static_cast<unsigned long long>(c.overruns_read),
+      static_cast<unsigned long long>(c.overruns_compute), static_cast<unsigned long long>(c.overruns_write),
+      static_cast<unsigned long long>(c.missed));
+  std::printf("Scheduling: %s; %llu page faults during the run.\n", result.scheduling.note.c_str(),
               static_cast<unsigned long long>(c.page_faults));
 }
 
@@ -232,7 +243,7 @@ void print_summary(const SessionResult& result, const LoopLimits& limits, bool f
   const LoopOutcome& o = result.outcome;
   const LoopCounts& c = o.counts;
   if (o.reason == StopReason::duration)
-    std::printf("Stayed up for %.4g s.\n", o.time_s);
+    std::printf("Stayed upright for %.4g s.\n", o.time_s);
   else
     std::printf("%s after %.4g s: %s.\n",
                 o.reason == StopReason::fell ? "Fell"
@@ -241,7 +252,7 @@ void print_summary(const SessionResult& result, const LoopLimits& limits, bool f
                 o.time_s, sentence_of(o, limits, result.log).c_str());
   if (!o.stop.done()) std::printf("%s.\n", sentence_of(o.stop).c_str());
   std::printf(
-      "Worst angle %.3f deg, worst cart position %.1f mm, %llu of %llu periods at the voltage limit.\n",
+      "Largest angle %.3f deg, largest cart position %.1f mm, %llu of %llu periods at the voltage limit.\n",
       o.worst_theta_rad * degrees_per_rad, o.worst_cart_m * 1e3, static_cast<unsigned long long>(c.saturated),
       static_cast<unsigned long long>(c.periods));
   if (fast) {
@@ -250,8 +261,9 @@ void print_summary(const SessionResult& result, const LoopLimits& limits, bool f
     print_timing(result);
   }
   print_link(o);
+  if (o.device_clock) print_device_clock(*o.device_clock);
   if (result.log.rows_dropped > 0)
-    std::printf("Log: %llu rows were dropped, the disk was too slow.\n",
+    std::printf("Log: %llu rows were dropped because the disk was too slow.\n",
                 static_cast<unsigned long long>(result.log.rows_dropped));
   std::printf("%s\n", result.directory.c_str());
   std::fflush(stdout);
@@ -317,7 +329,7 @@ ExitCode run(const Arguments& arguments) {
   RunSetup setup = make_setup(arguments);
   const OverrunLimit overrun = overrun_limit(model_of(arguments, setup), setup.control);
   if (!arguments.force) require_stabilized(overrun);
-  if (!arguments.unchecked) require_checked_signs(setup.rig, ", or give --unchecked");
+  if (!arguments.unchecked) require_checked_signs(setup.rig, ", or add --unchecked");
   apply(overrun, setup.limits);
   if (!arguments.as_json)
     std::cout << delay_line(setup.control) << ".\nDelay margin: " << overrun.sentence << "." << std::endl;
@@ -335,7 +347,7 @@ ExitCode run(const Arguments& arguments) {
   if (!result.log.failure.empty()) std::cerr << "upright: " << result.log.failure << "\n";
   if (result.directory != result.made_at)
     std::cerr << "upright: " << result.made_at.string() << " was moved to " << result.directory.string()
-              << " while the run went on; no row is lost\n";
+              << " during the run; no row was lost\n";
   if (!result.outcome.stop.done()) {
     std::cerr << "upright: " << sentence_of(result.outcome.stop) << std::endl;
     return ExitCode::device;
@@ -349,33 +361,38 @@ ExitCode run(const Arguments& arguments) {
 
 void add_run(CommandLine& line) {
   const Command command = line.command(
-      "run", "Close the loop on a rig and log it",
+      "run", "Run the control loop on a rig and log it",
       "Example:  upright run --rig config/rigs/simulated.yaml --gains config/gains/exponential.yaml "
       "--duration 60 --theta0-deg 3 --fast\n"
       "The last line of the output is the run directory.");
   const auto a = std::make_shared<Arguments>();
   command.option("--rig", a->rig, "Rig file").required();
   command.option("--gains", a->gains, "Gain file").required();
-  command.option("--plant", a->plant,
-                 "Model of a real rig: its delay margin limits overruns, and gains must stabilize it");
-  command.option("--delay", a->delay_s, "Delay of the feedback [s], in place of the gain file's")
+  command.option(
+      "--plant", a->plant,
+      "Plant file of a real rig: the gains must stabilize it, and its delay margin limits overruns");
+  command.option("--delay", a->delay_s, "Delay of the feedback [s] (default: delay_s of the gain file)")
       .in(Range::within(0.0, DelayLine::longest_delay_s));
   constexpr double longest_run_s = 1e6;
-  command.option("--duration", a->duration_s, "How long to run [s] (10)").in({0.0, longest_run_s, true});
+  command.option("--duration", a->duration_s, "Duration of the run [s] (default: 10)")
+      .in({0.0, longest_run_s, true});
   command
       .option("--wait", a->wait_s,
-              "How long to wait at zero volts for the pendulum to be lifted upright [s], real rigs (30)")
+              "Real rigs only: how long to wait at zero volts for the pendulum to be lifted upright [s] "
+              "(default: 30)")
       .in(Range::within(0.0, 86400.0));
-  command.option("--theta0-deg", a->theta0_deg, "Initial angle [degree], simulated rigs only")
+  command
+      .option("--theta0-deg", a->theta0_deg,
+              "Simulated rigs only: initial angle [degree], 0 is upright (default: that of the rig file)")
       .in(Range::within(-180.0, 180.0));
   add_simulated(command, a->seed, a->fast);
-  command.option("--out", a->out, "The folder that the run directory is made in (runs)");
-  command.option("--label", a->label, "End of the run directory's name (run)");
+  command.option("--out", a->out, "Folder in which the run directory is created (default: runs)");
+  command.option("--label", a->label, "Last part of the name of the run directory (default: run)");
   add_realtime(command, a->realtime);
   add_live(command, a->live_port);
-  command.flag("--unchecked", a->unchecked, "Run a real rig whose signs were not checked");
-  command.flag("--force", a->force, "Run gains that do not stabilize the plant");
-  command.flag("--json", a->as_json, "One JSON document");
+  command.flag("--unchecked", a->unchecked, "Run a real rig without a sign check");
+  command.flag("--force", a->force, "Run even if the gains do not stabilize the plant");
+  command.flag("--json", a->as_json, "Print one JSON document");
   command.does([a] { return run(*a); });
 }
 

@@ -31,7 +31,7 @@ pthread_t main_thread;
 constexpr int computing_signals[] = {SIGINT, SIGTERM};
 
 void end_at_once(int /*number*/) {
-  constexpr char sentence[] = "upright: interrupted before there was an answer: start the command again\n";
+  constexpr char sentence[] = "upright: interrupted before the first result: start the command again\n";
   const ssize_t ignored = write(STDERR_FILENO, sentence, sizeof sentence - 1);
   static_cast<void>(ignored);
   _exit(static_cast<int>(ExitCode::stopped));

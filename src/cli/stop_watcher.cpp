@@ -12,8 +12,9 @@ StopWatcher stop_watcher(LiveView* view) {
   watcher.end_requests = end_requests;
   watcher.trying = [view](const StopReport& report, double left_s) {
     const std::string text = "zero volts is not confirmed yet (" + reason_of(report) + ")";
-    std::fprintf(stderr, "upright: %s: it is tried for %.0f s more, or until Ctrl-C\n", text.c_str(), left_s);
-    if (view != nullptr) view->say({LiveState::Kind::stopped, text + ": it is being tried"});
+    std::fprintf(stderr, "upright: %s: upright tries again for %.0f s, or until Ctrl-C\n", text.c_str(),
+                 left_s);
+    if (view != nullptr) view->say({LiveState::Kind::stopped, text + ": upright tries again"});
   };
   return watcher;
 }

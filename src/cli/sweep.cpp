@@ -80,7 +80,7 @@ void print(const SweepResult& result, const std::string& folder) {
   for (const Transition& t : result.transitions)
     std::printf("%12.4f   %20s   %15s\n", t.theta0_rad * 57.29577951308232,
                 milliseconds(t.oscillates_from_s).c_str(), milliseconds(t.falls_from_s).c_str());
-  std::printf("%zu runs made, results in %s\n", result.runs_made, folder.c_str());
+  std::printf("%zu runs simulated, results in %s\n", result.runs_made, folder.c_str());
   std::fflush(stdout);
 }
 
@@ -110,8 +110,8 @@ ExitCode run_here(const SweepArguments& arguments, const MpiExecutor& ranks) {
     print(result, folder);
   if (!result.interrupted) return ExitCode::done;
   throw Error(ExitCode::stopped, "the sweep was stopped after " + std::to_string(result.runs_made) +
-                                     " runs, kept in " + folder +
-                                     ": give the same command again, it goes on from there");
+                                     " runs, which are kept in " + folder +
+                                     ": start the same command again to continue");
 }
 
 /// On the ranks other than the first: it is the first that speaks, of errors too.
@@ -134,18 +134,18 @@ ExitCode run(const SweepArguments& arguments) {
 
 void add_sweep(CommandLine& line) {
   const Command command = line.command(
-      "sweep", "Outcomes over starting angle and delay",
+      "sweep", "Simulate a grid of starting angles and delays: stable, oscillating or fallen",
       "Example:  upright sweep config/sweeps/exponential.yaml --out runs/map && upright report runs/map\n"
-      "Stopped with Ctrl-C it keeps what is done; the same command goes on from there.");
+      "Ctrl-C stops the sweep and keeps the finished runs. The same command continues it.");
   const auto arguments = std::make_shared<SweepArguments>();
   command.option("sweep", arguments->file, "Sweep file").required();
-  command.option("--out", arguments->out, "Folder for the results; runs/sweep-NAME when not given");
-  command.option("--threads", arguments->threads, "Threads; one per processor when not given")
+  command.option("--out", arguments->out, "Folder for the results (default: runs/sweep-NAME)");
+  command.option("--threads", arguments->threads, "Number of threads (default: one per processor)")
       .from_to(1u, 1024u);
   command.flag("--transitions-only", arguments->transitions_only,
-               "Search the delays at which the outcome changes, without the whole grid");
-  command.flag("--overwrite", arguments->overwrite, "Replace the results that are in the folder");
-  command.flag("--json", arguments->as_json, "One JSON document");
+               "Search only for the delays at which the outcome changes, without the whole grid");
+  command.flag("--overwrite", arguments->overwrite, "Replace existing results in the folder");
+  command.flag("--json", arguments->as_json, "Print one JSON document");
   command.does([arguments] { return run(*arguments); });
 }
 

@@ -41,30 +41,30 @@ void take_address(const std::string& text, VirtualRigOptions& options) {
   options.tcp_port = digits ? std::stoi(port) : -1;
   if (options.tcp_port < 0 || options.tcp_port > 65535)
     throw ConfigError("'" + text +
-                      "' has no port from 0 to 65535: give --tcp HOST:PORT, with port 0 for a free one");
+                      "' has no port from 0 to 65535: use --tcp HOST:PORT, with port 0 for any free port");
 }
 
 /// Modbus asks nobody who he is: whoever reaches the port moves the rig.
 void say_listening(const std::string& name, bool everybody) {
   std::cout << "listening on " << name << std::endl;
   if (everybody)
-    std::cerr << "upright: whoever reaches " << name
-              << " can drive this rig: give --tcp 127.0.0.1:PORT unless other machines are meant to"
-              << std::endl;
+    std::cerr << "upright: warning: every machine that reaches " << name
+              << " can drive this rig: use --tcp 127.0.0.1:PORT for this machine only" << std::endl;
 }
 
 Plant plant_for(const Flags& flags, const RigFile& rig) {
   if (!flags.plant.empty()) return read_plant_file(flags.plant);
   if (rig.simulated) return read_plant_file(rig.simulated->plant);
   throw ConfigError(rig.file.string() +
-                    ":1: simulated.plant is missing: give --plant, or add a simulated section with a plant");
+                    ":1: simulated.plant is missing: name a plant file with --plant, or add a simulated "
+                    "section with a plant");
 }
 
 void serve(const Flags& flags) {
   const RigFile rig = read_rig_file(flags.rig);
   VirtualRigOptions options;
   if (flags.tcp.empty() == flags.rtu.empty())
-    throw ConfigError("virtual-rig serves one link: give either --tcp HOST:PORT or --rtu TTY");
+    throw ConfigError("virtual-rig serves exactly one link: use either --tcp HOST:PORT or --rtu TTY");
   if (!flags.tcp.empty()) take_address(flags.tcp, options);
   options.serial_line = flags.rtu;
   options.pace = !flags.no_pace;
@@ -92,49 +92,58 @@ void serve(const Flags& flags) {
 void add_virtual_rig(CommandLine& line) {
   auto flags = std::make_shared<Flags>();
   const Command command = line.command(
-      "virtual-rig", "Serve a plant in real time behind a Modbus server",
+      "virtual-rig", "Simulate a rig in real time behind a Modbus server",
       "Example: upright virtual-rig --rig config/rigs/modbus-tcp.yaml --tcp 127.0.0.1:1502 --theta0-deg 3\n"
-      "prints 'listening on 127.0.0.1:1502' and serves until interrupted. The pendulum is held until the\n"
-      "controller takes over. Faults are injected into replies from then on.");
+      "It prints 'listening on 127.0.0.1:1502' and serves until it is interrupted. The pendulum is held\n"
+      "until the controller takes over; from then on the --inject options take effect.");
   command.option("--rig", flags->rig, "Rig file with the register map").required();
   command.option(
       "--tcp", flags->tcp,
-      "HOST:PORT to listen on; without HOST this machine only (127.0.0.1); port 0 takes a free one");
-  command.option("--rtu", flags->rtu, "Serial line; where nothing exists, a pseudo-terminal gets this name");
-  command.option("--theta0-deg", flags->theta0_deg, "Initial angle, 0 upright").from_to(-360.0, 360.0);
+      "HOST:PORT to listen on (default HOST: 127.0.0.1, this machine only); port 0 takes any free port");
+  command.option("--rtu", flags->rtu,
+                 "Serial line; if the path does not exist, a pseudo-terminal is created there");
   command
-      .option("--hang", flags->hang_s,
-              "The pendulum hangs for so many seconds from the first request on, then it is lifted")
+      .option("--theta0-deg", flags->theta0_deg,
+              "Initial angle [degree], 0 is upright (default: that of the rig file)")
+      .from_to(-360.0, 360.0);
+  command
+      .option(
+          "--hang", flags->hang_s,
+          "Time after the first request for which the pendulum hangs before it is lifted [s] (default: 0)")
       .from_to(0.0, 1e6);
-  command.option("--plant", flags->plant, "Plant file, in place of the rig file's");
-  command.option("--trace", flags->trace, "CSV of the plant's side: time, voltage, position, angle");
-  command.option("--duration", flags->duration_s, "Seconds to serve; 0 until interrupted").from_to(0.0, 1e6);
-  command.flag("--no-pace", flags->no_pace, "Do not slow a pseudo-terminal down to its baud rate");
+  command.option("--plant", flags->plant, "Plant file (default: that of the rig file)");
+  command.option("--trace", flags->trace,
+                 "CSV file to write: time, voltage, position and angle of the plant");
+  command.option("--duration", flags->duration_s, "How long to serve [s] (default: 0, until interrupted)")
+      .from_to(0.0, 1e6);
+  command.flag("--no-pace", flags->no_pace, "Do not limit a pseudo-terminal to its baud rate");
   constexpr int most_replies = 1'000'000'000;
   command.option("--inject-seed", flags->faults.seed, "Seed of the injected faults");
-  command.option("--inject-late-ms", flags->late_ms, "How late a late reply is").from_to(0.0, 1e5);
-  command.option("--inject-late-every", flags->faults.late_every, "One reply in N is late")
+  command.option("--inject-late-ms", flags->late_ms, "Delay of a late reply [ms]").from_to(0.0, 1e5);
+  command.option("--inject-late-every", flags->faults.late_every, "Delay one reply in N")
       .from_to(0, most_replies);
-  command.option("--inject-drop-every", flags->faults.drop_every, "One reply in N is dropped")
+  command.option("--inject-drop-every", flags->faults.drop_every, "Drop one reply in N")
       .from_to(0, most_replies);
-  command.option("--inject-corrupt-every", flags->faults.corrupt_every, "One reply in N has a wrong bit")
-      .from_to(0, most_replies);
-  command.option("--inject-stale-every", flags->faults.stale_every, "One reply in N is the one before")
+  command.option("--inject-corrupt-every", flags->faults.corrupt_every, "Flip one bit in one reply in N")
       .from_to(0, most_replies);
   command
-      .option("--inject-reorder-every", flags->faults.reorder_every, "One reply in N leaves after the next")
+      .option("--inject-stale-every", flags->faults.stale_every,
+              "Repeat the previous reply instead of one reply in N")
+      .from_to(0, most_replies);
+  command
+      .option("--inject-reorder-every", flags->faults.reorder_every, "Send one reply in N after the next one")
       .from_to(0, most_replies);
   const auto once = [&command](const char* name, double& after_s, const std::string& what) {
-    command.option(name, after_s, what + " once, this many seconds after the controller took over")
+    command.option(name, after_s, what + " once, this many seconds after the controller takes over")
         .from_to(0.0, 1e6);
   };
   once("--inject-restart-after", flags->faults.restart_after_s, "Restart the device");
   once("--inject-cut-after", flags->faults.cut_after_s, "Cut the link");
-  once("--inject-stick-after", flags->faults.stick_after_s, "Stop an encoder");
-  once("--inject-jump-after", flags->faults.jump_after_s, "Let the cart's counts jump");
-  command.option("--inject-stick", flags->stuck_encoder, "Which encoder stops (cart)")
+  once("--inject-stick-after", flags->faults.stick_after_s, "Freeze an encoder");
+  once("--inject-jump-after", flags->faults.jump_after_s, "Make the cart's counts jump");
+  command.option("--inject-stick", flags->stuck_encoder, "Encoder that freezes (default: cart)")
       .one_of({"cart", "pendulum"});
-  command.option("--inject-jump-counts", flags->faults.jump_counts, "How far the cart's counts jump");
+  command.option("--inject-jump-counts", flags->faults.jump_counts, "Size of the jump [counts]");
   command.does([flags] {
     serve(*flags);
     return ExitCode::done;

@@ -25,22 +25,22 @@ std::string brief(double value) {
 
 /// What a rig of this kind has, from a finger's length to an industrial stage: wide enough for any that
 /// somebody builds, and a mistaken unit (grams, millimetres, degrees) falls outside.
-struct Believable {
+struct PlausibleRange {
   const char* key;
   double low, high;
   const char* unit;
 };
-constexpr Believable cart_mass{"cart_mass_kg", 0.02, 500.0, "kg"};
-constexpr Believable pendulum_mass{"pendulum.mass_kg", 0.001, 200.0, "kg"};
-constexpr Believable pendulum_length{"pendulum.length_to_com_m", 0.01, 5.0, "m"};
-constexpr Believable gravity{"gravity_mps2", 9.7, 9.9, "m/s2"};  // on Earth 9.764 to 9.834
-constexpr Believable track_limit{"track.limit_m", 0.02, 20.0, "m"};
+constexpr PlausibleRange cart_mass{"cart_mass_kg", 0.02, 500.0, "kg"};
+constexpr PlausibleRange pendulum_mass{"pendulum.mass_kg", 0.001, 200.0, "kg"};
+constexpr PlausibleRange pendulum_length{"pendulum.length_to_com_m", 0.01, 5.0, "m"};
+constexpr PlausibleRange gravity{"gravity_mps2", 9.7, 9.9, "m/s2"};  // on Earth 9.764 to 9.834
+constexpr PlausibleRange track_limit{"track.limit_m", 0.02, 20.0, "m"};
 
-void doubt(Sentences& doubts, const Believable& range, double value) {
+void doubt(Sentences& doubts, const PlausibleRange& range, double value) {
   if (value >= range.low && value <= range.high) return;
-  doubts.push_back(std::string(range.key) + " is " + brief(value) + " " + range.unit + ", and " +
-                   brief(range.low) + " to " + brief(range.high) + " " + range.unit +
-                   " is usual: check the value and its unit");
+  doubts.push_back(std::string(range.key) + " is " + brief(value) + " " + range.unit +
+                   ", outside the usual range of " + brief(range.low) + " to " + brief(range.high) + " " +
+                   range.unit + ": check the value and its unit");
 }
 
 /// A lost reply or two are ordinary: a watchdog that is shorter ends runs that nothing is wrong with.
@@ -50,14 +50,14 @@ void compare_watchdogs(const RigFile& rig, const ControlConfig& control, Sentenc
   const double period_s = control.period_s();
   const auto compare = [&](const char* key, double time_s, const char* consequence) {
     if (time_s >= fewest_periods_of_a_watchdog * period_s) return;
-    warnings.push_back(std::string(key) + " is " + brief(time_s) + " s, and a period is " + brief(period_s) +
-                       " s: " + consequence + "; give it " + brief(fewest_periods_of_a_watchdog) +
-                       " periods at least, or raise sample_rate_hz");
+    warnings.push_back(std::string(key) + " is " + brief(time_s) + " s, but a period is " + brief(period_s) +
+                       " s, so " + consequence + ": set it to at least " +
+                       brief(fewest_periods_of_a_watchdog) + " periods, or raise sample_rate_hz");
   };
   compare("watchdog_s", rig.watchdog_s, "one lost reply ends the run");
   if (rig.modbus && !is_simulated(rig) && rig.modbus->watchdog)
     compare("modbus.device_watchdog.time_s", rig.modbus->watchdog->time_s,
-            "the device takes the voltage away between two of them");
+            "the device may switch the voltage off between two requests");
 }
 
 /// An amplifier or a track that does not go with this plant.
@@ -67,14 +67,15 @@ void compare_rig_and_plant(const RigFile& rig, const Plant& plant, Sentences& wa
   const double mass_kg = plant.cart_mass_kg + (plant.pendulum ? plant.pendulum->mass_kg : 0.0);
   const double most_mps2 = rig.amplifier.limit_v * std::abs(plant.motor.force_per_volt_n) / mass_kg;
   if (most_mps2 < slowest_mps2 || most_mps2 > fastest_mps2)
-    warnings.push_back("the amplifier's limit accelerates the cart by " + brief(most_mps2) +
-                       " m/s2: check amplifier.limit_v, force_per_volt_n and the masses, and their units");
+    warnings.push_back("at the amplifier's limit the cart accelerates at " + brief(most_mps2) +
+                       " m/s2, which is implausible: check amplifier.limit_v, force_per_volt_n, the masses, "
+                       "and their units");
   if (!plant.pendulum) return;
   // A cart that catches a fall of a few degrees moves by about a tenth of the pendulum's length.
   constexpr double least_share_of_length = 0.1;
   if (rig.track_limit_m < least_share_of_length * plant.pendulum->length_to_com_m)
-    warnings.push_back("track.limit_m is " + brief(rig.track_limit_m) + " m, little for a pendulum of " +
-                       brief(plant.pendulum->length_to_com_m) +
+    warnings.push_back("track.limit_m is " + brief(rig.track_limit_m) +
+                       " m, which is short for a pendulum of " + brief(plant.pendulum->length_to_com_m) +
                        " m to its centre of mass: check both values and their units");
 }
 
@@ -107,13 +108,13 @@ Sentences doubts_about(const RigFile& rig) {
   if (rig.fall_angle_rad > 0.5 * std::numbers::pi)
     doubts.push_back(
         "fall_angle_rad is " + brief(rig.fall_angle_rad) +
-        " rad, beyond horizontal: give the angle from which nothing catches the pendulum any more");
+        " rad, which is beyond horizontal: set the angle at which the pendulum can no longer be caught");
   // A coarser encoder shows a balancing cart's motion in a few steps, and its velocity not at all.
   constexpr double fewest_counts_on_the_track = 100.0;
   if (rig.track_limit_m < fewest_counts_on_the_track * std::abs(rig.calibration.cart.per_count))
     doubts.push_back("calibration.cart.m_per_count is " + brief(rig.calibration.cart.per_count) +
-                     " m, fewer than " + brief(fewest_counts_on_the_track) +
-                     " counts to track.limit_m: check both values and their units");
+                     " m, which gives fewer than " + brief(fewest_counts_on_the_track) +
+                     " counts up to track.limit_m: check both values and their units");
   return doubts;
 }
 
@@ -131,18 +132,19 @@ Sentences doubts_about(const ControlConfig& control) {
     zeros += value == 0.0 ? 1 : 0;
     if (value < 0.0) negative += (negative.empty() ? "" : ", ") + std::string(name);
   }
-  if (zeros == 4) doubts.emplace_back("all four gains are 0: nothing balances");
+  if (zeros == 4)
+    doubts.emplace_back("all four gains are 0, so the controller does nothing: enter the designed gains");
   if (!negative.empty())
     doubts.push_back(
         negative +
-        " below 0: with V = gains . state, voltage toward +x and theta_rad growing toward +x, gains "
-        "that balance are above 0; reverse the sign, or check the convention they were designed in");
+        " below 0: with V = gains . state, voltage and theta_rad positive toward +x, gains that balance are "
+        "positive; reverse the sign, or check the sign convention of the design");
   const double nyquist_hz = 0.5 * control.sample_rate_hz;
   if (control.estimator.kind == EstimatorKind::second_order_filter &&
       control.estimator.cutoff_hz > nyquist_hz)
     doubts.push_back("velocity_estimator.cutoff_hz is " + brief(control.estimator.cutoff_hz) +
                      " Hz, above half the sample rate (" + brief(nyquist_hz) +
-                     " Hz), so that the filter smooths nothing: lower it, or raise sample_rate_hz");
+                     " Hz), so the filter has no effect: lower it, or raise sample_rate_hz");
   return doubts;
 }
 

@@ -1,4 +1,4 @@
-// Whether files that are right each by itself are right together: what `upright check` says beyond the
+// Consistency between files that are valid individually: the checks of `upright check` beyond the
 // syntax.
 #pragma once
 
@@ -12,23 +12,23 @@
 
 namespace upright {
 
-/// The files of one run, as far as they are known.
+/// The files of one run, as far as they are given.
 struct RunFiles {
   std::optional<RigFile> rig;
   std::optional<ControlConfig> control;
-  std::optional<Plant> plant;  ///< the model that was given, or the simulated rig's own
+  std::optional<Plant> plant;  ///< the given model, or the plant of the simulated rig
 };
 
-/// A sentence each, cause first.
+/// Sentences, cause first.
 struct Agreement {
   std::vector<std::string> errors;    ///< `run` refuses these files together
-  std::vector<std::string> warnings;  ///< `run` takes them, and somebody should look at them
+  std::vector<std::string> warnings;  ///< `run` accepts them, but they should be checked
 };
 
-/// What is wrong between the files, and what is hard to believe of each.
+/// Inconsistencies between the files, and implausible values in each.
 Agreement agreement_of(const RunFiles& files);
 
-/// Values that are possible and hard to believe: mistakes of a unit or a sign, most often.
+/// Values that are possible but implausible, most often because of a wrong unit or sign.
 std::vector<std::string> doubts_about(const Plant& plant);
 std::vector<std::string> doubts_about(const RigFile& rig);
 std::vector<std::string> doubts_about(const ControlConfig& control);

@@ -1,4 +1,4 @@
-// One line of an examination: what was found, what that means, and what to do about it.
+// One result of an examination: the observation, its severity and the remedy.
 #pragma once
 
 #include <cstdint>
@@ -9,9 +9,9 @@ namespace upright {
 
 enum class Health : std::uint8_t {
   good,
-  not_examined,  ///< nothing was found out; the remedy says how it would be
-  poor,          ///< a rig runs, less well than it could
-  bad,           ///< do not run a rig like this
+  not_examined,  ///< no result; the remedy says how to examine it
+  poor,          ///< the rig runs, with reduced performance
+  bad,           ///< do not run the rig
 };
 
 /// "good", "not examined", "poor", "bad".
@@ -21,10 +21,10 @@ struct Finding {
   std::string subject;  ///< "kernel", "link", ...
   Health health = Health::good;
   std::string what;
-  std::string remedy;  ///< empty: nothing to do
+  std::string remedy;  ///< empty: no action is required
 };
 
-/// The worst of all; good when there are none. What was not examined makes nothing worse.
+/// The worst of all; good when there are none. Findings that were not examined are ignored.
 Health verdict_of(const std::vector<Finding>& findings) noexcept;
 
 }  // namespace upright

@@ -33,14 +33,14 @@ Finding kernel(const fs::path& root) {
   if (preemptible) return {"kernel", Health::good, "PREEMPT_RT, " + release, ""};
   return {
       "kernel", Health::poor, release + " without PREEMPT_RT",
-      "install linux-image-rt-amd64 and boot it: wake-ups then stay within tens of microseconds under load"};
+      "install and boot linux-image-rt-amd64, which wakes the loop within tens of microseconds under load"};
 }
 
 Finding isolation(const fs::path& root) {
   const std::string isolated = first_line(root / "sys/devices/system/cpu/isolated");
   if (!isolated.empty()) return {"processors", Health::good, "isolated: " + isolated, ""};
   return {"processors", Health::poor, "none is isolated",
-          "boot with isolcpus=managed_irq,domain,N for the last processor N, which the loop takes"};
+          "boot with isolcpus=managed_irq,domain,N, where N is the last processor, which the loop uses"};
 }
 
 /// The speed governors in use, each once.
@@ -57,10 +57,9 @@ std::string governors(const fs::path& root) {
 
 Finding speed(const fs::path& root) {
   const std::string found = governors(root);
-  if (found.empty())
-    return {"governor", Health::good, "the kernel does not change the processors' speed", ""};
+  if (found.empty()) return {"governor", Health::good, "the kernel does not change the processor speed", ""};
   if (found == "performance") return {"governor", Health::good, found, ""};
-  return {"governor", Health::poor, found, "cpupower frequency-set --governor performance"};
+  return {"governor", Health::poor, found, "run cpupower frequency-set --governor performance"};
 }
 
 Finding sleep_states(const fs::path& root) {
@@ -69,10 +68,11 @@ Finding sleep_states(const fs::path& root) {
     return {"sleep states", Health::good, "kept shallow during a run", ""};
   std::error_code none;
   if (!fs::exists(root / "sys/devices/system/cpu/cpu0/cpuidle/state1", none))
-    return {"sleep states", Health::good, "the kernel knows no deep ones", ""};
-  return {
-      "sleep states", Health::poor, device.string() + " cannot be written: processors may sleep deeply",
-      "let your group write it: a udev rule KERNEL==\"cpu_dma_latency\", GROUP=\"upright\", MODE=\"0660\""};
+    return {"sleep states", Health::good, "this kernel uses no deep ones", ""};
+  return {"sleep states", Health::poor,
+          device.string() + " cannot be written, so processors may enter deep sleep states",
+          "give your group write access with the udev rule KERNEL==\"cpu_dma_latency\", GROUP=\"upright\", "
+          "MODE=\"0660\""};
 }
 
 std::string amount(rlim_t limit) {
@@ -87,8 +87,7 @@ Finding priority_limit() {
   if (limit.rlim_cur >= wanted) return {"rtprio", Health::good, amount(limit.rlim_cur), ""};
   return {"rtprio", Health::poor, "limited to " + amount(limit.rlim_cur),
           "join the group upright (groupadd --system upright; usermod --append --groups upright USER), put "
-          "'@upright - "
-          "rtprio 90' into /etc/security/limits.d/upright.conf and log in again"};
+          "'@upright - rtprio 90' into /etc/security/limits.d/upright.conf, and log in again"};
 }
 
 Finding memory_limit() {
@@ -98,8 +97,7 @@ Finding memory_limit() {
   if (limit.rlim_cur == RLIM_INFINITY) return {"memlock", Health::good, "unlimited", ""};
   return {"memlock", Health::poor, "limited to " + amount(limit.rlim_cur) + " bytes",
           "join the group upright (groupadd --system upright; usermod --append --groups upright USER), put "
-          "'@upright - "
-          "memlock unlimited' into /etc/security/limits.d/upright.conf and log in again"};
+          "'@upright - memlock unlimited' into /etc/security/limits.d/upright.conf, and log in again"};
 }
 
 /// Whether a list of processors as the kernel writes it, "0,2-5", has this one.
@@ -124,9 +122,9 @@ std::string boot_option(const fs::path& root, const std::string& key) {
 Finding tick(const fs::path& root, int cpu) {
   const std::string number = std::to_string(cpu);
   if (lists(first_line(root / "sys/devices/system/cpu/nohz_full"), cpu))
-    return {"timer tick", Health::good, "off on processor " + number + " while the loop has it alone", ""};
+    return {"timer tick", Health::good, "off on processor " + number + " while only the loop runs there", ""};
   return {"timer tick", Health::poor,
-          "processor " + number + " keeps it: some hundred interrupts per second beside the loop's own",
+          "processor " + number + " has it: several hundred interrupts per second besides those of the loop",
           "boot with nohz_full=" + number};
 }
 
@@ -135,9 +133,8 @@ Finding rcu_callbacks(const fs::path& root, int cpu) {
   // The kernel takes the processors of nohz_full into it by itself.
   if (lists(boot_option(root, "rcu_nocbs"), cpu) ||
       lists(first_line(root / "sys/devices/system/cpu/nohz_full"), cpu))
-    return {"RCU callbacks", Health::good, "done elsewhere than on processor " + number, ""};
-  return {"RCU callbacks", Health::poor,
-          "processor " + number + " does the kernel's deferred freeing, at moments that nobody chooses",
+    return {"RCU callbacks", Health::good, "not run on processor " + number, ""};
+  return {"RCU callbacks", Health::poor, "processor " + number + " runs them, at unpredictable times",
           "boot with rcu_nocbs=" + number};
 }
 
@@ -153,15 +150,17 @@ Finding interrupts(const fs::path& root, int cpu) {
     if (lists(served, cpu)) here.push_back(entry.path().filename().string());
   }
   const std::string number = std::to_string(cpu);
-  if (all == 0) return {"interrupts", Health::not_examined, "the kernel does not say who serves them", ""};
-  if (here.empty()) return {"interrupts", Health::good, "none is served by processor " + number, ""};
+  if (all == 0)
+    return {"interrupts", Health::not_examined, "the kernel does not report which processors handle them",
+            ""};
+  if (here.empty()) return {"interrupts", Health::good, "processor " + number + " handles none", ""};
   std::sort(here.begin(), here.end());
   return {"interrupts", Health::poor,
-          std::to_string(here.size()) + " of " + std::to_string(all) + " may be served by processor " +
-              number + ", each before the loop",
+          std::to_string(here.size()) + " of " + std::to_string(all) + " may be handled by processor " +
+              number + " and then delay the loop",
           "boot with isolcpus=managed_irq,domain," + number +
-              ", stop irqbalance, and write another processor's number into /proc/irq/" + here.front() +
-              "/smp_affinity_list and the others'"};
+              ", stop irqbalance, and write the number of another processor into /proc/irq/" + here.front() +
+              "/smp_affinity_list and those of the other interrupts"};
 }
 
 /// The kernel takes real-time threads off their processor once they have used this share of a second.
@@ -171,30 +170,33 @@ Finding throttling(const fs::path& root) {
   const std::string runtime = first_line(root / "proc/sys/kernel/sched_rt_runtime_us");
   const std::string period = first_line(root / "proc/sys/kernel/sched_rt_period_us");
   if (runtime.empty() || period.empty())
-    return {"throttling", Health::not_examined, "the kernel does not say how it limits real-time threads",
+    return {"throttling", Health::not_examined, "the kernel does not report its limit on real-time threads",
             ""};
   const double runtime_us = std::strtod(runtime.c_str(), nullptr),
                period_us = std::strtod(period.c_str(), nullptr);
   if (runtime_us < 0.0)
-    return {"throttling", Health::good, "off: a real-time thread that goes astray keeps its processor", ""};
+    return {"throttling", Health::good, "off: a real-time thread in an endless loop blocks its processor",
+            ""};
   const double share = period_us > 0.0 ? runtime_us / period_us : 0.0;
   const std::string what =
       "real-time threads get at most " + std::to_string(std::lround(100 * share)) + " % of each second";
-  if (share >= enough_share) return {"throttling", Health::good, what + ", more than the loop takes", ""};
-  return {"throttling", Health::poor, what + ": the loop may be stopped for the rest",
-          "sysctl kernel.sched_rt_runtime_us=950000 (of kernel.sched_rt_period_us=1000000)"};
+  if (share >= enough_share)
+    return {"throttling", Health::good, what + ", which is more than the loop needs", ""};
+  return {"throttling", Health::poor, what + ", so the loop may be paused for the rest",
+          "run sysctl kernel.sched_rt_runtime_us=950000 (with kernel.sched_rt_period_us=1000000)"};
 }
 
 Finding siblings(const fs::path& root, int cpu) {
   const std::string number = std::to_string(cpu);
   const std::string core =
       first_line(root / ("sys/devices/system/cpu/cpu" + number + "/topology/thread_siblings_list"));
-  if (core.empty()) return {"core", Health::not_examined, "the kernel does not say who shares it", ""};
+  if (core.empty())
+    return {"core", Health::not_examined, "the kernel does not report which processors share it", ""};
   if (core.find_first_of(",-") == std::string::npos)
-    return {"core", Health::good, "processor " + number + " has one of its own", ""};
+    return {"core", Health::good, "processor " + number + " has its own core", ""};
   return {"core", Health::poor,
-          "shared by the processors " + core + " (SMT): what runs on the other slows the loop on " + number,
-          "boot with nosmt, or write 0 into /sys/devices/system/cpu/cpuN/online for the other one"};
+          "shared by processors " + core + " (SMT): work on the other one slows the loop on " + number,
+          "boot with nosmt, or write 0 into /sys/devices/system/cpu/cpuN/online of the other processor N"};
 }
 
 /// USB converters that wait for more bytes before they pass on what came: FTDI's for 16 ms as delivered.
@@ -210,11 +212,12 @@ Finding usb_latency(const fs::path& root) {
     if (std::atoi(timer.c_str()) <= shortest_ms) continue;
     slow += (slow.empty() ? "" : ", ") + entry.path().filename().string() + " " + timer + " ms";
   }
-  if (timers == 0) return {"USB converters", Health::good, "none with a latency timer", ""};
-  if (slow.empty()) return {"USB converters", Health::good, "latency timers of 1 ms", ""};
-  return {"USB converters", Health::poor, "replies may wait in the converter: " + slow,
-          "echo 1 | sudo tee /sys/bus/usb-serial/devices/ttyUSB0/latency_timer; for good by a udev rule: "
-          "ACTION==\"add\", SUBSYSTEM==\"usb-serial\", DRIVER==\"ftdi_sio\", ATTR{latency_timer}=\"1\""};
+  if (timers == 0) return {"USB converters", Health::good, "none has a latency timer", ""};
+  if (slow.empty()) return {"USB converters", Health::good, "their latency timers are 1 ms", ""};
+  return {
+      "USB converters", Health::poor, "replies may be delayed by the converter's latency timer: " + slow,
+      "run echo 1 | sudo tee /sys/bus/usb-serial/devices/ttyUSB0/latency_timer; permanently with the udev "
+      "rule ACTION==\"add\", SUBSYSTEM==\"usb-serial\", DRIVER==\"ftdi_sio\", ATTR{latency_timer}=\"1\""};
 }
 
 /// The processor that the loop would stay on: the last one, as enter_realtime chooses.

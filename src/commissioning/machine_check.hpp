@@ -1,4 +1,4 @@
-// What this machine offers a real-time loop: kernel, processors, limits, and whether SCHED_FIFO is really
+// Suitability of this machine for a real-time loop: kernel, processors, limits, and whether SCHED_FIFO is
 // granted.
 #pragma once
 
@@ -10,10 +10,10 @@
 
 namespace upright {
 
-/// Where the kernel's files are: "/" but in tests.
+/// Root of the kernel's files: "/" except in tests.
 std::vector<Finding> examine_machine(const std::filesystem::path& root = "/");
 
-/// Judges what a thread was granted that asked for it.
+/// Rates the real-time settings that a thread was granted.
 std::vector<Finding> examine_grant(const RealtimeGrant& grant);
 
 }  // namespace upright

@@ -40,20 +40,19 @@ SignFinding judge_signs(const std::vector<LogRecord>& rows, bool has_pendulum) {
     if (std::abs(pulse.lean_rad) > felt_rad) ++(pulse.lean_rad * pulse.cart_m > 0.0 ? lag : lead);
   }
   if (cart_with + cart_against < 2)
-    return {false, "the cart hardly moved: check amplifier, cable and largest_v"};
+    return {false, "the cart hardly moved: check the amplifier, its cable and largest_v"};
   if (cart_with > 0 && cart_against > 0)
-    return {false, "the cart moved both ways under the same voltage: check the cart's encoder"};
+    return {false, "the cart moved in both directions under the same voltage: check the cart encoder"};
   if (cart_against > 0)
     return {false,
-            "positive voltage moved the cart toward -x: turn amplifier.sign, or calibration.cart.sign where "
-            "+x is "
-            "the other side"};
+            "positive voltage moved the cart toward -x: reverse amplifier.sign, or calibration.cart.sign if "
+            "+x is the other direction"};
   if (has_pendulum && lag + lead < 2)
-    return {false, "the pendulum hardly moved when the cart did: check its encoder"};
+    return {false, "the pendulum hardly moved when the cart did: check the pendulum encoder"};
   if (has_pendulum && lag > 0 && lead > 0)
-    return {false, "the pendulum swung on its own: let it hang still and repeat the check"};
+    return {false, "the pendulum was already swinging: let it hang still and repeat the check"};
   if (has_pendulum && lead > 0)
-    return {false, "the pendulum leaned ahead of the cart: turn calibration.pendulum.sign"};
+    return {false, "the pendulum leaned ahead of the cart: reverse calibration.pendulum.sign"};
   return {true, "positive voltage moves the cart toward +x" +
                     std::string(has_pendulum ? ", and the hanging pendulum lags behind it" : "")};
 }

@@ -1,5 +1,5 @@
-// Do signs and directions agree on a rig? Low pulses tell: positive voltage must make cart_m grow, and a
-// hanging pendulum lags behind the cart. The answer is kept beside the rig file (sign_record.hpp).
+// Checks the signs of a rig with low voltage pulses: positive voltage must increase cart_m, and a hanging
+// pendulum lags behind the cart. The result is stored beside the rig file (sign_record.hpp).
 #pragma once
 
 #include <string>
@@ -11,10 +11,10 @@ namespace upright {
 
 struct SignFinding {
   bool agrees = false;
-  std::string sentence;  ///< what was seen, or what to turn round
+  std::string sentence;  ///< the observation, or the sign to reverse
 };
 
-/// Judges the rows of a sign check.
+/// Evaluates the rows of a sign check.
 SignFinding judge_signs(const std::vector<LogRecord>& rows, bool has_pendulum);
 
 }  // namespace upright

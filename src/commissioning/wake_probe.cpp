@@ -79,11 +79,11 @@ Finding judge_wake_ups(const std::string& subject, const DurationHistogram& late
   const double period_us = 1e6 * period_s, most_us = late.quantile_us(0.999);
   char what[160];
   std::snprintf(what, sizeof what,
-                "late by %.0f us (50 %%), %.0f us (99.9 %%), %.0f us at worst, of a period of %.0f us",
+                "latency %.0f us (50 %%), %.0f us (99.9 %%), %.0f us (max), period %.0f us",
                 late.quantile_us(0.5), most_us, late.max_us(), period_us);
   if (most_us <= good_share * period_us) return {subject, Health::good, what, ""};
   return {subject, most_us > bad_share * period_us ? Health::bad : Health::poor, what,
-          "lower sample_rate_hz, or follow the remedies above: kernel, processors, governor, scheduling"};
+          "lower sample_rate_hz, or apply the remedies above: kernel, processors, governor, scheduling"};
 }
 
 }  // namespace upright

@@ -1,4 +1,4 @@
-// How late a thread wakes that sleeps as the loop does: at absolute times, at the loop's rate and priority.
+// Wake-up latency of a thread that sleeps as the loop does: absolute times, same rate and priority.
 #pragma once
 
 #include <string>
@@ -14,11 +14,11 @@ struct WakeProbe {
   RealtimeGrant grant;
 };
 
-/// Sleeps for `duration_s` at `rate_hz` in a thread of its own, and spins as `request` says. `loaded`:
-/// meanwhile a thread per processor, without priority, keeps the machine busy with memory and system calls.
+/// Sleeps for `duration_s` at `rate_hz` in a separate thread, and polls as `request` says. `loaded`:
+/// meanwhile one thread per processor, without real-time priority, loads memory and system calls.
 WakeProbe probe_wake_ups(double rate_hz, double duration_s, bool loaded, const RealtimeRequest& request);
 
-/// Good while 99.9 % of the wake-ups are within a tenth of the period; bad when they are not within half of
+/// Good if 99.9 % of the wake-ups are within a tenth of the period; bad if they are not within half of
 /// it.
 Finding judge_wake_ups(const std::string& subject, const DurationHistogram& late, double period_s);
 

@@ -63,7 +63,7 @@ PairedDifference difference_in(const Pairs& pairs, std::size_t quantity) {
 /// The folder of a trial's run: within the experiment's, so that one from somebody else leads nowhere else.
 fs::path run_within(const fs::path& folder, const std::string& name) {
   if (name.empty() || name == "." || name == ".." || fs::path(name).filename() != name)
-    throw ConfigError((folder / "trials.csv").string() + " names a run outside its folder, " + name +
+    throw ConfigError((folder / "trials.csv").string() + " contains a run outside its folder, " + name +
                       ": remove that line");
   return folder / name;
 }

@@ -1,6 +1,5 @@
-// Controllers that took turns in an experiment, A, B, A, B: what differs between them, round by round. What a
-// rig does over an afternoon (warm bearings, dust) is the same for both runs of a round and leaves their
-// difference.
+// The comparison of controllers that alternate in an experiment (A, B, A, B), by rounds. Slow changes of the
+// rig (warm bearings, dust) affect both runs of a round equally, so they cancel in the difference.
 #pragma once
 
 #include <filesystem>
@@ -18,26 +17,25 @@ struct ComparedRun {
   RunBehaviour behaviour;
 };
 
-/// One quantity of a controller against the first one's, over the rounds in which both stayed up.
+/// One quantity of a controller compared with the first one, over the rounds in which both stayed up.
 struct PairedDifference {
   std::size_t quantity = 0;     ///< place in `quantities`
   double from = 0.0, to = 0.0;  ///< means
-  /// Mean of the rounds' differences, with the interval of the paired t-test, 95 percent; none with fewer
-  /// than two rounds.
+  /// Mean of the differences, with the 95 % interval of the paired t-test (from two rounds on).
   Estimate difference;
-  /// The interval leaves zero out.
+  /// Whether the interval excludes zero.
   bool is_clear() const;
 };
 
-/// A controller against the first one.
+/// A controller compared with the first one.
 struct ControllerComparison {
   std::string controller;
-  std::size_t rounds = 0;                     ///< that both did and stayed up in
+  std::size_t rounds = 0;                     ///< in which both controllers stayed up
   int falls = 0;                              ///< of this controller
   std::vector<PairedDifference> differences;  ///< in the order of `quantities`; empty without a round
 };
 
-/// A piece of an experiment in which controllers took turns.
+/// A piece of an experiment with alternating controllers.
 struct PieceComparison {
   std::string label, first_controller;
   int first_falls = 0;
@@ -45,17 +43,17 @@ struct PieceComparison {
   std::vector<ComparedRun> runs;  ///< in the order they were made
 };
 
-/// Mean and interval of differences; there must be one.
+/// Mean and interval of differences. There must be at least one.
 Estimate paired_difference(const std::vector<double>& differences);
 
-/// From runs that are read: those of a round are paired. The first controller is the first run's.
+/// Compares runs, which are paired by rounds. The first controller is that of the first run.
 PieceComparison compare_in_rounds(std::string label, std::vector<ComparedRun> runs);
 
 /// True for an experiment's folder.
 bool holds_experiment(const std::filesystem::path& folder);
 
-/// Of an experiment's folder, also of one that was interrupted; empty where no controllers took turns. Throws
-/// ConfigError where it cannot be read.
+/// The comparisons of an experiment's folder, also of an interrupted one. Empty if no controllers alternate.
+/// Throws ConfigError if it cannot be read.
 std::vector<PieceComparison> paired_comparisons(const std::filesystem::path& folder);
 
 }  // namespace upright

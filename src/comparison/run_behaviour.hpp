@@ -1,11 +1,11 @@
-// How a run behaved over its last third, where the start is forgotten: hunting, voltage, chatter, falls,
-// lateness; each with an interval, so that two runs can be told apart from chance.
+// The behaviour of a run over its last third, after the transient: hunting, voltage, chatter, falls and
+// lateness, with confidence intervals to compare runs.
 //
-// Intervals hold with 95 percent, from batches of equal duration (at least a second each, 5 to 20 of them)
-// and without any random number. A root mean square has Student's interval of the batches' mean squares;
-// where neighbouring batches resemble each other it is widened by (1 + r) / (1 - r) of the variance, r the
-// correlation of neighbours. A peak-to-peak value scatters as that of one batch does: the largest of several
-// has the spread of the largest of one (exactly so for Gumbel's law).
+// The 95 % intervals come from batches of equal duration (5 to 20 of at least a second each), without random
+// numbers. An RMS value has Student's interval of the batches' mean squares. If neighbouring batches are
+// correlated with r, the variance is multiplied by (1 + r) / (1 - r). A peak-to-peak value has the scatter of
+// one batch, because the largest of several values has the spread of a single one (exactly for the Gumbel
+// distribution).
 #pragma once
 
 #include <array>
@@ -21,7 +21,7 @@
 
 namespace upright {
 
-/// A value; without an interval where the run is too short for one.
+/// A value with a 95 % interval, or without one if the run is too short.
 struct Estimate {
   double value = 0.0;
   std::optional<std::array<double, 2>> ci95;
@@ -32,7 +32,7 @@ struct Behaviour {
   std::array<Estimate, 4> values;
 };
 
-/// Names as in JSON, SI units; and how people read them.
+/// The key in JSON (SI units), and name, unit and factor for display.
 struct Quantity {
   std::string_view key, name, unit;
   double per_si_unit;  ///< a value in `unit` is this times the SI value
@@ -41,17 +41,17 @@ inline constexpr std::array<Quantity, 4> quantities = {
     {{"cart_peak_to_peak_m", "cart", "mm peak to peak", 1e3},
      {"theta_peak_to_peak_rad", "angle", "deg peak to peak", 57.29577951308232},
      {"voltage_rms_v", "voltage", "V rms", 1.0},
-     {"voltage_step_rms_v", "voltage from step to step", "V rms", 1.0}}};
+     {"voltage_step_rms_v", "voltage change per sample", "V rms", 1.0}}};
 
-/// Measures rows between two times, in the same memory however many there are.
+/// Measures rows between two times, in constant memory.
 class BehaviourMeter {
  public:
   /// The window must not be empty.
   BehaviourMeter(double from_s, double to_s);
 
-  /// Rows in their order; those before the window give the first step's voltage.
+  /// Rows in order. Rows before the window give the voltage before the first change.
   void add(const LogRecord& row);
-  /// None when the window is too short or holds too few rows.
+  /// Empty if the window is too short or has too few rows.
   std::optional<Behaviour> result() const;
   std::uint64_t rows() const { return rows_; }
   const DurationHistogram& lateness() const { return lateness_; }
@@ -76,32 +76,32 @@ struct RunBehaviour {
   double sample_rate_hz = 0.0;
   double from_s = 0.0, to_s = 0.0;  ///< the last third
   std::uint64_t rows = 0;           ///< in it
-  std::string result;               ///< completed, fell, stopped, or cut_short where no outcome was written
-  std::string sentence;             ///< why the run ended, as it said itself
+  std::string result;               ///< completed, fell, stopped, or cut_short if no outcome was written
+  std::string sentence;             ///< why the run ended, from its outcome
   double ended_s = 0.0;
   bool fell = false;
-  std::optional<Behaviour> behaviour;  ///< none: see `problem`
+  std::optional<Behaviour> behaviour;  ///< empty: see `problem`
   std::string problem;
-  /// Of the last third; none in virtual time.
+  /// Of the last third. Empty in virtual time.
   struct Lateness {
     double median_us, p99_us, largest_us;
   };
   std::optional<Lateness> lateness;
 };
 
-/// Reads a run, also one that was cut short, with any sample rate. Where the log tells when the state
-/// feedback acts (experiments), only those rows count. Throws ConfigError when the folder is no run.
+/// Reads a run with any sample rate, also one that was cut short. If the log marks when the state feedback
+/// acts (experiments), only those rows count. Throws ConfigError if the folder is not a run.
 RunBehaviour behaviour_of_run(const std::filesystem::path& directory);
 
 /// One quantity of two runs.
 struct Difference {
   std::size_t quantity = 0;  ///< place in `quantities`
   double from = 0.0, to = 0.0;
-  /// Told apart from chance by the intervals; none where one of the runs has none.
+  /// Whether the difference exceeds the intervals. Empty if one of the runs has none.
   std::optional<bool> is_clear;
 };
 
-/// The largest ratio first, clear ones before the others; empty where one has no behaviour.
+/// Clear differences first, then by ratio. Empty if one of the runs has no behaviour.
 std::vector<Difference> differences_between(const RunBehaviour& before, const RunBehaviour& after);
 
 }  // namespace upright

@@ -15,12 +15,14 @@ Controller::Controller(const ControlConfig& config, double amplifier_limit_v, Mo
       parts_(std::move(parts)) {
   if (!(limit_v_ > 0.0) || !std::isfinite(limit_v_))
     throw ConfigError("the amplifier's voltage limit is " + exact_text(limit_v_) +
-                      " V: give it a limit above 0");
+                      " V: set it to a value above 0");
   if (config.compensation.kind != CompensationKind::none && !parts_.compensator)
     throw ConfigError(
-        "the gain file has a predictor, and this controller has none: use delay_compensation: {kind: none}");
+        "the gain file asks for a predictor, but this controller has none: use delay_compensation: {kind: "
+        "none}");
   if (config.has_state_estimator() && !parts_.estimator)
-    throw ConfigError("this controller has no state estimator: use velocity_estimator");
+    throw ConfigError(
+        "the gain file asks for a state estimator, but this controller has none: use velocity_estimator");
 }
 
 void Controller::begin(const ControlInput& input) noexcept {

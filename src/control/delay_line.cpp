@@ -10,9 +10,9 @@ namespace upright {
 
 DelayLine::DelayLine(double delay_s, double period_s) : delay_s_(delay_s) {
   if (!(period_s > 0.0) || !std::isfinite(period_s))
-    throw ConfigError("the sampling period is " + exact_text(period_s) + " s: give it a value above 0");
+    throw ConfigError("the sampling period is " + exact_text(period_s) + " s: use a value above 0");
   if (!(delay_s >= 0.0 && delay_s <= longest_delay_s && delay_s / period_s <= longest_delay_periods))
-    throw ConfigError("the delay is " + exact_text(delay_s) + " s: give delay_s from 0 to " +
+    throw ConfigError("the delay is " + exact_text(delay_s) + " s: set delay_s to a value from 0 to " +
                       exact_text(longest_delay_s) + " s");
   constexpr double same_period = 1e-9;
   const double periods = delay_s / period_s;

@@ -1,9 +1,9 @@
-// Delay compensation behind a state estimator: the delayed estimate, with the force on the cart that it
-// holds, carried through every voltage that is on its way. In the loop it allocates, locks and throws
-// nothing; its cost grows with the delay (a few products for each buffered voltage).
+// Delay compensation for a state estimator: predicts the delayed estimate, including its force on the
+// cart, through all voltages that have been commanded since. In the loop it does not allocate, lock or
+// throw. Its cost grows with the delay (a few products per buffered voltage).
 //
-// The force fades with the time constant `disturbance_rejection: decay_s` as it is carried forward: friction
-// that holds now has turned round half a swing later.
+// In the prediction the force decays with the time constant `disturbance_rejection: decay_s`, since the
+// present friction has reversed half a swing later.
 #pragma once
 
 #include <Eigen/Core>
@@ -17,14 +17,14 @@ namespace upright {
 
 class EstimatePredictor final : public DelayCompensator {
  public:
-  /// Throws ConfigError when the plant cannot be predicted with.
+  /// Throws ConfigError when prediction with the plant is impossible.
   EstimatePredictor(const ControlConfig& config, const Plant& plant);
 
   void start(const ControlState& state) noexcept override;
   ControlState compensate(const ControlState& delayed, double applied_v) noexcept override;
 
-  /// What `compensate` gives for what the estimator shows (its rows and columns: the four fed back in
-  /// sensors' units, motor, force), and per volt commanded, oldest first; the newest is one period old.
+  /// `compensate` as a linear function of the estimate (the four fed-back states in sensor units, motor,
+  /// force) and of the commanded voltages (oldest first, the newest is one period old).
   struct Linear {
     Eigen::Matrix<double, 6, 6> estimate;
     Eigen::Matrix<double, 6, Eigen::Dynamic> voltages;
@@ -32,7 +32,7 @@ class EstimatePredictor final : public DelayCompensator {
   Linear linear() const;
 
  private:
-  static constexpr int carried = 6;  ///< all but the angle's zero, which the estimate has been freed of
+  static constexpr int carried = 6;  ///< all states but the angle's zero, which is removed from the estimate
   using Vector = Eigen::Matrix<double, carried, 1>;
   using Matrix = Eigen::Matrix<double, carried, carried>;
 
@@ -43,15 +43,15 @@ class EstimatePredictor final : public DelayCompensator {
   Dynamics<double> actuator_;
   double slope_ = 1.0;
   Vector scale_;
-  Matrix a_ = Matrix::Identity();  ///< over the horizon
+  Matrix a_ = Matrix::Identity();  ///< over the prediction horizon
   Vector constant_ = Vector::Zero();
   Eigen::Matrix<double, carried, Eigen::Dynamic>
-      on_their_way_;        ///< oldest first; the first for a part of a period
+      on_their_way_;        ///< oldest first; the first for a fraction of a period
   Matrix step_a_, lead_a_;  ///< over a period; over the input delay
   Vector step_b_, step_constant_, lead_b_, lead_constant_;
-  std::size_t free_steps_ = 0;  ///< periods from the start on until an estimate is from after the start
+  std::size_t free_steps_ = 0;  ///< periods from the start until the estimate dates from after the start
 
-  std::vector<double> drives_;  ///< a ring kept twice, so that its window is contiguous
+  std::vector<double> drives_;  ///< a ring stored twice, so that its window is contiguous
   std::size_t window_ = 0;
   std::size_t first_ = 0;
   std::size_t steps_ = 0;

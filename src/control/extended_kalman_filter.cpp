@@ -7,7 +7,7 @@ namespace upright {
 namespace {
 
 /// The engine gets the voltage behind the static chain and the delay, which the filter follows itself.
-Plant behind_the_chain(Plant plant) {
+Plant without_static_actuator(Plant plant) {
   const std::size_t lag = effect_number("motor_lag");
   for (std::size_t effect = 0; effect < effect_count; ++effect)
     if (effect_registry()[effect].enters == Enters::actuator && effect != lag) plant.remove(effect);
@@ -30,11 +30,11 @@ EngineOptions options_for(double period_s) {
 
 ExtendedKalmanFilter::ExtendedKalmanFilter(const ControlConfig& config, const Plant& plant)
     : KalmanFilter(config, plant),
-      engine_(make_model<double>(behind_the_chain(plant)), options_for(config.period_s())),
+      engine_(make_model<double>(without_static_actuator(plant)), options_for(config.period_s())),
       period_s_(config.period_s()),
       early_s_(input_fraction() * config.period_s()),
       volts_per_newton_(1.0 / plant.motor.force_per_volt_n),
-      yields_(plant.find("drive_compliance") != nullptr),
+      drive_deflects_(plant.find("drive_compliance") != nullptr),
       friction_share_(config.friction.share),
       friction_follows_(config.period_s() / (config.period_s() + config.friction.lag_s)) {
   ExtendedKalmanFilter::start(0.0, 0.0);
@@ -78,8 +78,8 @@ void ExtendedKalmanFilter::propagate(double late_v, double early_v) noexcept {
   friction_lagged_n_ += friction_follows_ * (friction_n() - friction_lagged_n_);
 }
 
-double ExtendedKalmanFilter::drive_yields_m() const noexcept {
-  if (!yields_) return 0.0;
+double ExtendedKalmanFilter::drive_deflection_m() const noexcept {
+  if (!drive_deflects_) return 0.0;
   PlantState<double> state = engine_.state();
   state.motor_v -= volts_per_newton_ * state_(filter_cart_force);
   return position_of(engine_.dynamics().measure(state).cart_m) - state.cart_m;

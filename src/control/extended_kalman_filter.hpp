@@ -1,14 +1,14 @@
-// A Kalman filter that predicts with the plant file's own physics: sine and cosine, dry friction that sticks
-// and slips or its bristles, and every other effect that the file has. The force on the cart that it
-// estimates is then what the file lacks.
+// A Kalman filter that predicts with the nonlinear equations of the plant file: sine and cosine, dry
+// friction with sticking or bristles, and all other effects. The estimated force on the cart is the
+// remaining model error.
 //
-// Readings correct the prediction by the stationary gain of the sliding plant (`kalman_gain`): a resting cart
-// shows no force below its breakaway level, so that a gain that followed the contact would let go of the
-// force just when it decides when the cart moves on.
+// Measurements update the prediction with the stationary gain of the sliding plant (`kalman_gain`). A
+// gain that followed the contact would discard the force estimate at rest, where forces below the
+// breakaway level are not observable, although it decides when the cart breaks away.
 //
-// The dry friction of the model is shown as a part of the force to be taken away (`friction_compensation`),
-// behind a first-order lag. While the cart slides it is the level against the motion; while it rests, what
-// holds it: taking that away lets the voltage grow until the cart moves, at the rate that the lag sets.
+// For `friction_compensation` the model's dry friction is part of the force to be cancelled, after a
+// first-order lag. While sliding it is the level opposing the motion. At rest it is the holding force:
+// cancelling it raises the voltage until the cart breaks away, at a rate set by the lag.
 #pragma once
 
 #include "kalman_filter.hpp"
@@ -25,7 +25,7 @@ class ExtendedKalmanFilter final : public KalmanFilter {
 
  private:
   void propagate(double late_v, double early_v) noexcept override;
-  double drive_yields_m() const noexcept override;
+  double drive_deflection_m() const noexcept override;
   double rejected_force_n() const noexcept override;
 
   PlantState<double> plant_state(double drive_v) const noexcept;
@@ -34,7 +34,7 @@ class ExtendedKalmanFilter final : public KalmanFilter {
 
   EventEngine<double> engine_;
   double period_s_, early_s_, volts_per_newton_;
-  bool yields_;
+  bool drive_deflects_;
   double friction_share_, friction_follows_;
   double friction_lagged_n_ = 0.0;
 };

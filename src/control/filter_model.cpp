@@ -63,7 +63,8 @@ MatrixXd sampled_noise(const MatrixXd& a, const MatrixXd& w, double period_s) {
 
 ContinuousModel continuous_model(const Plant& plant) {
   if (!plant.pendulum)
-    throw ConfigError("the plant is a cart alone: name a plant with a pendulum for the estimator");
+    throw ConfigError(
+        "the estimator's plant has no pendulum: name a plant file with a pendulum in state_estimator");
   constexpr double any_smoothing = 1.0;  // no dry level is left to smooth
   const LinearPlant linear = linearize(sliding_plant(plant), any_smoothing);
   const Index n = linear.a.rows();
@@ -141,7 +142,8 @@ Eigen::Matrix<double, filter_states, 2> kalman_gain(const ContinuousModel& model
   const MatrixXd gain = spread.ldlt().solve(shows * solution.x).transpose();
   Eigen::Matrix<double, filter_states, 2> whole = Eigen::Matrix<double, filter_states, 2>::Zero();
   whole(at, Eigen::all) = gain * step.cwiseInverse().asDiagonal();
-  if (!whole.allFinite()) throw ConfigError("the estimator's gain is not finite: correct its process noise");
+  if (!whole.allFinite())
+    throw ConfigError("the estimator's gain is not finite: correct the process noise in state_estimator");
   return whole;
 }
 

@@ -54,7 +54,7 @@ StateEstimatorConfig read_state_estimator(const YamlMap& map) {
     config.*number.value = map.optional_number(number.key, Range::within(0.0, largest));
     const std::optional<double>& value = config.*number.value;
     if (value && *value < smallest && !(number.may_be_zero && *value == 0.0))
-      map.fail(number.key, "is too small", "give it at least " + exact_text(smallest));
+      map.fail(number.key, "is too small", "set it to at least " + exact_text(smallest));
   }
   map.finish();
   return config;
@@ -142,12 +142,13 @@ ControlConfig read_gains(const YamlMap& document) {
   if (const auto rejection = document.optional_map("disturbance_rejection")) {
     config.rejection = read_rejection(*rejection);
     if (!config.has_state_estimator())
-      document.fail("disturbance_rejection", "has no estimated force to work with", "add a state_estimator");
+      document.fail("disturbance_rejection", "needs an estimate of the force on the cart",
+                    "add a state_estimator");
   }
   if (const auto friction = document.optional_map("friction_compensation")) {
     config.friction = read_friction(*friction);
     if (config.state_estimator.kind != StateEstimatorKind::extended_kalman)
-      document.fail("friction_compensation", "has no model of friction to work with",
+      document.fail("friction_compensation", "needs a model of the friction",
                     "use state_estimator: {kind: extended_kalman} and a plant file with friction");
   }
   if (config.has_state_estimator() && !document.has("velocity_estimator"))

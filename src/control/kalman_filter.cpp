@@ -44,9 +44,9 @@ KalmanFilter::KalmanFilter(const ControlConfig& config, const Plant& plant)
   known_force_n_ = model.known_force_n + actuator_.actuate(0.0) / model.volts_per_newton;
   if (const PlantEffect* zone = plant.find("voltage_dead_zone")) dead_zone_v_ = zone->values[0];
   const Resolution steps = resolution_of(config.state_estimator);
-  unsure_v_ = elementary::hypot(config.gains.cart_position_v_per_m * steps.cart_m,
-                                config.gains.pendulum_angle_v_per_rad * steps.angle_rad) /
-              std::sqrt(12.0);
+  rounding_voltage_v_ = elementary::hypot(config.gains.cart_position_v_per_m * steps.cart_m,
+                                          config.gains.pendulum_angle_v_per_rad * steps.angle_rad) /
+                        std::sqrt(12.0);
   drives_.resize(input_periods_ + 2);
   KalmanFilter::start(0.0, 0.0);
 }
@@ -78,7 +78,7 @@ void KalmanFilter::propagate(double late_v, double early_v) noexcept {
   state_ = (step_.a * state_ + step_.b * late_v + early_ * early_v + step_.constant).eval();
 }
 
-void KalmanFilter::follow_velocities(double cart_m, double theta_rad) noexcept {
+void KalmanFilter::update_velocities(double cart_m, double theta_rad) noexcept {
   const double from_m = cart_.position(), from_rad = pendulum_.position(), steps = missed_ + 1.0;
   for (std::uint32_t i = 1; i <= missed_; ++i) {
     cart_.step(from_m + i / steps * (cart_m - from_m));
@@ -91,7 +91,7 @@ void KalmanFilter::follow_velocities(double cart_m, double theta_rad) noexcept {
 
 ControlState KalmanFilter::update(double cart_m, double theta_rad, double applied_v) noexcept {
   advance(applied_v);
-  follow_velocities(cart_m, theta_rad);
+  update_velocities(cart_m, theta_rad);
   const double position = position_of(cart_m), theta = (theta_rad - offset_(1)) / scale_(1);
   const double turn = full_turn_rad * std::round(theta / full_turn_rad);
   state_(filter_theta) += turn_rad_ - turn;
@@ -105,7 +105,7 @@ ControlState KalmanFilter::update(double cart_m, double theta_rad, double applie
     state_(filter_cart_force) = 0.0;
     return shown();
   }
-  const double cart_off = position - drive_yields_m() - state_(filter_cart);
+  const double cart_off = position - drive_deflection_m() - state_(filter_cart);
   const double angle_off = lean - state_(filter_theta) - state_(filter_angle_zero);
   state_ += gain_.col(0) * cart_off + gain_.col(1) * angle_off;
   return shown();
@@ -132,7 +132,7 @@ double KalmanFilter::rejecting_v(const ControlState& estimate) const noexcept {
 
 double KalmanFilter::command_v(double wanted_v) const noexcept {
   if (!(dead_zone_v_ > 0.0)) return wanted_v;
-  return wanted_v + dead_zone_v_ * std::clamp(wanted_v / unsure_v_, -1.0, 1.0);
+  return wanted_v + dead_zone_v_ * std::clamp(wanted_v / rounding_voltage_v_, -1.0, 1.0);
 }
 
 KalmanFilter::Linear KalmanFilter::linear() const {

@@ -1,10 +1,10 @@
-// A stationary Kalman filter for a plant near upright, sampled with a held voltage.
+// A stationary Kalman filter for a plant near upright, discretised with zero-order hold.
 //
-// The model is the plant file's while the cart slides; dry friction is then part of the estimated force on
-// the cart. The actuator chain is exact: dead zone, gain, offset and saturation act on the voltage commanded,
-// the input delay is a buffer, the lag a state. Measurement noise is that of a rounded count, q^2/12.
+// The model is the plant file's while the cart slides; dry friction is part of the estimated force. The
+// actuator chain is exact: dead zone, gain, offset and saturation act on the command, the input delay is
+// a buffer, the lag a state. Measurement noise is that of quantisation, q^2/12.
 //
-// Far from upright, where the line does not hold, the states follow the sensors and the velocity filter.
+// Far from upright, outside the linear range, the states follow the sensors and the velocity filter.
 #pragma once
 
 #include <cstdint>
@@ -28,20 +28,20 @@ class KalmanFilter : public StateEstimator {
   double rejecting_v(const ControlState& estimate) const noexcept override;
   double command_v(double wanted_v) const noexcept override;
 
-  /// One step, for analysis, per volt commanded and per unit that the sensors show:
-  /// x(k + 1) = keeps (a x(k) + late u(k - d) + early u(k - d - 1)) + gain y(k + 1).
+  /// One step, for analysis, per volt commanded and per unit of the sensors: x(k + 1) = keeps (a x(k) +
+  /// late u(k - d) + early u(k - d - 1)) + gain y(k + 1).
   struct Linear {
     FilterMatrix a, keeps;
     FilterVector late, early;
     Eigen::Matrix<double, filter_states, 2> gain;
     std::vector<Eigen::Index> present;                 ///< the states that are not always zero
     std::size_t input_periods;                         ///< d
-    Eigen::Matrix<double, 4, filter_states> fed_back;  ///< in sensors' units
+    Eigen::Matrix<double, 4, filter_states> fed_back;  ///< in sensor units
     double rejecting_v_per_n;
   };
   Linear linear() const;
 
-  /// Beyond this angle from upright the line is not used: sin(1.2) is four fifths of 1.2.
+  /// Limit of the linear range about upright: sin(1.2) is four fifths of 1.2.
   static constexpr double linear_within_rad = 1.2;
 
  protected:
@@ -49,7 +49,7 @@ class KalmanFilter : public StateEstimator {
   /// `early_v` before that for the fraction of a period that the input delay has.
   virtual void propagate(double late_v, double early_v) noexcept;
   /// How far the sensor shows the cart from where `state_` has it, beyond scale and offset [m].
-  virtual double drive_yields_m() const noexcept { return 0.0; }
+  virtual double drive_deflection_m() const noexcept { return 0.0; }
   /// The force on the cart that the voltage takes away, beyond what is known and constant [N].
   virtual double rejected_force_n() const noexcept { return share_ * state_(filter_cart_force); }
 
@@ -64,7 +64,7 @@ class KalmanFilter : public StateEstimator {
 
  private:
   void advance(double applied_v) noexcept;
-  void follow_velocities(double cart_m, double theta_rad) noexcept;
+  void update_velocities(double cart_m, double theta_rad) noexcept;
   ControlState shown() const noexcept;
 
   Dynamics<double> actuator_;
@@ -78,7 +78,7 @@ class KalmanFilter : public StateEstimator {
   double rejecting_v_per_n_ = 0.0;  ///< of a force that is to be taken away whole
   double share_ = 1.0;
   double dead_zone_v_ = 0.0;
-  double unsure_v_ = 1.0;  ///< rms of the feedback by rounded counts: below it, its sign is not known
+  double rounding_voltage_v_ = 1.0;  ///< rms of the feedback due to rounding
   double known_force_n_ = 0.0;
   VelocityEstimator cart_, pendulum_;
   std::uint32_t missed_ = 0;    ///< periods since the last reading

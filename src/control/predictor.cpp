@@ -25,7 +25,8 @@ FilterPolynomials polynomials_of(const EstimatorStep& f) {
 
 LinearPlant sliding_line(const Plant& plant) {
   if (!plant.pendulum)
-    throw ConfigError("the plant of delay_compensation is a cart alone: name a plant with a pendulum");
+    throw ConfigError(
+        "the predictor's plant has no pendulum: name a plant file with a pendulum in delay_compensation");
   constexpr double any_smoothing = 1.0;  // no dry level is left to smooth
   return linearize(sliding_plant(plant), any_smoothing);
 }

@@ -56,7 +56,7 @@ EstimatorStep second_order_step(double wc, double zeta, double period) {
 
 EstimatorStep make_estimator_step(const EstimatorConfig& config, double period_s) {
   if (!(period_s > 0.0) || !std::isfinite(period_s))
-    throw ConfigError("the sampling period is " + exact_text(period_s) + " s: give it a value above 0");
+    throw ConfigError("the sampling period is " + exact_text(period_s) + " s: use a value above 0");
   if (config.kind == EstimatorKind::difference) {
     EstimatorStep step;
     step.g2 = 1.0 / period_s;
@@ -64,8 +64,9 @@ EstimatorStep make_estimator_step(const EstimatorConfig& config, double period_s
   }
   if (!(config.cutoff_hz > 0.0) || !(config.damping > 0.0) || !std::isfinite(config.cutoff_hz) ||
       !std::isfinite(config.damping))
-    throw ConfigError("cut-off and damping of the velocity filter are " + exact_text(config.cutoff_hz) +
-                      " Hz and " + exact_text(config.damping) + ": give both a value above 0");
+    throw ConfigError("cutoff frequency and damping of the velocity filter are " +
+                      exact_text(config.cutoff_hz) + " Hz and " + exact_text(config.damping) +
+                      ": set both to a value above 0");
   return second_order_step(2.0 * std::numbers::pi * config.cutoff_hz, config.damping, period_s);
 }
 

@@ -74,8 +74,7 @@ void explain(const LinearPlant& linear, ControllablePart& part, std::complex<dou
         {state, eigenvalue,
          state + " = " + combination(part.follow.row(static_cast<Index>(i)), part.states) + " + " + motion +
              " that the voltage cannot move; the gains are those of the stabilizable part, where this state "
-             "follows "
-             "the others"});
+             "follows the others"});
   }
 }
 
@@ -86,12 +85,12 @@ ControllablePart controllable_part(const LinearPlant& linear) {
   const MatrixXd basis = krylov_basis(linear.a, linear.b);
   const Index r = basis.cols();
   const auto fed_back = static_cast<Index>(linear.fed_back.size());
-  if (r < fed_back) refuse(linear, "the voltage does not move every state that is fed back");
+  if (r < fed_back) refuse(linear, "the voltage does not affect every state that is fed back");
   ControllablePart part;
   part.states.assign(linear.states.begin(), linear.states.begin() + r);
   const Eigen::FullPivLU<MatrixXd> kept(basis.topRows(r));
   if (!kept.isInvertible() || kept.rcond() < in_the_subspace)
-    refuse(linear, "the voltage does not move every state that is fed back");
+    refuse(linear, "the voltage does not affect every state that is fed back");
   part.follow = basis * kept.inverse();
   part.follow.topRows(r).setIdentity();
   part.a = (linear.a * part.follow).topRows(r);
@@ -101,8 +100,8 @@ ControllablePart controllable_part(const LinearPlant& linear) {
   const MatrixXd rest = whole.rightCols(n - r);
   const std::complex<double> eigenvalue = largest_eigenvalue(rest.transpose() * linear.a * rest);
   if (eigenvalue.real() > 1e-9 * linear.a.norm())
-    refuse(linear,
-           "a part that the voltage cannot move grows at " + short_number(eigenvalue.real()) + " 1/s");
+    refuse(linear, "a mode that the voltage does not affect is unstable (eigenvalue " +
+                       short_number(eigenvalue.real()) + " 1/s)");
   explain(linear, part, eigenvalue);
   return part;
 }

@@ -48,17 +48,18 @@ ControlConfig first_config(const Plant& plant, const EstimatorRequest& request,
   return config;
 }
 
-constexpr const char* what_helps = "raise --r, shorten the delay, or state less --uncertainty";
+constexpr const char* what_helps = "raise --r, shorten the delay, or lower --uncertainty";
 
 void refuse_sensitive(const std::string& parameter) {
   if (!parameter.empty())
-    throw ConfigError("the loop does not hold with " + parameter + " than in the plant file: " + what_helps);
+    throw ConfigError("the loop does not balance with " + parameter +
+                      " than in the plant file: " + what_helps);
 }
 
 void refuse_falls(const ParameterTrials& trials, double uncertainty) {
   if (trials.fell == 0) return;
   if (trials.one_alone_falls) refuse_sensitive(trials.most_sensitive_to);
-  throw ConfigError("with every parameter " + exact_text(100.0 * uncertainty) + " percent off " +
+  throw ConfigError("with every parameter " + exact_text(100.0 * uncertainty) + " percent wrong, " +
                     std::to_string(trials.fell) + " of " + std::to_string(trials.runs) +
                     " simulated runs fell, and the loop is most sensitive to " + trials.most_sensitive_to +
                     ": " + what_helps);
@@ -98,8 +99,8 @@ EstimatorDesign design_with_estimator(const Plant& plant, const EstimatorRequest
   }
   if (design.bears_unmodelled_s <= 0.0)
     throw ConfigError(
-        "the loop is unstable however slowly the force on the cart is followed: raise --r, or the sample "
-        "rate, or shorten the delay");
+        "the loop is unstable even with the slowest estimator of the force on the cart: raise --r or the "
+        "sample rate, or shorten the delay");
   refuse_sensitive(parameter_not_borne(plant, design.config, request.uncertainty));
   if (!request.delay_s) {
     constexpr int together = 40;

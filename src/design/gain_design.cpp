@@ -88,7 +88,7 @@ void add_shares(GainDesign& design, const ControllablePart& part, const RowVecto
   }
 }
 
-void note_what_is_there(GainDesign& design, const Plant& plant, const LinearPlant& linear) {
+void record_plant_structure(GainDesign& design, const Plant& plant, const LinearPlant& linear) {
   design.notes = linear.notes;
   if (linear.input_delay_s > 0.0)
     design.notes.push_back("input_delay: its " + exact_text(linear.input_delay_s) +
@@ -106,7 +106,7 @@ void find_poles(GainDesign& design, const LinearPlant& linear, const RowVectorXd
   if (design.closed_loop_poles.front().real() >= 0.0)
     throw ConfigError("the gains designed without the motor lag do not stabilize the plant with it, " +
                       matrix_text("A", whole.a) + ", " + matrix_text("b", whole.b) +
-                      ": raise r or make the motor lag shorter");
+                      ": raise --r, or shorten the motor lag");
 }
 
 void refuse_unreadable(const LinearPlant& linear) {
@@ -131,7 +131,7 @@ GainDesign design_gains(const Plant& plant, const DesignWeights& weights, double
   design.residual = solution.residual;
   design.eliminated = part.eliminated;
   add_shares(design, part, solution.gain);
-  note_what_is_there(design, plant, linear);
+  record_plant_structure(design, plant, linear);
   if (lagging)
     design.eliminated.push_back({"motor_v", linear.a(linear.a.rows() - 1, linear.a.rows() - 1),
                                  "motor_v is not measured: the gains take the motor lag as quick (motor_v "

@@ -52,8 +52,7 @@ LinearSampledLoop::LinearSampledLoop(const Plant& plant, const ControlConfig& co
                                      ExtraDelay extra)
     : period_s_(config.period_s()), extra_(extra), fed_back_(gains_of(config)) {
   if (!plant.pendulum)
-    throw ConfigError(
-        "the plant has no pendulum, so that there is nothing to balance: give a plant with one");
+    throw ConfigError("the plant has no pendulum to balance: name a plant file with a pendulum");
   const LinearPlant linear = linearize(plant, smoothing);
   const ControllablePart part = controllable_part(linear);
   const Periods input = periods_of(linear.input_delay_s, period_s_);
@@ -249,9 +248,9 @@ MatrixXd LinearSampledLoop::closed_loop(double delay_s) const {
   if (!has_roots(delay_s)) {
     char periods[32];
     std::snprintf(periods, sizeof periods, "%.0f", remembered_periods(delay_s));
-    throw ConfigError(std::string("the loop remembers ") + periods +
-                      " periods of delay, of prediction and of the plant's input delay, too many to find its "
-                      "roots: lower sample_rate_hz or delay_s");
+    throw ConfigError(std::string("delay, prediction and input delay together last ") + periods +
+                      " periods, which is too long to compute the roots of the loop: lower sample_rate_hz or "
+                      "delay_s");
   }
   const bool known = extra_ == ExtraDelay::known;
   const std::vector<double> taps = convolved(shares(known ? delay_s : 0.0), shares(lined_delay_s_));

@@ -1,4 +1,4 @@
-// A plant whose numbers are not quite those of its file: which of them a designed loop is sensitive to.
+// Sensitivity of a designed loop to the parameters of its plant.
 #pragma once
 
 #include <functional>
@@ -10,29 +10,29 @@
 
 namespace upright {
 
-/// One number of a plant, and how to multiply it.
+/// One parameter of a plant, and a function that scales it.
 struct UncertainParameter {
-  std::string name;  ///< as the plant file calls it
+  std::string name;  ///< name in plant files
   std::function<void(Plant&, double by)> scale;
 };
 
-/// Mass of the cart; mass, length and inertia of the pendulum; the motor's two; and every value of every
-/// effect.
+/// Mass of the cart; mass, length and inertia of the pendulum; the motor's two constants; and all values
+/// of all effects.
 std::vector<UncertainParameter> uncertain_parameters(const Plant& plant);
 
-/// What simulated runs said, each from 3 degrees for some seconds, with encoders and the plant's own friction
-/// while the estimator believes the plant file.
+/// Results of simulated runs from 3 degrees over some seconds, with encoders and the plant's own
+/// friction, while the estimator uses the plant file.
 struct ParameterTrials {
   int runs = 0, fell = 0;
-  bool one_alone_falls = false;    ///< with one parameter off and the others right
-  double hunting_m = 0.0;          ///< cart, peak to peak over the last third, with the plant as in its file
-  double largest_hunting_m = 0.0;  ///< of all runs that did not fall
-  /// Name and error of the first parameter that makes the loop fall by itself, or hunt most where none does.
+  bool one_alone_falls = false;    ///< with one parameter perturbed
+  double hunting_m = 0.0;          ///< cart, peak to peak over the last third, with the unperturbed plant
+  double largest_hunting_m = 0.0;  ///< over all runs without a fall
+  /// Name and error of the first parameter that alone causes a fall, else of that with most hunting.
   std::string most_sensitive_to;
 };
 
-/// Each parameter off by `uncertainty` up and down, alone, then `together` runs with all of them off at once,
-/// each up or down. Reads no file. Throws ConfigError when the loop cannot be run.
+/// Perturbs each parameter alone by `uncertainty` in both directions, then makes `together` runs with all
+/// of them perturbed at random. Reads no file. Throws ConfigError when the loop cannot be run.
 ParameterTrials try_parameters(const Plant& plant, const ControlConfig& config, double uncertainty,
                                int together);
 

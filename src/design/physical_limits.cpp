@@ -12,7 +12,7 @@ namespace upright {
 
 PhysicalLimits physical_limits(const Plant& plant) {
   if (!plant.pendulum)
-    throw ConfigError("the plant is a cart alone: name a plant with a pendulum, which is what falls");
+    throw ConfigError("the plant has no pendulum to balance: name a plant file with a pendulum");
   constexpr double any_smoothing = 1.0;  // no dry level is left to smooth
   const LinearPlant linear = linearize(large_motion_plant(plant), any_smoothing);
   PhysicalLimits limits;

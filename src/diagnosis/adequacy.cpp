@@ -10,39 +10,38 @@ namespace upright {
 
 ResidualTests examine_fit(const FitData& data, const FitPoint& fitted, const SelectionPolicy& policy,
                           const SearchBudget& budget) {
-  ResidualTests structure = examine_residuals(data, fitted, policy);
+  ResidualTests tests = examine_residuals(data, fitted, policy);
   FitPoint point = fitted;
   point.noise = sensors_only(fitted.noise);
   const FitResult plain = fit_initial_states(data, point);
-  structure.noise_ratio = whitened_rms(plain);
+  tests.noise_ratio = whitened_rms(plain);
   point = plain.point;
-  point.noise = as_slow_as_left(fitted.noise, structure);
-  structure.excess = structure.noise_ratio / simulation_floor(data, point, budget.floor_draws).highest;
-  conclude_tests(structure, policy.residual);
-  return structure;
+  point.noise = low_frequency_equivalent(fitted.noise, tests);
+  tests.excess = tests.noise_ratio / simulation_floor(data, point, budget.floor_draws).highest;
+  conclude_tests(tests, policy.residual);
+  return tests;
 }
 
-SimulationFloor held_out_floor(const Search& search, const Hypothesis& judged,
-                               const ResidualTests& structure) {
+SimulationFloor held_out_floor(const Search& search, const Hypothesis& judged, const ResidualTests& tests) {
   if (search.held_data().segments.empty()) return {};
   FitPoint point = judged.held.point;
-  point.noise = as_slow_as_left(judged.train.point.noise, structure);
+  point.noise = low_frequency_equivalent(judged.train.point.noise, tests);
   return simulation_floor(search.held_data(), point, search.budget().floor_draws);
 }
 
-void compare_held_out(const Search& search, const Hypothesis& judged, ResidualTests& structure) {
+void compare_held_out(const Search& search, const Hypothesis& judged, ResidualTests& tests) {
   if (search.held_data().segments.empty()) return;
-  Hypothesis told = search.told(judged);
+  Hypothesis conditioned = search.conditioned_on_held_out(judged);
   // What is left need not be such noise: all runs together may be further off than such noise makes them, and
   // held-out ones by as much again.
-  const double excess = search.simulate(told).gap / held_out_floor(search, told, structure).highest;
-  if (!is_held_out_too_far_off(excess, structure.excess, search.policy().residual)) return;
-  structure.structured = true;
+  const double excess = search.simulate(conditioned).gap / held_out_floor(search, conditioned, tests).highest;
+  if (!is_held_out_too_far_off(excess, tests.excess, search.policy().residual)) return;
+  tests.structured = true;
   std::ostringstream text;
   text.precision(3);
   text << "a plain simulation of held-out runs is " << excess
        << " times as far off as noise like what is left of the others makes it at most";
-  structure.sentence = text.str();
+  tests.sentence = text.str();
 }
 
 }  // namespace upright

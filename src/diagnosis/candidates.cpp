@@ -145,18 +145,18 @@ bool is_plainer(std::size_t a, std::size_t b) {
   return a < b;
 }
 
-std::vector<FreeParameter> believed_parameters(const Plant& plant, std::size_t effect, const DataRange& range,
-                                               const PriorPolicy& prior) {
+std::vector<FreeParameter> correction_parameters(const Plant& plant, std::size_t effect,
+                                                 const DataRange& range, const PriorPolicy& prior) {
   const EffectInfo& info = effect_registry()[effect];
   const PlantEffect* have = plant.find(effect);
   std::vector<FreeParameter> free;
   for (std::size_t i = 0; i < info.parameters.size(); ++i) {
     FreeParameter p = free_parameter(effect, i, range, prior);
     p.prior_mean = have != nullptr ? have->values[i] : info.parameters[i].neutral;
-    const double belief = info.enters == Enters::parameter ? prior.base_parameter : prior.friction;
+    const double relative_sigma = info.enters == Enters::parameter ? prior.base_parameter : prior.friction;
     const double size =
         std::max(std::abs(p.prior_mean), prior.least_share_of_typical * info.parameters[i].typical);
-    p.prior_sigma = belief * size;
+    p.prior_sigma = relative_sigma * size;
     p.scale = size;
     if (is_named(effect, "angle_offset") && have == nullptr) {
       // An incremental encoder knows its zero to a count, and friction lets a pendulum rest a little off.

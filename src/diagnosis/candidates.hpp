@@ -34,8 +34,8 @@ std::vector<FreeParameter> free_parameters(std::size_t effect, const DataRange& 
 
 /// A correction of something the plant file already says, with the belief that it is a few percent off at
 /// most.
-std::vector<FreeParameter> believed_parameters(const Plant& plant, std::size_t effect, const DataRange& range,
-                                               const PriorPolicy& prior);
+std::vector<FreeParameter> correction_parameters(const Plant& plant, std::size_t effect,
+                                                 const DataRange& range, const PriorPolicy& prior);
 
 /// Corrections that every fit leaves room for: the base parameters (cart_mass, ...) that these data can show,
 /// and the zero of the angle within a count.

@@ -22,12 +22,12 @@ Decision waiting(MissingFit fit) {
 
 /// What is saved on training data beyond the price of the parameters.
 double saving_of(const Evidence& e, const Improvement& improvement) {
-  return improvement.train + e.price_saved - e.price;
+  return improvement.train + e.penalty_saved - e.penalty;
 }
 
 /// What a few moments hold has a small t on the training runs. Held-out runs are a witness of their own,
 /// whose evidence adds to its square, unless the training runs say no more than chance does.
-double witnessed_t(const Improvement& improvement, const AcceptancePolicy& p) {
+double combined_t(const Improvement& improvement, const AcceptancePolicy& p) {
   if (!(improvement.t_value > p.chance_t)) return improvement.t_value;
   return std::sqrt(improvement.t_value * improvement.t_value + std::max(improvement.held, 0.0));
 }
@@ -47,7 +47,7 @@ bool is_overwhelming(const Evidence& e, const AcceptancePolicy& p) {
 /// Whether the data show an effect at all.
 Decision decide_shown(const Evidence& e, const Improvement& improvement, const AcceptancePolicy& p) {
   const double saving = saving_of(e, improvement);
-  const double t = witnessed_t(improvement, p);
+  const double t = combined_t(improvement, p);
   if (is_borne_out(saving, improvement, p) && t > p.least_t) return accepted(Rule::borne_out);
   if (saving < p.least_evidence) return rejected(Rule::too_little_evidence);
   // Held-out data that do not excite the effect say nothing.
@@ -55,7 +55,7 @@ Decision decide_shown(const Evidence& e, const Improvement& improvement, const A
   if (t > p.least_t) return accepted(Rule::shown_throughout);
   if (saving > p.overwhelming_evidence) return accepted(Rule::overwhelming);
   // Numbers of the plant that need not be so far off are no matter of noise.
-  if (improvement.belief - e.price > p.least_evidence) return accepted(Rule::plant_numbers);
+  if (improvement.prior - e.penalty > p.least_evidence) return accepted(Rule::plant_numbers);
   if (!(improvement.t_value > p.least_t_of_sensors && improvement.held > p.equally_good_evidence))
     return rejected(Rule::chance);
   // Where nothing but the sensors' noise is left, its evidence needs no other witness.
@@ -109,13 +109,13 @@ Decision decide_addition(const Evidence& e, const AcceptancePolicy& p) {
     return rejected(Rule::held_out_in_doubt);
   }
   // A better estimate of the noise is not taken for an effect.
-  if (e.with_little_noise || e.improvement.train < p.overwhelming_evidence) {
-    if (!e.levelled) return waiting(MissingFit::levelled_noise);
-    shown = decide_shown(e, *e.levelled, p);
+  if (e.with_low_noise || e.improvement.train < p.overwhelming_evidence) {
+    if (!e.at_equal_noise) return waiting(MissingFit::equal_noise);
+    shown = decide_shown(e, *e.at_equal_noise, p);
     if (!shown.accepted) return shown;
   }
   if (!e.is_correction) {
-    const Decision certain = decide_certain(e, e.levelled.value_or(e.improvement), p);
+    const Decision certain = decide_certain(e, e.at_equal_noise.value_or(e.improvement), p);
     if (!certain.accepted) return certain;
   }
   const Decision simulated = decide_simulation(e, shown.rule, p);
@@ -227,13 +227,13 @@ Decision decide(const Evidence& evidence, const SelectionPolicy& policy) {
       return decide_pair(evidence, policy.acceptance);
     case Change::keep:
       return decide_keeping(evidence, policy.acceptance);
-    case Change::trust_grown:
+    case Change::trust_added:
       return decide_trust(evidence, policy.acceptance);
   }
   return {};
 }
 
-bool is_better_place(double fall, const AcceptancePolicy& policy) {
+bool is_better_optimum(double fall, const AcceptancePolicy& policy) {
   return fall > policy.equally_good_evidence;
 }
 

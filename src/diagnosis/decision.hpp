@@ -14,7 +14,7 @@ namespace upright {
 /// of a quarter of a second.
 struct Improvement {
   double train = 0.0;    ///< fall of the objective on training data
-  double belief = 0.0;   ///< of that, what is believed of the parameters: they need not go so far from it
+  double prior = 0.0;    ///< of that, what is believed of the parameters: they need not go so far from it
   double held = 0.0;     ///< of the negative log predictive density of held-out data
   double t_value = 0.0;  ///< of the mean fall per quarter of a second of training data
 };
@@ -32,32 +32,32 @@ enum class Change {
   simplify,    ///< what was found into plainer words
   pair,        ///< two effects for what was found of them
   keep,        ///< what was found earlier, beside the others
-  trust_grown  ///< what was added while held-out runs spoke against it
+  trust_added  ///< what was added while held-out runs spoke against it
 };
 
 /// What the data say of a change. Improvements are over the model without it.
 struct Evidence {
   Change change = Change::add;
   Improvement improvement;
-  double price = 0.0;              ///< of the parameters beyond the first that it brings [evidence]
-  double price_saved = 0.0;        ///< of those that go [evidence]
-  double certainty = 0.0;          ///< of the size of what it brings, the least [standard errors]
-  bool plausible = true;           ///< no size at the end of its range, none that does nothing
-  bool bends_another = false;      ///< another effect that was found becomes what cannot be
-  bool is_correction = false;      ///< of a number of the plant file
-  bool with_little_noise = false;  ///< found from less noise than the model without it has
-  bool is_plainer = false;         ///< than what goes
+  double penalty = 0.0;         ///< of the parameters beyond the first that it brings [evidence]
+  double penalty_saved = 0.0;   ///< of those that go [evidence]
+  double certainty = 0.0;       ///< of the size of what it brings, the least [standard errors]
+  bool plausible = true;        ///< no size at the end of its range, none that does nothing
+  bool bends_another = false;   ///< another effect that was found becomes what cannot be
+  bool is_correction = false;   ///< of a number of the plant file
+  bool with_low_noise = false;  ///< found from less noise than the model without it has
+  bool is_plainer = false;      ///< than what goes
 
   // From fits that only some rules ask for.
-  std::optional<Improvement> levelled;  ///< over the model from the same noise
-  std::optional<double> simulated_gap;  ///< of held-out data [sensor noise]
+  std::optional<Improvement> at_equal_noise;  ///< over the model from the same noise
+  std::optional<double> simulated_gap;        ///< of held-out data [sensor noise]
   std::optional<SimulationChange> simulated_segments;
   std::optional<double> certainty_of_all_runs;
   std::optional<double> certainty_converged;  ///< once more fits gain nothing
 };
 
 /// A fit that a decision waits for.
-enum class MissingFit { none, levelled_noise, simulation, simulated_segments, all_runs, converged };
+enum class MissingFit { none, equal_noise, simulation, simulated_segments, all_runs, converged };
 
 /// Why a change was accepted, or why not.
 enum class Rule {
@@ -99,7 +99,7 @@ struct Decision {
 Decision decide(const Evidence& evidence, const SelectionPolicy& policy);
 
 /// Whether a fit from elsewhere, whose objective is lower by `fall`, is in a better place.
-bool is_better_place(double fall, const AcceptancePolicy& policy);
+bool is_better_optimum(double fall, const AcceptancePolicy& policy);
 
 /// An effect that may be taken.
 struct Contender {

@@ -39,26 +39,26 @@ class Diagnostician {
       selection_.begin();
       selection_.find();
       ResidualTests left = settle();
-      if (left.structured && selection_.begin_anew()) left = settle();
+      if (left.structured && selection_.renew_initial_states()) left = settle();
       if (left.structured && selection_.find_pairs_of_all()) left = settle();
       if (left.beyond_sensors && selection_.find_thoroughly(left.structured)) left = settle();
       conclude(left);
     } catch (const Interrupted&) {
       result_.interrupted = true;
     } catch (const BoundReached&) {
-      examine_what_was_found();
+      examine_at_bound();
     }
     if (!decided_) report_so_far();
     return std::move(result_);
   }
   /// Whether an effect was found that the plant file lacks, not only numbers of it that are off.
-  bool found_what_was_lacking() const {
+  bool found_missing_effect() const {
     return std::any_of(selection_.found().begin(), selection_.found().end(),
                        [&](std::size_t effect) { return !search_.is_nuisance(effect); });
   }
   /// Of what is unexplained: whether held-out runs excite what is missing still, and the others do not. They
   /// alone show it, or spoke to the end against what the others show beyond doubt.
-  bool lacks_what_was_held_out() const {
+  bool misses_held_out_excitation() const {
     return selection_.contradicted() ||
            !examine_fit(data_.train, final_.train.point, policy_, budget_).structured;
   }
@@ -66,7 +66,7 @@ class Diagnostician {
  private:
   static DataSplit checked(DataSplit data) {
     if (data.train.segments.empty())
-      throw ConfigError("no stretch of the data is long enough to simulate: record longer runs");
+      throw ConfigError("no part of the data is long enough to simulate: record longer runs");
     return data;
   }
 
@@ -84,7 +84,7 @@ class Diagnostician {
 
   /// After the bound ended the search: what it found is examined as if it had ended by itself, within a bound
   /// of its own.
-  void examine_what_was_found() {
+  void examine_at_bound() {
     result_.bound_reached = true;
     if (decided_) return;
     bound_.grant(budget_.examination_share * work_samples_);
@@ -140,7 +140,7 @@ class Diagnostician {
     // At what all runs say, so that what few training runs left uncertain is not taken for something missing.
     ResidualTests left = examine_fit(all, known_.train.point, policy_, budget_);
     if (!left.structured) compare_held_out(search_, final_, left);
-    if (!left.structured) doubt_what_cannot_be(left);
+    if (!left.structured) flag_scale_at_bound(left);
     return left;
   }
 
@@ -148,18 +148,18 @@ class Diagnostician {
   void settle_corrections() {
     const Hypothesis& h = selection_.current();
     const auto n = static_cast<Eigen::Index>(h.free.size());
-    ParameterBeliefs beliefs{Eigen::VectorXd(n), Eigen::VectorXd(n), h.train.covariance};
+    ParameterPosterior posterior{Eigen::VectorXd(n), Eigen::VectorXd(n), h.train.covariance};
     std::vector<bool> is_correction;
     for (const FreeParameter& p : h.free) {
       const auto at = static_cast<Eigen::Index>(is_correction.size());
-      beliefs.value[at] = h.train.point.plant.find(p.effect)->values[p.index];
-      beliefs.prior_mean[at] = p.prior_mean;
+      posterior.value[at] = h.train.point.plant.find(p.effect)->values[p.index];
+      posterior.prior_mean[at] = p.prior_mean;
       is_correction.push_back(std::find(selection_.found().begin(), selection_.found().end(), p.effect) ==
                               selection_.found().end());
     }
     std::vector<std::size_t> corrections;
-    for (const std::size_t j : certain_parameters(beliefs, is_correction, policy_.correction))
-      if (is_correction[j] && !is_believed(h, j) && search_.is_plausible(h, h.free[j].effect) &&
+    for (const std::size_t j : certain_parameters(posterior, is_correction, policy_.correction))
+      if (is_correction[j] && !keeps_prior(h, j) && search_.is_plausible(h, h.free[j].effect) &&
           std::find(corrections.begin(), corrections.end(), h.free[j].effect) == corrections.end())
         corrections.push_back(h.free[j].effect);
     fit_last(corrections);
@@ -170,14 +170,14 @@ class Diagnostician {
   void fit_last(std::vector<std::size_t>& corrections) {
     const Hypothesis* from = &selection_.current();
     for (;;) {
-      options_.tell(0.88, "fitting what is left");
+      options_.tell(0.88, "final fit to the training runs");
       std::vector<std::size_t> all = selection_.found();
       all.insert(all.end(), corrections.begin(), corrections.end());
-      final_ = search_.only(all, *from, nullptr, true);
-      search_.judge(final_, final_.train.point.noise);
+      final_ = search_.fitted_separately(all, *from, nullptr, true);
+      search_.filter_held_out(final_, final_.train.point.noise);
       from = &final_;
-      options_.tell(0.9, "fitting all runs");
-      known_ = search_.on_all(final_);
+      options_.tell(0.9, "final fit to all runs");
+      known_ = search_.fitted_to_all_runs(final_);
       const auto includes_nothing = [&](std::size_t effect) {
         return !is_certain_of_all_runs(search_.certainty(known_, effect), policy_.correction);
       };
@@ -188,33 +188,33 @@ class Diagnostician {
   }
 
   /// A coefficient of the plant file that moved within what is believed of it.
-  bool is_believed(const Hypothesis& h, std::size_t j) const {
+  bool keeps_prior(const Hypothesis& h, std::size_t j) const {
     const FreeParameter& p = h.free[j];
     if (effect_registry()[p.effect].enters == Enters::parameter || plant_.find(p.effect) == nullptr)
       return false;
     const double value = h.train.point.plant.find(p.effect)->values[p.index];
-    return is_within_belief(value, p.prior_mean, p.prior_sigma, policy_.correction);
+    return is_within_prior(value, p.prior_mean, p.prior_sigma, policy_.correction);
   }
 
   /// Corrections in the order of how much each closes: of sensors first, then of the plant's numbers, which
   /// are always a little off.
   void order_corrections(const std::vector<std::size_t>& corrections) {
     const Noise noise = final_.train.point.noise;
-    std::vector<std::tuple<bool, double, std::size_t>> opened;
+    std::vector<std::tuple<bool, double, std::size_t>> ranked;
     for (const std::size_t effect : corrections) {
       std::vector<std::size_t> others = selection_.found();
       for (const std::size_t other : corrections)
         if (other != effect) others.push_back(other);
-      Hypothesis h = search_.only(others, final_, &noise);
-      search_.judge(h, noise);
-      opened.emplace_back(effect_registry()[effect].enters == Enters::parameter, -search_.gap_of(h), effect);
+      Hypothesis h = search_.fitted_separately(others, final_, &noise);
+      search_.filter_held_out(h, noise);
+      ranked.emplace_back(effect_registry()[effect].enters == Enters::parameter, -search_.gap_of(h), effect);
     }
-    std::sort(opened.begin(), opened.end());
+    std::sort(ranked.begin(), ranked.end());
     corrections_.clear();
-    for (const auto& [number, gap, effect] : opened) corrections_.push_back(effect);
+    for (const auto& [number, gap, effect] : ranked) corrections_.push_back(effect);
   }
 
-  void conclude(const ResidualTests& structure) {
+  void conclude(const ResidualTests& tests) {
     options_.tell(0.93, "measuring the gap");
     note_runs();
     result_.noise = known_.train.point.noise;
@@ -223,10 +223,10 @@ class Diagnostician {
     const Noise quiet = sensors_only(final_.train.point.noise);
     // Of what is left but cannot be told from noise, the floor is what such noise makes; else the sensors
     // alone.
-    const double floor = structure.structured ? 1.0 : held_out_floor(search_, final_, structure).usual;
+    const double floor = tests.structured ? 1.0 : held_out_floor(search_, final_, tests).usual;
     const auto gap_with = [&](const std::vector<std::size_t>& effects, const Hypothesis& from, bool settled) {
-      Hypothesis h = search_.only(effects, from, &fitted_noise, settled);
-      search_.judge(h, quiet);
+      Hypothesis h = search_.fitted_separately(effects, from, &fitted_noise, settled);
+      search_.filter_held_out(h, quiet);
       return search_.gap_of(h) / floor;
     };
     double gap = result_.gap_before = gap_with({}, final_, false);
@@ -242,7 +242,7 @@ class Diagnostician {
       result_.effects.push_back(found);
     }
     result_.gap_after = gap;
-    result_.residual = structure.sentence;
+    result_.residual = tests.sentence;
     result_.model = all.empty() ? plant_ : model_with(all, known_.train.point.plant);
     for (auto& candidate : result_.candidates) {
       candidate.gap_after = result_.gap_before;
@@ -255,7 +255,7 @@ class Diagnostician {
     std::stable_sort(result_.candidates.begin(), result_.candidates.end(),
                      [](const auto& a, const auto& b) { return a.evidence > b.evidence; });
     note_doubtful_numbers();
-    decide(structure);
+    decide(tests);
     trace_residuals();
     find_indistinguishable();
   }
@@ -264,25 +264,25 @@ class Diagnostician {
     if (data_.held.segments.empty()) return;
     const Noise noise = final_.train.point.noise;
     result_.residual_after = smooth_residuals(data_.held, final_.held.point, policy_.location.walk);
-    Hypothesis as_given = search_.only({}, final_, &noise);
-    search_.judge(as_given, noise);
+    Hypothesis as_given = search_.fitted_separately({}, final_, &noise);
+    search_.filter_held_out(as_given, noise);
     result_.residual_before = smooth_residuals(data_.held, as_given.held.point, policy_.location.walk);
   }
 
   /// A scale at the end of what it may be stands for something else.
-  void doubt_what_cannot_be(ResidualTests& structure) const {
+  void flag_scale_at_bound(ResidualTests& tests) const {
     for (const std::size_t effect : all_found()) {
       const auto [scale, parameter] = scale_of(effect);
       if (parameter == nullptr) continue;
       const EndOfRange end = end_of_range(scale, parameter->low, parameter->high, policy_.correction);
       if (end == EndOfRange::none) continue;
-      structure.structured = true;
+      tests.structured = true;
       std::ostringstream text;
       text.precision(3);
       text << "it takes a " << kind_of(effect) << " of " << scale
            << (end == EndOfRange::low ? " or less" : " or more")
            << ", which cannot be: something else is missing";
-      structure.sentence = text.str();
+      tests.sentence = text.str();
     }
   }
 
@@ -344,13 +344,13 @@ class Diagnostician {
     if (!rod) plant.pendulum->given_inertia_kgm2 = base.inertia_about_pivot_kgm2;
   }
 
-  void decide(const ResidualTests& structure) {
+  void decide(const ResidualTests& tests) {
     const bool worse = result_.gap_after > result_.gap_before;
     if (worse)
       result_.notes.emplace_back(
           "what was found takes held-out data further from the model, so it explains nothing: check the "
           "data and the plant file first");
-    if (structure.structured || worse) {
+    if (tests.structured || worse) {
       result_.verdict = Verdict::unexplained;
     } else if (!result_.effects.empty()) {
       result_.verdict = Verdict::explained;
@@ -364,7 +364,7 @@ class Diagnostician {
   /// Other effects that do as well in the place of one that was found: from sensitivities, or fitted where an
   /// effect does not act in proportion to its size.
   void find_indistinguishable() {
-    options_.tell(0.94, "what else could it be");
+    options_.tell(0.94, "searching for confusable effects");
     std::vector<std::pair<std::size_t, Plant>> alternatives;
     for (const Alternative& alternative : linear_alternatives(search_, final_, all_found())) {
       declare(alternative.instead_of, alternative.effect);
@@ -373,13 +373,13 @@ class Diagnostician {
     std::optional<double> on_screening_subset;
     for (const std::size_t effect : selection_.found()) {
       std::optional<Hypothesis> without;
-      for (const std::size_t other : selection_.near(effect)) {
+      for (const std::size_t other : selection_.similar_effects(effect)) {
         if (is_listed(other) || is_declared(effect, other)) continue;
-        options_.tell(0.95, "is it " + kind_of(other) + " instead of " + kind_of(effect));
+        options_.tell(0.95, "fitting " + kind_of(other) + " in place of " + kind_of(effect));
         if (!without) without = search_.without(selection_.current(), effect);
         if (!std::isfinite(without->train.objective)) break;
         Hypothesis alternative = search_.screened(*without, other);
-        search_.settle_on_subset(alternative);
+        search_.converge_on_subset(alternative);
         if (!on_screening_subset)
           on_screening_subset = search_.on_screening_subset(selection_.current()).train.objective;
         // So much worse on a part, it is no better on the whole.
@@ -474,7 +474,7 @@ NextBest next_best(const Diagnosis& diagnosis, const FoundEffect& effect) {
 
 Diagnosis diagnose(const Plant& plant, const std::vector<Measurement>& runs,
                    const DiagnosisOptions& options) {
-  if (runs.empty()) throw ConfigError("no run was named: name at least one with --data");
+  if (runs.empty()) throw ConfigError("no run was given: give at least one with --data");
   const std::string fault = fault_of(plant);
   if (!fault.empty()) throw ConfigError(fault);
   const bool shared = std::any_of(runs.begin(), runs.end(), [&](const Measurement& run) {
@@ -482,7 +482,7 @@ Diagnosis diagnose(const Plant& plant, const std::vector<Measurement>& runs,
   });
   if (!shared)
     throw ConfigError(
-        "the runs hold theta_rad only, and the model is a cart alone: add the pendulum to the plant file");
+        "the runs contain only theta_rad, and the model has no pendulum: add the pendulum to the plant file");
   const InterruptibleWork watch(options.signal);
   Diagnostician first(plant, runs, options, HeldOut::middle);
   Diagnosis diagnosis = first.run();
@@ -491,11 +491,11 @@ Diagnosis diagnose(const Plant& plant, const std::vector<Measurement>& runs,
   const bool unexplained = diagnosis.verdict == Verdict::unexplained;
   try {
     // A weak effect may show too little in the runs that are left once one is held out.
-    if (unexplained ? !first.lacks_what_was_held_out() : first.found_what_was_lacking()) return diagnosis;
-    options.tell(0.02, "looking again, with other runs held out");
+    if (unexplained ? !first.misses_held_out_excitation() : first.found_missing_effect()) return diagnosis;
+    options.tell(0.02, "repeating the search with other runs held out");
     Diagnostician second(plant, runs, options, HeldOut::other);
     Diagnosis other = second.run();
-    if (other.verdict == Verdict::explained && (unexplained || second.found_what_was_lacking())) {
+    if (other.verdict == Verdict::explained && (unexplained || second.found_missing_effect())) {
       other.notes.emplace_back(
           "the runs held out at first show what the others alone do not: others were held out instead");
       return other;

@@ -1,4 +1,4 @@
-// A diagnosis as the JSON document that the interface fixes.
+// A diagnosis as the JSON document diagnosis.json.
 #pragma once
 
 #include <nlohmann/json.hpp>

@@ -1,4 +1,4 @@
-// Where the fit of an effect begins, with what an earlier fit of the same data left.
+// The starts of the fit of an effect, from the residual of an earlier fit of the same data.
 #pragma once
 
 #include <vector>
@@ -7,8 +7,8 @@
 
 namespace upright {
 
-/// Values of the effect's parameters to begin from, SI units. What is left of the cart's force at the fit
-/// `point` of `data` points at the pitch of periodic forces.
+/// Starting values of the parameters of an effect, in SI units. The residual force at the fit `point` of
+/// `data` shows the pitch of periodic forces.
 std::vector<std::vector<double>> effect_starts(std::size_t effect, const DataRange& range,
                                                const FitData& data, const FitPoint& point,
                                                const SelectionPolicy& policy, const SearchBudget& budget);

@@ -21,13 +21,13 @@ double value_of(const Hypothesis& h, Eigen::Index place) {
 }
 
 /// What the size of an effect is when there is nothing to find.
-double nothing_of(const Hypothesis& h, Eigen::Index place) {
+double absent_value(const Hypothesis& h, Eigen::Index place) {
   const FreeParameter& p = h.free[static_cast<std::size_t>(place)];
   return p.prior_sigma > 0.0 ? p.prior_mean : effect_registry()[p.effect].parameters[p.index].neutral;
 }
 
 double distance(const Hypothesis& h, Eigen::Index place) {
-  const double off = std::abs(value_of(h, place) - nothing_of(h, place));
+  const double off = std::abs(value_of(h, place) - absent_value(h, place));
   const double sigma = std::sqrt(std::max(h.train.covariance(place, place), 0.0));
   return sigma > 0.0 ? off / sigma : std::numeric_limits<double>::infinity();
 }
@@ -36,7 +36,7 @@ double distance(const Hypothesis& h, Eigen::Index place) {
 /// together with it.
 Plant without(const Hypothesis& h, Eigen::Index place) {
   Plant plant = h.train.point.plant;
-  const double moved = nothing_of(h, place) - value_of(h, place);
+  const double moved = absent_value(h, place) - value_of(h, place);
   const double variance = h.train.covariance(place, place);
   for (std::size_t j = 0; j < h.free.size(); ++j) {
     const FreeParameter& p = h.free[j];
@@ -57,8 +57,7 @@ bool is_proportional(std::size_t effect) {
 
 }  // namespace
 
-bool takes_certainty_away(double distance_with_other, double distance_alone,
-                          const DistinctionPolicy& policy) {
+bool reduces_certainty(double distance_with_other, double distance_alone, const DistinctionPolicy& policy) {
   return distance_with_other < policy.least_distance &&
          distance_with_other < policy.least_loss * distance_alone;
 }
@@ -76,13 +75,13 @@ std::vector<Alternative> linear_alternatives(const Search& search, const Hypothe
   for (const std::size_t other : others) {
     if (!is_proportional(other)) continue;
     if (std::find(listed.begin(), listed.end(), other) != listed.end()) continue;
-    const Hypothesis open = search.opened(h, other);
+    const Hypothesis open = search.with_effect_free(h, other);
     if (!open.valid) continue;
     for (const std::size_t effect : listed) {
       const Eigen::Index before = size_place(h, effect), after = size_place(open, effect);
-      if (before < 0 || after < 0 || !std::isfinite(nothing_of(h, before))) continue;
+      if (before < 0 || after < 0 || !std::isfinite(absent_value(h, before))) continue;
       const double doubt = distance(open, after);
-      if (takes_certainty_away(doubt, distance(h, before), search.policy().distinction))
+      if (reduces_certainty(doubt, distance(h, before), search.policy().distinction))
         alternatives.push_back({effect, other, without(open, after)});
     }
   }

@@ -17,7 +17,7 @@ struct Alternative {
 
 /// Whether an effect that is so many standard errors from nothing may be another, which leaves it fewer once
 /// it is left open too.
-bool takes_certainty_away(double distance_with_other, double distance_alone, const DistinctionPolicy& policy);
+bool reduces_certainty(double distance_with_other, double distance_alone, const DistinctionPolicy& policy);
 
 /// Whether an effect that was fitted in the place of another does as well: by the evidence that is lost, and
 /// the t value of the loss.

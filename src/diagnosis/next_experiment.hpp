@@ -1,5 +1,5 @@
-// The next safe run: of the experiment files in config/experiments/diagnosis, the one that best tells the
-// explanations apart that the data leave open.
+// The next safe run: of the experiment files in config/experiments/diagnosis, the one that best distinguishes
+// the confusable effects.
 #pragma once
 
 #include <optional>
@@ -11,16 +11,15 @@
 
 namespace upright {
 
-/// The library: the files of config/experiments/diagnosis, carried by the program, each with its path in the
-/// repository.
+/// The files of config/experiments/diagnosis, embedded in the program, each with its path in the repository.
 struct LibraryExperiment {
   std::string file;
   Experiment experiment;
 };
 std::vector<LibraryExperiment> experiment_library();
 
-/// `chosen` is the plant that was found, `alternatives` those that explain the data as well, each with the
-/// effect it has instead.
+/// `chosen` is the plant that was found, `alternatives` are plants that fit equally well, each with the
+/// effect that it has instead.
 std::optional<NextExperiment> choose_experiment(
     const Plant& chosen, const std::vector<std::pair<std::size_t, Plant>>& alternatives,
     const std::vector<Measurement>& runs);

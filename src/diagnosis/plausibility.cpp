@@ -10,22 +10,23 @@ namespace upright {
 namespace {
 
 /// Sets the parameter at `place` back to what was believed of it, and takes it out: the others follow.
-void set_back(ParameterBeliefs& beliefs, Eigen::Index place) {
-  const double step = beliefs.prior_mean[place] - beliefs.value[place];
+void set_back(ParameterPosterior& posterior, Eigen::Index place) {
+  const double step = posterior.prior_mean[place] - posterior.value[place];
   const Eigen::VectorXd column =
-      beliefs.covariance.col(place) / std::max(beliefs.covariance(place, place), 1e-300);
-  beliefs.value += column * step;
-  beliefs.covariance -= column * beliefs.covariance.row(place).eval();
+      posterior.covariance.col(place) / std::max(posterior.covariance(place, place), 1e-300);
+  posterior.value += column * step;
+  posterior.covariance -= column * posterior.covariance.row(place).eval();
   std::vector<Eigen::Index> others;
-  for (Eigen::Index i = 0; i < beliefs.value.size(); ++i)
+  for (Eigen::Index i = 0; i < posterior.value.size(); ++i)
     if (i != place) others.push_back(i);
-  const Eigen::MatrixXd covariance = beliefs.covariance(others, others);
-  beliefs = {beliefs.value(others).eval(), beliefs.prior_mean(others).eval(), covariance};
+  const Eigen::MatrixXd covariance = posterior.covariance(others, others);
+  posterior = {posterior.value(others).eval(), posterior.prior_mean(others).eval(), covariance};
 }
 
 }  // namespace
 
-std::vector<std::size_t> certain_parameters(ParameterBeliefs beliefs, const std::vector<bool>& is_correction,
+std::vector<std::size_t> certain_parameters(ParameterPosterior posterior,
+                                            const std::vector<bool>& is_correction,
                                             const CorrectionPolicy& policy) {
   std::vector<std::size_t> open(is_correction.size());
   std::iota(open.begin(), open.end(), std::size_t{0});
@@ -35,15 +36,15 @@ std::vector<std::size_t> certain_parameters(ParameterBeliefs beliefs, const std:
     for (std::size_t a = 0; a < open.size(); ++a) {
       if (!is_correction[open[a]]) continue;
       const auto at = static_cast<Eigen::Index>(a);
-      const double z = std::abs(beliefs.value[at] - beliefs.prior_mean[at]) /
-                       std::sqrt(std::max(beliefs.covariance(at, at), 1e-300));
+      const double z = std::abs(posterior.value[at] - posterior.prior_mean[at]) /
+                       std::sqrt(std::max(posterior.covariance(at, at), 1e-300));
       if (z < least) {
         least = z;
         place = a;
       }
     }
     if (!(least < policy.least_z)) return open;
-    set_back(beliefs, static_cast<Eigen::Index>(place));
+    set_back(posterior, static_cast<Eigen::Index>(place));
     open.erase(open.begin() + static_cast<std::ptrdiff_t>(place));
   }
 }
@@ -52,8 +53,8 @@ bool is_certain_of_all_runs(double certainty, const CorrectionPolicy& policy) {
   return !(certainty < policy.least_certainty_of_all_runs);
 }
 
-bool is_within_belief(double value, double prior_mean, double prior_sigma, const CorrectionPolicy& policy) {
-  return std::abs(value - prior_mean) < policy.within_belief * prior_sigma;
+bool is_within_prior(double value, double prior_mean, double prior_sigma, const CorrectionPolicy& policy) {
+  return std::abs(value - prior_mean) < policy.within_prior * prior_sigma;
 }
 
 EndOfRange end_of_range(double scale, double low, double high, const CorrectionPolicy& policy) {

@@ -9,7 +9,7 @@
 namespace upright {
 
 /// What a fit says of its parameters.
-struct ParameterBeliefs {
+struct ParameterPosterior {
   Eigen::VectorXd value, prior_mean;
   Eigen::MatrixXd covariance;
 };
@@ -17,7 +17,8 @@ struct ParameterBeliefs {
 /// The places of the parameters that are there once every correction which is not certain has been set back
 /// to what was believed of it: the least certain first, and the others follow (a Gaussian approximation of
 /// the likelihood). What is no correction stays.
-std::vector<std::size_t> certain_parameters(ParameterBeliefs beliefs, const std::vector<bool>& is_correction,
+std::vector<std::size_t> certain_parameters(ParameterPosterior posterior,
+                                            const std::vector<bool>& is_correction,
                                             const CorrectionPolicy& policy);
 
 /// Whether a correction is still certain once all runs are fitted.
@@ -25,7 +26,7 @@ bool is_certain_of_all_runs(double certainty, const CorrectionPolicy& policy);
 
 /// A coefficient of the plant file that moved no further than such coefficients do from day to day: the
 /// number is set right, but nothing was missing.
-bool is_within_belief(double value, double prior_mean, double prior_sigma, const CorrectionPolicy& policy);
+bool is_within_prior(double value, double prior_mean, double prior_sigma, const CorrectionPolicy& policy);
 
 /// Where a scale is at an end of what it may be, and stands for something else.
 enum class EndOfRange { none, low, high };

@@ -156,7 +156,7 @@ std::pair<double, std::size_t> explained_share(const Rows& rows, const std::vect
 
 }  // namespace
 
-ResidualPlace locate_residual(const FitData& data, const FitPoint& point, const SelectionPolicy& policy) {
+ResidualLocation locate_residual(const FitData& data, const FitPoint& point, const SelectionPolicy& policy) {
   const Rows rows = collect(data, smooth_residuals(data, point, policy.location.walk), policy);
   const auto [force_share, force_feature] = explained_share(rows, rows.force, policy.location);
   const auto [torque_share, torque_feature] = explained_share(rows, rows.torque, policy.location);

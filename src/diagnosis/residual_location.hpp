@@ -10,11 +10,11 @@ namespace upright {
 
 /// In which equation the residual is and what it goes with most: a ridge regression of the smoothed residual
 /// force and torque on velocity, direction, position, voltage, time, ..., judged on segments it has not seen.
-struct ResidualPlace {
+struct ResidualLocation {
   bool in_pendulum = false;
   double share = 0.0;  ///< of its variance that can be predicted
-  std::string goes_with;
+  std::string depends_on;
 };
-ResidualPlace locate_residual(const FitData& data, const FitPoint& point, const SelectionPolicy& policy);
+ResidualLocation locate_residual(const FitData& data, const FitPoint& point, const SelectionPolicy& policy);
 
 }  // namespace upright

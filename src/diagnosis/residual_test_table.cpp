@@ -46,8 +46,8 @@ std::string slow_push_of(const ResidualTests& s) {
               " times as large as noise that accounts for single samples makes it");
 }
 
-std::string goes_with(const ResidualTests& s) {
-  return text("what is left goes with ", s.goes_with, " (", s.certainty, " standard errors)");
+std::string depends_on(const ResidualTests& s) {
+  return text("what is left goes with ", s.depends_on, " (", s.certainty, " standard errors)");
 }
 std::string comes_in_bursts(const ResidualTests& s) {
   return text("what is left comes in bursts: some stretches are ", s.dispersion, " times as far off as most");
@@ -77,7 +77,7 @@ std::string simulates_too_far_off(const ResidualTests& s) {
 }
 std::string is_uneven(const ResidualTests& s) {
   return text("what is left is uneven (some stretches are ", s.dispersion,
-              " times as far off as most) and may go with ", s.goes_with, " (", s.certainty,
+              " times as far off as most) and may go with ", s.depends_on, " (", s.certainty,
               " standard errors)");
 }
 std::string is_a_disturbance(const ResidualTests& s) {
@@ -92,61 +92,61 @@ std::string is_a_disturbance(const ResidualTests& s) {
 }
 
 using P = ResidualPolicy;
-constexpr auto above = ResidualSign::Beyond::above, below = ResidualSign::Beyond::below;
+constexpr auto above = ResidualCondition::Beyond::above, below = ResidualCondition::Beyond::below;
 
 constexpr std::array table = {
-    ResidualTest{"dependence", {dependence, above, &P::least_dependence}, {}, goes_with},
+    ResidualTest{"dependence", {dependence, above, &P::least_dependence}, {}, depends_on},
     ResidualTest{"bursts", {dispersion, above, &P::bursts}, {}, comes_in_bursts},
     ResidualTest{"heavy_tails",
                  {kurtosis, above, &P::heaviest_tails},
-                 ResidualSign{tails_certainty, above, &P::least_dependence},
+                 ResidualCondition{tails_certainty, above, &P::least_dependence},
                  has_heavy_tails},
     ResidualTest{"lasting_bursts",
                  {kurtosis, above, &P::heavy_tails},
-                 ResidualSign{slow, above, &P::rather_slow},
+                 ResidualCondition{slow, above, &P::rather_slow},
                  comes_in_bursts_that_last},
     ResidualTest{"too_slow", {slow, above, &P::slowest}, {}, is_too_slow},
     ResidualTest{"too_quick", {quick, below, &P::quickest}, {}, is_too_quick},
     ResidualTest{"rather_quick_with_dependence",
                  {quick, below, &P::rather_quick},
-                 ResidualSign{dependence, above, &P::suspected_dependence},
+                 ResidualCondition{dependence, above, &P::suspected_dependence},
                  is_too_quick},
     ResidualTest{"excess", {excess, above, &P::most_excess}, {}, simulates_too_far_off},
     ResidualTest{"uneven_with_dependence",
                  {dispersion, above, &P::uneven},
-                 ResidualSign{dependence, above, &P::suspected_dependence},
+                 ResidualCondition{dependence, above, &P::suspected_dependence},
                  is_uneven}};
 
 }  // namespace
 
-bool ResidualSign::shows(const ResidualTests& left, const ResidualPolicy& policy) const {
-  const double value = statistic(left);
+bool ResidualCondition::shows(const ResidualTests& tests, const ResidualPolicy& policy) const {
+  const double value = statistic(tests);
   return beyond == Beyond::above ? value > policy.*threshold : value < policy.*threshold;
 }
 
-bool ResidualTest::fails(const ResidualTests& left, const ResidualPolicy& policy) const {
-  return sign.shows(left, policy) && (!second || second->shows(left, policy));
+bool ResidualTest::fails(const ResidualTests& tests, const ResidualPolicy& policy) const {
+  return sign.shows(tests, policy) && (!second || second->shows(tests, policy));
 }
 
 std::span<const ResidualTest> residual_test_table() {
   return table;
 }
 
-const ResidualTest* failed_test(const ResidualTests& left, const ResidualPolicy& policy) {
+const ResidualTest* failed_test(const ResidualTests& tests, const ResidualPolicy& policy) {
   const auto failed = std::find_if(table.begin(), table.end(),
-                                   [&](const ResidualTest& test) { return test.fails(left, policy); });
+                                   [&](const ResidualTest& test) { return test.fails(tests, policy); });
   return failed != table.end() ? &*failed : nullptr;
 }
 
-void conclude_tests(ResidualTests& left, const ResidualPolicy& policy) {
-  left.beyond_sensors = left.noise_ratio > policy.sensors_noise_ratio;
-  if (!left.beyond_sensors) {
-    left.sentence = "what is left is the sensors' own noise";
+void conclude_tests(ResidualTests& tests, const ResidualPolicy& policy) {
+  tests.beyond_sensors = tests.noise_ratio > policy.sensors_noise_ratio;
+  if (!tests.beyond_sensors) {
+    tests.sentence = "what is left is the sensors' own noise";
     return;
   }
-  const ResidualTest* failed = failed_test(left, policy);
-  left.structured = left.structured || failed != nullptr;
-  left.sentence = failed != nullptr ? failed->sentence(left) : is_a_disturbance(left);
+  const ResidualTest* failed = failed_test(tests, policy);
+  tests.structured = tests.structured || failed != nullptr;
+  tests.sentence = failed != nullptr ? failed->sentence(tests) : is_a_disturbance(tests);
 }
 
 }  // namespace upright

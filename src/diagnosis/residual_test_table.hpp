@@ -12,32 +12,32 @@
 namespace upright {
 
 /// One sign: a statistic of what is left beyond its threshold.
-struct ResidualSign {
+struct ResidualCondition {
   enum class Beyond { above, below };
   double (*statistic)(const ResidualTests&);
   Beyond beyond;
   double ResidualPolicy::*threshold;
 
-  bool shows(const ResidualTests& left, const ResidualPolicy& policy) const;
+  bool shows(const ResidualTests& tests, const ResidualPolicy& policy) const;
 };
 
 /// Something is missing where its sign shows, and the second one too where there is one.
 struct ResidualTest {
   std::string_view id;
-  ResidualSign sign;
-  std::optional<ResidualSign> second;
+  ResidualCondition sign;
+  std::optional<ResidualCondition> second;
   std::string (*sentence)(const ResidualTests&);
 
-  bool fails(const ResidualTests& left, const ResidualPolicy& policy) const;
+  bool fails(const ResidualTests& tests, const ResidualPolicy& policy) const;
 };
 
 /// In the order in which they are asked: the first that fails says what is left.
 std::span<const ResidualTest> residual_test_table();
 
 /// The first that fails; null where none does.
-const ResidualTest* failed_test(const ResidualTests& left, const ResidualPolicy& policy);
+const ResidualTest* failed_test(const ResidualTests& tests, const ResidualPolicy& policy);
 
 /// Whether what is left is more than noise, in a sentence, once its excess is known too.
-void conclude_tests(ResidualTests& left, const ResidualPolicy& policy);
+void conclude_tests(ResidualTests& tests, const ResidualPolicy& policy);
 
 }  // namespace upright

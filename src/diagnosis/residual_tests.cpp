@@ -286,15 +286,15 @@ ResidualTests examine_residuals(const FitData& data, const FitPoint& point, cons
     if (certain) largest_share = share;
     result.certainty = certainty;
     const bool along = sum_of(blocks.probe[i]).score > 0.0;
-    result.goes_with = std::string(probes[i].name) + " " + std::string(place_of(probes[i].on)) +
-                       (along ? probes[i].looks_like : probes[i].turned_round);
+    result.depends_on = std::string(probes[i].name) + " " + std::string(place_of(probes[i].on)) +
+                        (along ? probes[i].looks_like : probes[i].turned_round);
   }
   return result;
 }
 
-Noise as_slow_as_left(Noise noise, const ResidualTests& structure) {
-  noise.force *= structure.slow_force;
-  noise.torque *= structure.slow_torque;
+Noise low_frequency_equivalent(Noise noise, const ResidualTests& tests) {
+  noise.force *= tests.slow_force;
+  noise.torque *= tests.slow_torque;
   return noise;
 }
 

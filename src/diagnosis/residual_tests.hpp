@@ -27,7 +27,7 @@ struct ResidualTests {
   double dispersion = 1.0;   ///< 95th percentile of block rms over its median
   Tails tails;               ///< of the pulses
   double certainty = 0.0;    ///< of the dependence that shows most [standard errors]
-  std::string goes_with;     ///< what with, and where: in which equation or sensor
+  std::string depends_on;    ///< what with, and where: in which equation or sensor
   /// How much larger slow force and torque are, a few hertz and below, than white noise that accounts for the
   /// samples: a disturbance whose colour the filter does not know is estimated where the samples show it
   /// best, and a plain simulation is moved by what is slow. At least 1.
@@ -39,7 +39,7 @@ struct ResidualTests {
 };
 
 /// White noise that moves a plain simulation as what is left does.
-Noise as_slow_as_left(Noise noise, const ResidualTests& structure);
+Noise low_frequency_equivalent(Noise noise, const ResidualTests& tests);
 
 /// Examines what a fit leaves at `point`.
 ResidualTests examine_residuals(const FitData& data, const FitPoint& point, const SelectionPolicy& policy);

@@ -1,11 +1,11 @@
-// Which way something goes, and how long ago it turned.
+// The direction of a motion and the time since its last reversal.
 #pragma once
 
 #include <cmath>
 
 namespace upright {
 
-/// -1, 0 or 1: 0 within the dead band.
+/// -1, 0 or 1; 0 within the dead band.
 inline double direction_of(double v, double dead) {
   return v > dead ? 1.0 : v < -dead ? -1.0 : 0.0;
 }
@@ -18,7 +18,7 @@ struct Reversal {
     if (now != last) since_s = 0.0;
     last = now;
   }
-  /// The direction, as it fades after a reversal. 0 before the first one.
+  /// The direction, with a magnitude that decays after a reversal. 0 before the first one.
   double fading(double over_s) const { return std::exp(-since_s / over_s) * last; }
 };
 

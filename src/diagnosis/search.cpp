@@ -19,7 +19,7 @@ constexpr double infinity = std::numeric_limits<double>::infinity();
 
 /// The same motion with another plant, whose sensors may show it otherwise.
 FitPoint moved_to(FitPoint point, const Plant& plant) {
-  follow_sensors(point.starts, point.plant, plant);
+  convert_initial_states(point.starts, point.plant, plant);
   point.plant = plant;
   return point;
 }
@@ -31,14 +31,14 @@ std::set<std::size_t> effects_of_both(const Hypothesis& first, const Hypothesis&
 }
 
 /// What a fit says of its parameters, as a belief. What it says nothing of is believed to be where it is.
-Belief belief_of(const Hypothesis& h) {
+GaussianPrior posterior_of(const Hypothesis& h) {
   const auto n = static_cast<Eigen::Index>(h.free.size());
-  Belief belief{Eigen::VectorXd(n), Eigen::MatrixXd::Zero(n, n)};
-  if (n == 0) return belief;
+  GaussianPrior posterior{Eigen::VectorXd(n), Eigen::MatrixXd::Zero(n, n)};
+  if (n == 0) return posterior;
   Eigen::VectorXd scale(n);
   for (Eigen::Index j = 0; j < n; ++j) {
     const FreeParameter& p = h.free[static_cast<std::size_t>(j)];
-    belief.mean[j] = h.train.point.plant.find(p.effect)->values[p.index];
+    posterior.mean[j] = h.train.point.plant.find(p.effect)->values[p.index];
     scale[j] = std::sqrt(h.train.covariance(j, j));
     if (!(scale[j] > 0.0)) scale[j] = 1e-6 * p.scale;
   }
@@ -48,9 +48,9 @@ Belief belief_of(const Hypothesis& h) {
   constexpr double least = 1e-9;
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(0.5 * (correlation + correlation.transpose()));
   const Eigen::VectorXd inverse = solver.eigenvalues().cwiseMax(least).cwiseInverse();
-  belief.information =
+  posterior.information =
       unscale * solver.eigenvectors() * inverse.asDiagonal() * solver.eigenvectors().transpose() * unscale;
-  return belief;
+  return posterior;
 }
 
 double log_determinant(const Eigen::MatrixXd& information) {
@@ -79,7 +79,7 @@ Improvement compare(const Hypothesis& simpler, const Hypothesis& richer) {
   for (std::size_t b = 0; b < blocks; ++b)
     falls.push_back(simpler.train.block_objective[b] - richer.train.block_objective[b]);
   result.train = simpler.train.objective - richer.train.objective;
-  result.belief = std::accumulate(falls.begin(), falls.end(), result.train, std::minus<>());
+  result.prior = std::accumulate(falls.begin(), falls.end(), result.train, std::minus<>());
   result.held = simpler.negative_log_predictive_density - richer.negative_log_predictive_density;
   result.t_value = t_of(falls);
   return result;
@@ -124,15 +124,15 @@ Search::Search(const Plant& plant, const std::vector<Measurement>& runs, const F
   const std::size_t stride = std::clamp<std::size_t>(
       train_.segments.size() / budget_.least_screening_segments, 1, budget_.most_screening_stride);
   choose_screening_subset(stride);
-  train_starts_ = guess_starts(runs, train.segments, plant_);
-  held_starts_ = guess_starts(runs, held.segments, plant_);
+  train_starts_ = estimate_initial_states(runs, train.segments, plant_);
+  held_starts_ = estimate_initial_states(runs, held.segments, plant_);
 }
 
 FitOptions Search::screening() const {
   FitOptions options;
   options.noise_rounds = 0;
-  options.noise_last = true;
-  options.most_iterations = budget_.screening_steps;
+  options.noise_at_end = true;
+  options.max_iterations = budget_.screening_steps;
   return options;
 }
 
@@ -158,7 +158,7 @@ std::vector<FreeParameter> Search::free_of(const std::set<std::size_t>& added) c
   for (const std::size_t effect : nuisances_) {
     const auto parameters = added.contains(effect)
                                 ? free_parameters(effect, range_, policy_.prior)
-                                : believed_parameters(given_, effect, range_, policy_.prior);
+                                : correction_parameters(given_, effect, range_, policy_.prior);
     free.insert(free.end(), parameters.begin(), parameters.end());
   }
   for (const std::size_t effect : added) {
@@ -179,7 +179,7 @@ Hypothesis Search::fitted(const std::set<std::size_t>& added, const FitPoint& st
   return h;
 }
 
-void Search::calm(Hypothesis& h, const FitOptions& options) {
+void Search::restart_with_low_noise(Hypothesis& h, const FitOptions& options) {
   if (!h.valid) return;
   FitPoint point = h.train.point;
   point.noise = reduced_process_noise(point.noise);
@@ -187,29 +187,29 @@ void Search::calm(Hypothesis& h, const FitOptions& options) {
   if (again.train.objective < h.train.objective) h = std::move(again);
 }
 
-bool Search::may_calm(const Hypothesis& base, const Hypothesis& h) const {
+bool Search::may_restart_with_low_noise(const Hypothesis& base, const Hypothesis& h) const {
   // Where every bit of evidence counts, the whole data are asked.
   if (screening_subset_.segments.size() == train_.segments.size()) return true;
   if (!(base.train.objective - h.train.objective > budget_.clear_evidence)) return true;
   FitPoint point = screening_point(h);
   const double as_it_is = fit(screening_subset_, point, h.free, screening()).objective;
   point.noise = reduced_process_noise(point.noise);
-  return fit(screening_subset_, point, h.free, {}).objective < as_it_is - budget_.same_place;
+  return fit(screening_subset_, point, h.free, {}).objective < as_it_is - budget_.restart_tolerance;
 }
 
-void Search::judge(Hypothesis& h, const Noise& noise) const {
+void Search::filter_held_out(Hypothesis& h, const Noise& noise) const {
   if (!std::isfinite(h.train.objective)) return;
   const FitPoint plain{plant_, held_starts_, noise};
   const FitPoint point = moved_to(plain, h.train.point.plant);
   h.held = fit_initial_states(held_, point, budget_.held_out_steps);
 }
 
-const PlainSimulation& Search::simulate(Hypothesis& h) const {
+const FreeRunSimulation& Search::simulate(Hypothesis& h) const {
   if (h.simulation) return *h.simulation;
   Hypothesis plain = h;
-  judge(plain, sensors_only(h.train.point.noise));
+  filter_held_out(plain, sensors_only(h.train.point.noise));
   const FitResult& simulated = held_.segments.empty() ? plain.train : plain.held;
-  h.simulation.emplace(PlainSimulation{gap_of(plain), {}});
+  h.simulation.emplace(FreeRunSimulation{gap_of(plain), {}});
   for (std::size_t s = 0; s < simulated.segment_chi_square.size(); ++s)
     h.simulation->segment_gap.push_back(
         std::sqrt(simulated.segment_chi_square[s] / std::max(simulated.segment_samples[s], 1e-9)));
@@ -229,10 +229,10 @@ bool Search::is_plausible(const Hypothesis& h, std::size_t effect) const {
         !shows_on_encoder(value, range_.theta_resolution_rad, policy_.correction))
       return false;
   }
-  return can_be(h, effect);
+  return is_admissible(h, effect);
 }
 
-bool Search::can_be(const Hypothesis& h, std::size_t effect) const {
+bool Search::is_admissible(const Hypothesis& h, std::size_t effect) const {
   for (const FreeParameter& p : h.free)
     if (p.effect == effect && p.index == 0 && !(h.train.point.plant.find(effect)->values[0] < p.high))
       return false;
@@ -267,8 +267,8 @@ double Search::certainty(const Hypothesis& h, std::size_t effect) const {
          std::sqrt(std::max(held, 1.0));
 }
 
-void Search::weigh(Hypothesis& h) const {
-  judge(h, h.train.point.noise);
+void Search::predict_held_out(Hypothesis& h) const {
+  filter_held_out(h, h.train.point.noise);
   if (std::isfinite(h.train.objective))
     h.negative_log_predictive_density = negative_log_predictive_density_of(h);
 }
@@ -289,17 +289,18 @@ double Search::negative_log_predictive_density_of(const Hypothesis& h) const {
   if (!std::isfinite(h.held.objective) || held_.segments.empty()) return h.held.objective;
   FitOptions options;
   options.noise_rounds = budget_.predictive_noise_rounds;
-  options.most_iterations = budget_.predictive_steps;
-  options.belief = belief_of(h);
-  const FitResult told = fit(held_, h.held.point, h.free, options);
+  options.max_iterations = budget_.predictive_steps;
+  options.joint_prior = posterior_of(h);
+  const FitResult conditioned = fit(held_, h.held.point, h.free, options);
   // Laplace's approximation of the likelihood, averaged over what the training runs left open.
-  return told.objective + log_determinant(told.information) - log_determinant(options.belief->information);
+  return conditioned.objective + log_determinant(conditioned.information) -
+         log_determinant(options.joint_prior->information);
 }
 
-Hypothesis Search::told(const Hypothesis& h) const {
+Hypothesis Search::conditioned_on_held_out(const Hypothesis& h) const {
   FitOptions options;
   options.noise_rounds = 0;
-  options.belief = belief_of(h);
+  options.joint_prior = posterior_of(h);
   FitPoint point = h.held.point;
   point.noise = h.train.point.noise;
   const FitResult held = fit(held_, point, h.free, options);
@@ -316,9 +317,9 @@ Hypothesis Search::baseline() {
       with_fitted_initial_states(train_, {plant_, train_starts_, {.force = 0.1, .torque = 0.01}});
   FitOptions options;
   Hypothesis h = fitted({}, start, options, free_of({}));
-  options.most_iterations = budget_.baseline_restart_steps;
-  calm(h, options);
-  weigh(h);
+  options.max_iterations = budget_.baseline_restart_steps;
+  restart_with_low_noise(h, options);
+  predict_held_out(h);
   return h;
 }
 
@@ -334,17 +335,17 @@ std::vector<FitPoint> Search::points_with(const FitPoint& from, std::size_t effe
   return points;
 }
 
-std::vector<double> Search::promised_gains(const Hypothesis& base,
-                                           const std::vector<std::size_t>& effects) const {
-  FitOptions only_look;
-  only_look.most_iterations = 0;
-  only_look.noise_rounds = 0;
-  const auto promise = [&](const FitPoint& point, const std::vector<FreeParameter>& free) {
-    const FitResult seen = fit(screening_subset_, point, free, only_look);
-    return seen.promised_fall ? seen.objective - *seen.promised_fall : -infinity;
+std::vector<double> Search::predicted_gains(const Hypothesis& base,
+                                            const std::vector<std::size_t>& effects) const {
+  FitOptions linearise_only;
+  linearise_only.max_iterations = 0;
+  linearise_only.noise_rounds = 0;
+  const auto predicted_objective = [&](const FitPoint& point, const std::vector<FreeParameter>& free) {
+    const FitResult seen = fit(screening_subset_, point, free, linearise_only);
+    return seen.predicted_reduction ? seen.objective - *seen.predicted_reduction : -infinity;
   };
   const FitPoint from = screening_point(base);
-  const double without = promise(from, base.free);
+  const double without = predicted_objective(from, base.free);
   std::vector<double> gains;
   for (const std::size_t effect : effects) {
     std::set<std::size_t> added = base.added;
@@ -352,7 +353,7 @@ std::vector<double> Search::promised_gains(const Hypothesis& base,
     const std::vector<FreeParameter> free = free_of(added);
     double least = infinity;
     for (const FitPoint& point : points_with(from, effect, base))
-      least = std::min(least, promise(point, free));
+      least = std::min(least, predicted_objective(point, free));
     gains.push_back(std::isfinite(without) ? without - least : infinity);
   }
   return gains;
@@ -386,13 +387,13 @@ Hypothesis Search::screened_pair(const Hypothesis& base, const Hypothesis& first
   return h;
 }
 
-void Search::settle_on_subset(Hypothesis& h) const {
+void Search::converge_on_subset(Hypothesis& h) const {
   if (std::isfinite(h.train.objective)) h.train = fit(screening_subset_, h.train.point, h.free, {});
 }
 
 Hypothesis Search::on_screening_subset(const Hypothesis& base) const {
   FitOptions options = screening();
-  options.most_iterations = budget_.screening_reference_steps;
+  options.max_iterations = budget_.screening_reference_steps;
   Hypothesis h;
   h.added = base.added;
   h.free = base.free;
@@ -403,7 +404,7 @@ Hypothesis Search::on_screening_subset(const Hypothesis& base) const {
 void Search::refit(const Hypothesis& base, Hypothesis& h) {
   if (!std::isfinite(h.train.objective)) return;
   FitOptions options;
-  options.or_noise = base.train.point.noise;
+  options.alternative_noise = base.train.point.noise;
   FitPoint point = moved_to(base.train.point, h.train.point.plant);
   point.noise = h.train.point.noise;
   h = fitted(h.added, point, options, h.free);
@@ -412,19 +413,19 @@ void Search::refit(const Hypothesis& base, Hypothesis& h) {
 void Search::refine(const Hypothesis& base, Hypothesis& h) {
   if (!std::isfinite(h.train.objective)) return;
   refit(base, h);
-  if (may_calm(base, h)) calm(h, {});
-  weigh(h);
+  if (may_restart_with_low_noise(base, h)) restart_with_low_noise(h, {});
+  predict_held_out(h);
 }
 
-Hypothesis Search::begun_anew(const Hypothesis& base) {
+Hypothesis Search::with_new_initial_states(const Hypothesis& base) {
   FitPoint point = base.train.point;
-  point.starts = guess_starts(*train_.runs, train_.segments, point.plant);
+  point.starts = estimate_initial_states(*train_.runs, train_.segments, point.plant);
   Hypothesis h = fitted(base.added, point, FitOptions{}, base.free);
   const Hypothesis followed =
       fitted(base.added, with_fitted_initial_states(train_, h.train.point), FitOptions{}, base.free);
   if (followed.train.objective < h.train.objective) h = followed;
-  calm(h, {});
-  weigh(h);
+  restart_with_low_noise(h, {});
+  predict_held_out(h);
   return h;
 }
 
@@ -439,7 +440,7 @@ Hypothesis Search::exchanged(const Hypothesis& base, std::size_t effect,
     plant.set(other.number, other.values);
   }
   Hypothesis h = fitted(added, moved_to(base.train.point, plant), FitOptions{}, free_of(added));
-  weigh(h);
+  predict_held_out(h);
   return h;
 }
 
@@ -458,12 +459,12 @@ Hypothesis Search::without(const Hypothesis& base, std::size_t effect) {
   const FitPoint point = moved_to(base.train.point, plant);
   FitOptions options;
   h = fitted(added, point, options, free_of(added));
-  weigh(h);
+  predict_held_out(h);
   return h;
 }
 
-Hypothesis Search::only(const std::vector<std::size_t>& effects, const Hypothesis& from,
-                        const Noise* fixed_noise, bool settled) {
+Hypothesis Search::fitted_separately(const std::vector<std::size_t>& effects, const Hypothesis& from,
+                                     const Noise* fixed_noise, bool settled) {
   Plant plant = plant_;
   std::vector<FreeParameter> free;
   const auto include = [&](std::size_t effect, const std::vector<FreeParameter>& parameters) {
@@ -474,16 +475,16 @@ Hypothesis Search::only(const std::vector<std::size_t>& effects, const Hypothesi
     // What stands in the plant file is believed, if less firmly, even where the data correct it.
     const bool correction = is_nuisance(effect);
     std::vector<FreeParameter> parameters = correction
-                                                ? believed_parameters(given_, effect, range_, policy_.prior)
+                                                ? correction_parameters(given_, effect, range_, policy_.prior)
                                                 : free_parameters(effect, range_, policy_.prior);
-    for (FreeParameter& p : parameters) p.prior_sigma *= correction ? policy_.correction.less_firmly : 1.0;
+    for (FreeParameter& p : parameters) p.prior_sigma *= correction ? policy_.correction.prior_widening : 1.0;
     include(effect, parameters);
   }
   for (const std::size_t effect : nuisances_) {
     if (std::find(effects.begin(), effects.end(), effect) != effects.end()) continue;
     // The zero of the angle is known to a count only, whatever else is.
     const bool zero = effect == effect_number("angle_offset") && given_.find(effect) == nullptr;
-    if (settled || zero) include(effect, believed_parameters(given_, effect, range_, policy_.prior));
+    if (settled || zero) include(effect, correction_parameters(given_, effect, range_, policy_.prior));
   }
   FitPoint point = moved_to(from.train.point, plant);
   FitOptions options;
@@ -492,7 +493,7 @@ Hypothesis Search::only(const std::vector<std::size_t>& effects, const Hypothesi
   return fitted({effects.begin(), effects.end()}, point, options, free);
 }
 
-Hypothesis Search::on_all(const Hypothesis& h) const {
+Hypothesis Search::fitted_to_all_runs(const Hypothesis& h) const {
   FitData all = train_;
   all.segments.insert(all.segments.end(), held_.segments.begin(), held_.segments.end());
   FitPoint point = h.train.point;
@@ -504,7 +505,7 @@ Hypothesis Search::on_all(const Hypothesis& h) const {
   return result.valid ? result : h;
 }
 
-Hypothesis Search::opened(const Hypothesis& h, std::size_t effect) const {
+Hypothesis Search::with_effect_free(const Hypothesis& h, std::size_t effect) const {
   Hypothesis result;
   result.added = h.added;
   result.free = h.free;
@@ -532,10 +533,10 @@ Hypothesis Search::opened(const Hypothesis& h, std::size_t effect) const {
       result.free.push_back(p);
     }
   }
-  FitOptions only_look;
-  only_look.most_iterations = 0;
-  only_look.noise_rounds = 0;
-  result.train = fit(train_, point, result.free, only_look);
+  FitOptions linearise_only;
+  linearise_only.max_iterations = 0;
+  linearise_only.noise_rounds = 0;
+  result.train = fit(train_, point, result.free, linearise_only);
   result.valid = std::isfinite(result.train.objective);
   return result;
 }
@@ -556,7 +557,7 @@ FitPoint Search::pair_point(const Hypothesis& base, const Hypothesis& first, con
 Hypothesis Search::with_pair(const Hypothesis& base, const Hypothesis& first, const Hypothesis& second) {
   const std::set<std::size_t> added = effects_of_both(first, second);
   Hypothesis h = fitted(added, pair_point(base, first, second), FitOptions{}, free_of(added));
-  weigh(h);
+  predict_held_out(h);
   return h;
 }
 

@@ -17,7 +17,7 @@
 namespace upright {
 
 /// A plain simulation of held-out data, in units of the sensors' noise.
-struct PlainSimulation {
+struct FreeRunSimulation {
   double gap = 0.0;                 ///< root mean square of all that is off
   std::vector<double> segment_gap;  ///< the same, by segment
 };
@@ -30,10 +30,10 @@ struct Hypothesis {
   double negative_log_predictive_density =
       0.0;  ///< of the held-out data: minus twice the log of their likelihood, with noise of
             ///< their own, averaged over what the training data leave open of the parameters;
-            ///< not of what `only` and `on_all` made
+            ///< not of what `fitted_separately` and `fitted_to_all_runs` made
   std::vector<FreeParameter> free;  ///< the parameters that moved, in the order of train.covariance
   bool valid = false;               ///< fitted, and no parameter at a bound that makes it another effect
-  std::optional<PlainSimulation> simulation;  ///< once measured
+  std::optional<FreeRunSimulation> simulation;  ///< once measured
 };
 
 /// How much better the richer one is.
@@ -71,12 +71,12 @@ class Search {
   /// How far the objective falls on a part of the training data when each of these is added, as its
   /// derivatives promise it from the best of its starts: quick, and only a promise. Infinite where they do
   /// not reach so far.
-  std::vector<double> promised_gains(const Hypothesis& base, const std::vector<std::size_t>& effects) const;
+  std::vector<double> predicted_gains(const Hypothesis& base, const std::vector<std::size_t>& effects) const;
   /// Adds an effect to a hypothesis: a few steps from every start with the noise as it is, on a part of the
   /// training data.
   Hypothesis screened(const Hypothesis& base, std::size_t effect) const;
   /// Brings a screened hypothesis to convergence on that part, noise included.
-  void settle_on_subset(Hypothesis& screened) const;
+  void converge_on_subset(Hypothesis& screened) const;
   /// Two effects at once on that part, from where each alone was fitted, to convergence.
   Hypothesis screened_pair(const Hypothesis& base, const Hypothesis& first, const Hypothesis& second) const;
   /// A hypothesis on that part alone, with which to compare.
@@ -89,34 +89,34 @@ class Search {
   Hypothesis without(const Hypothesis& base, std::size_t effect);
   /// The same hypothesis from initial states that are guessed from the data once more: those that suited a
   /// poor model keep a good one from its place.
-  Hypothesis begun_anew(const Hypothesis& base);
+  Hypothesis with_new_initial_states(const Hypothesis& base);
   /// The same hypothesis with others, at these values to begin with, in the place of one effect.
   Hypothesis exchanged(const Hypothesis& base, std::size_t effect, const std::vector<PlantEffect>& others);
   /// These effects free with nothing believed of them beforehand. Everything else as in the plant file, or
   /// `settled`: within what is believed of it. Not judged.
-  Hypothesis only(const std::vector<std::size_t>& effects, const Hypothesis& from, const Noise* fixed_noise,
-                  bool settled = false);
+  Hypothesis fitted_separately(const std::vector<std::size_t>& effects, const Hypothesis& from,
+                               const Noise* fixed_noise, bool settled = false);
   /// The same point with one effect more left open, with nothing believed of it and where it does nothing:
   /// what the data then still say of the others.
-  Hypothesis opened(const Hypothesis& h, std::size_t effect) const;
+  Hypothesis with_effect_free(const Hypothesis& h, std::size_t effect) const;
   /// The same effects fitted to all runs, held-out ones too: what is known once the choice is made.
-  Hypothesis on_all(const Hypothesis& h) const;
+  Hypothesis fitted_to_all_runs(const Hypothesis& h) const;
   /// Adds two effects at once to a hypothesis and fits to convergence.
   Hypothesis with_pair(const Hypothesis& base, const Hypothesis& first, const Hypothesis& second);
   /// A hypothesis with its parameters moved to what the held-out data say too, as far as the training runs
   /// leave them open; the noise stays.
-  Hypothesis told(const Hypothesis& h) const;
+  Hypothesis conditioned_on_held_out(const Hypothesis& h) const;
   /// Follows held-out data with this noise.
-  void judge(Hypothesis& hypothesis, const Noise& noise) const;
+  void filter_held_out(Hypothesis& hypothesis, const Noise& noise) const;
   /// A plain simulation of held-out data, at its first call (of training data where none is held out).
-  const PlainSimulation& simulate(Hypothesis& h) const;
+  const FreeRunSimulation& simulate(Hypothesis& h) const;
   /// How far off what was judged is, in units of its noise.
   double gap_of(const Hypothesis& h) const;
   /// A hypothesis in which the new effect does nothing, or is of a size that makes it another effect, has
   /// lost.
   bool is_plausible(const Hypothesis& h, std::size_t effect) const;
   /// The second half of that: no size at the end of its range, no bristles that are a spring.
-  bool can_be(const Hypothesis& h, std::size_t effect) const;
+  bool is_admissible(const Hypothesis& h, std::size_t effect) const;
   /// How many standard errors the size of an effect is from nothing: from what the plant file says, of a
   /// correction. Its other parameters (a shape, a place) are held: without a size they mean nothing.
   double certainty(const Hypothesis& h, std::size_t effect) const;
@@ -124,7 +124,7 @@ class Search {
  private:
   void choose_screening_subset(std::size_t stride);
   /// Filters held-out data with the fitted noise, for their negative log predictive density.
-  void weigh(Hypothesis& h) const;
+  void predict_held_out(Hypothesis& h) const;
   double negative_log_predictive_density_of(const Hypothesis& h) const;
   /// Bristles that bend over a good part of the track before they slide are a spring by another name.
   bool bristles_are_short(const Hypothesis& h) const;
@@ -141,10 +141,10 @@ class Search {
   FitPoint pair_point(const Hypothesis& base, const Hypothesis& first, const Hypothesis& second) const;
   std::vector<PlantState<double>> screening_starts(const std::vector<PlantState<double>>& starts) const;
   /// Fits once more from less noise, and keeps what is better: much noise and a poor fit hold each other up.
-  void calm(Hypothesis& h, const FitOptions& options);
+  void restart_with_low_noise(Hypothesis& h, const FitOptions& options);
   /// Whether a fit from less noise may find better: of what is far better than `base`, as a part of the
   /// training data says.
-  bool may_calm(const Hypothesis& base, const Hypothesis& h) const;
+  bool may_restart_with_low_noise(const Hypothesis& base, const Hypothesis& h) const;
   Hypothesis fitted(const std::set<std::size_t>& added, const FitPoint& start, const FitOptions& options,
                     const std::vector<FreeParameter>& free);
 

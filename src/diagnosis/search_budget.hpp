@@ -1,10 +1,9 @@
-// What bounds the work of a diagnosis: how many candidates, rounds, steps and data are looked at. More of any
-// of these may find more and takes longer; nothing is believed for it (selection_policy.hpp decides that).
+// The limits of a diagnosis's work: how many candidates, rounds, steps and data are used. Larger limits may
+// find more and take longer. No effect is accepted because of them (selection_policy.hpp decides that).
 //
-// How far a fit goes by itself stands in FitOptions, how often a search may follow each sample at most in
-// `default_search_bound`. Each number says why it is as it is, and what its value rests on. "Chosen" means
-// chosen, not measured by itself; the whole is measured in docs/results/diagnosis-matrix.md (time of a
-// diagnosis).
+// FitOptions limits a single fit, and `default_search_bound` limits how often a search may follow each
+// sample. Each comment gives the unit, the reason and the origin of the value. "Chosen" means that the value
+// was not measured by itself; docs/results/diagnosis-matrix.md measures the time of a diagnosis.
 #pragma once
 
 #include <cstddef>
@@ -12,82 +11,89 @@
 namespace upright {
 
 struct SearchBudget {
-  // Screening: which part of the training data is looked at first.
-  /// [segments] Runs differ, segments of a run are alike: every few are taken in turn, but so many at least.
-  /// From twelve segments on it saves half: six 10 s runs with two effects took 35 s of processor time
-  /// instead of 62 s (with two more changes, seed 41/3).
+  // Screening: the part of the training data that is used first.
+  /// [segments] The least number of screening segments. Runs differ, but the segments of a run are similar,
+  /// so only every few are used. From twelve segments on this saves half of the work: six 10 s runs with two
+  /// effects took 35 s of processor time instead of 62 s (with two more changes, seed 41/3).
   std::size_t least_screening_segments = 6;
-  /// [segments] And every third at most. Chosen.
+  /// [segments] The largest stride between screening segments. Chosen.
   std::size_t most_screening_stride = 3;
-  /// [steps] Of a candidate's fit on that part, from each of its starts. Chosen.
+  /// [steps] The steps of a candidate's fit to the screening segments, from each of its starts. Chosen.
   int screening_steps = 4;
-  /// [steps] Of the fit without the candidate, which has converged on all of the data: a few, for the part
-  /// may say a little else. Chosen.
+  /// [steps] The steps of the fit without the candidate. It has converged on all the data and needs only a
+  /// few, because a part of the data can give slightly different values. Chosen.
   int screening_reference_steps = 2;
-  /// [1] What certainly is missing shows on a smaller share of the training data too: then they are not all
-  /// screened once more. Chosen.
+  /// [1] If something is certainly missing, screening segments that are less than this share of the training
+  /// data suffice: the candidates are not screened again on all of them. Chosen.
   double certain_screening_share = 0.5;
 
-  // Candidates: which are fitted in full.
-  /// [1] Candidates are screened that promise this share of what the best does. A promise is kept within a
-  /// factor of a few; of 23 rounds of 14 matrix cases the best was among the first three of that order.
-  double promise_share = 0.1;
-  /// Screened however little they promise. As above: well more than three.
+  // Candidates: which are fitted completely.
+  /// [1] Candidates whose predicted gain is this share of the best one's are screened. Predictions are right
+  /// within a factor of a few. In 23 rounds of 14 matrix cases, the best effect was among the first three in
+  /// the order of predicted gain.
+  double predicted_gain_share = 0.1;
+  /// [candidates] The least number that is screened, whatever their predicted gain. Well above three, for the
+  /// same reason.
   std::size_t least_screened = 8;
-  /// [1] Of `least_evidence`, in proportion to the screening subset: what gains less there is not fitted in
-  /// full. Below one, since a few steps do not reach all. Chosen.
+  /// [1] A candidate that gains less than this share of `least_evidence` on the screening segments, in
+  /// proportion to their number, is not fitted completely. Below one, because a few steps do not reach the
+  /// whole gain. Chosen.
   double least_screening_evidence_share = 0.4;
-  /// [1] Nor what gains less than this share of what the best does: a whole fit does not make up for it.
-  /// Twelve matrix cases gave the same results with it.
+  /// [1] A candidate that gains less than this share of the best one's gain is not fitted completely either,
+  /// because a complete fit would not close the difference. Twelve matrix cases gave the same results with
+  /// and without this limit.
   double least_gain_share = 0.05;
-  /// Candidates that are fitted in full in each round. Chosen.
+  /// [candidates] The most that are fitted completely in each round. Chosen.
   std::size_t most_finalists = 4;
-  /// Candidates of the first round whose pairs are tried where nothing else explains: 28 pairs. Chosen.
+  /// [candidates] If nothing else explains the data, the pairs of this many candidates of the first round are
+  /// tried: 28 pairs. Chosen.
   std::size_t most_resembling = 8;
-  /// Rounds of each way to search, each of which adds one effect. Hidden are two at most on the matrix.
-  /// Chosen.
+  /// [rounds] The rounds of each search. Each adds one effect. The matrix hides at most two. Chosen.
   int most_rounds = 4;
 
-  // Fits: how far they go.
-  /// [steps] Of the plant file's fit from less noise, the first of all: it starts far off. Chosen.
+  // Fits: how far they are continued.
+  /// [steps] The steps of the first fit, of the plant file with little noise. It starts far from its minimum.
+  /// Chosen.
   int baseline_restart_steps = 24;
-  /// [steps] Of the initial states alone, when held-out data are followed. Chosen.
+  /// [steps] The steps of a fit of the initial states alone, when held-out data are followed. Chosen.
   int held_out_steps = 6;
-  /// [rounds, steps] Of a fit of held-out data within what the training data leave open. Chosen.
+  /// [rounds] The noise estimates in a fit of held-out data, in which the parameters stay within what the
+  /// training data leave open. Chosen.
   int predictive_noise_rounds = 1;
+  /// [steps] The steps of that fit. Chosen.
   int predictive_steps = 4;
-  /// [turns] Fits of an effect that is less certain than its evidence says: much noise hides what a poor fit
-  /// leaves, and each gives way to the other by and by. Chosen.
-  int most_turns = 6;
-  /// [evidence] While each gains this. Chosen.
-  double least_turn_gain = 10.0;
-  /// [evidence] Above it, whether a fit from less noise may find better is asked of the screening subset
-  /// first; below, every bit of evidence counts. Chosen.
+  /// [fits] The most further fits of an effect that is less certain than its evidence suggests. A poor fit is
+  /// hidden by a large noise estimate; each further fit reduces both. Chosen.
+  int max_refits = 6;
+  /// [evidence] The least gain of each such fit for another one to follow. Chosen.
+  double min_refit_gain = 10.0;
+  /// [evidence] Above this evidence, the screening segments decide first whether a fit from less noise could
+  /// be better. Below it every difference counts, so all the data are used. Chosen.
   double clear_evidence = 1000.0;
-  /// [evidence] Another way to the same place makes an objective differ by this. Chosen.
-  double same_place = 10.0;
-  /// [1] What gains this share of what the effect it may stand for gained is fitted to the end before it is
-  /// compared: beside the others it starts at the wrong size. Chosen.
+  /// [evidence] Two fits that reach the same minimum in different ways differ by up to this. Chosen.
+  double restart_tolerance = 10.0;
+  /// [1] A possible replacement that gains this share of the gain of the earlier effect is fitted completely
+  /// before the two are compared, because beside the other effects it starts from a wrong size. Chosen.
   double exchange_share = 0.5;
-  /// [1] Of the search's bound, granted after it was reached: examining what was found takes about a tenth of
-  /// a usual search.
+  /// [1] The share of the search's bound that is granted after the bound was reached. The examination of the
+  /// result takes about a tenth of a usual search.
   double examination_share = 0.25;
 
-  // Starts of a force that repeats along the track.
-  /// [samples] Of the residual force, evenly spaced. Chosen.
+  // Starts of a force that is periodic along the track.
+  /// [samples] The samples of the residual force, evenly spaced. Chosen.
   std::size_t most_residual_samples = 4000;
-  /// [samples] Fewer show no pitch. Chosen.
+  /// [samples] Fewer samples show no pitch. Chosen.
   std::size_t least_residual_samples = 50;
-  /// As many as 5 m of track need down to a pitch of 1 mm. Over a longer one (or in another unit) the
-  /// shortest pitches are not looked for: the time that would take grows with the travel without end.
+  /// [frequencies] Enough for 5 m of track and a pitch of 1 mm. On a longer track (or in another unit) the
+  /// shortest pitches are not searched, because the time grows with the travel without limit.
   double most_frequencies = 20000.0;
-  /// Pitches from which to search. Chosen.
+  /// [pitches] The pitches from which fits start. Chosen.
   std::size_t most_pitches = 2;
 
-  /// Draws of the noise for the floor of a plain simulation, of which the largest is the most that noise
-  /// makes. Chosen.
+  /// [draws] The noise draws for the floor of a plain simulation. The largest draw is the limit of what noise
+  /// can cause. Chosen.
   std::size_t floor_draws = 32;
-  /// Effects that are named as next best at most. Chosen, for the reader.
+  /// [effects] The most effects that are named as next best. Chosen for the reader.
   std::size_t most_next_best = 3;
 };
 

@@ -1,11 +1,14 @@
-// What decides in a diagnosis: when an effect is believed, dropped, exchanged or declared indistinguishable,
-// what the residual tests tolerate, and what is believed of parameters beforehand. What bounds the work
-// instead stands in search_budget.hpp.
+// The limits that decide in a diagnosis: when an effect is accepted, dropped, exchanged or declared
+// confusable, what the residual tests accept as noise, and the prior distributions of parameters. Limits of
+// the work are in search_budget.hpp.
 //
-// Evidence is the fall of minus twice the log likelihood: 2 ln of how many times more likely the data become.
-// A t value and a certainty are in standard errors. Each number says why it is as it is, and what its value
-// rests on. "Chosen" means chosen, not measured by itself; all of them together are measured in
-// docs/results/diagnosis-matrix.md.
+// Evidence is the fall of minus twice the log likelihood, that is 2 ln of the likelihood ratio. t values and
+// certainties are in standard errors. Each comment gives the unit, the reason and the origin of the value.
+// "Chosen" means that the value was not measured by itself; docs/results/diagnosis-matrix.md measures all of
+// them together.
+//
+// scripts/write_reference.py copies the comments and values into docs/reference/diagnosis-rules.md, so each
+// member needs a comment of its own that begins with its unit.
 #pragma once
 
 #include <array>
@@ -15,275 +18,284 @@
 
 namespace upright {
 
-/// When an effect belongs to the model.
+/// When an effect is added to the model.
 struct AcceptancePolicy {
-  /// [evidence] Saved on the training data, beyond the price of its parameters. About 30 candidates with up
-  /// to three parameters are tried; 25 keeps chance below one in a thousand when noise is white. From that
-  /// count.
+  /// [evidence] The least evidence on the training runs, after the penalty of the parameters. About 30
+  /// candidates with up to three parameters are tried. With white noise, 25 keeps a chance result below one
+  /// in a thousand diagnoses. Computed from that number of candidates.
   double least_evidence = 25.0;
-  /// [standard errors] Of the saving per quarter of a second, which stays honest where the noise is not
-  /// white. Three are one in 700 by chance. Chosen.
+  /// [standard errors] The least t value of the saving per quarter of a second. It remains reliable if the
+  /// noise is not white. By chance, three occurs once in 700 times. Chosen.
   double least_t = 3.0;
-  /// [evidence] So large that coloured noise cannot have made it, however few the segments are that hold it.
-  /// Chosen.
+  /// [evidence] Coloured noise cannot produce this much, even if few segments contain it. Chosen.
   double overwhelming_evidence = 1000.0;
-  /// [robust standard errors] The size of an effect from nothing. As much as evidence of 16. Chosen.
+  /// [robust standard errors] The least certainty of the size of an effect. Equivalent to an evidence of 16.
+  /// Chosen.
   double least_certainty = 4.0;
-  /// [evidence] Each parameter beyond the first must save this on top: a simpler effect that does nearly as
-  /// well is preferred. Chosen.
-  double parameter_price = 10.0;
-  /// [evidence] By which two do equally well: the plainer one is taken. Odds of 7 to 1. Chosen.
+  /// [evidence] Each parameter beyond the first must save this in addition, so a simpler effect that fits
+  /// nearly as well is preferred. Chosen.
+  double parameter_penalty = 10.0;
+  /// [evidence] Two effects that differ by less fit equally well; the simpler one is taken. Odds of 7 to 1.
+  /// Chosen.
   double equally_good_evidence = 4.0;
-  /// [evidence] Held-out runs that do not excite the effect say nothing: 1.4 are odds of 2 to 1 against it.
-  /// An effect with evidence 448 had been refused at odds of 1.05 to 1.
+  /// [evidence] Held-out runs that do not excite the effect carry no information, so they may speak against
+  /// it by this much: odds of 2 to 1. Without it, an effect with an evidence of 448 was rejected at odds of
+  /// 1.05 to 1.
   double held_out_indifference = 1.4;
-  /// [evidence] Training and held-out runs both say so: each at least. Weak effects in one short run were
-  /// missed without this rule (fresh seeds of the matrix).
+  /// [evidence] If training and held-out runs both support an effect, each needs at least this. Without this
+  /// rule, weak effects in one short run were missed (new seeds of the matrix).
   double least_evidence_of_each = 8.0;
-  /// [evidence] And both together. Above `least_evidence`, for it stands in its place. As above.
+  /// [evidence] The sum that both need. It is larger than `least_evidence` because it replaces it. Same
+  /// origin.
   double least_evidence_together = 40.0;
-  /// [standard errors] Where t is no more than chance makes, held-out evidence does not add to its square:
-  /// one standard error. Chosen. (Held-out evidence of 25 bears out a t of 1.5: seeds 181/83 and 182/114.)
+  /// [standard errors] Below this t value, held-out evidence is not added to its square: one standard error
+  /// is what chance produces. Chosen. (Held-out evidence of 25 confirmed a t of 1.5: seeds 181/83 and
+  /// 182/114.)
   double chance_t = 1.0;
-  /// [standard errors] The least t where nothing but the sensors' noise is left: its evidence needs no other
-  /// witness. Chosen.
+  /// [standard errors] The least t value if only sensor noise remains, because then nothing else can have
+  /// produced the evidence. Chosen.
   double least_t_of_sensors = 1.5;
-  /// [sensor noise] A plain simulation of held-out runs that is no further off than this is the sensors'
-  /// noise. The matrix's own figure for the floor of a right model.
+  /// [sensor noise] A plain simulation of held-out runs with a smaller error leaves only sensor noise. This
+  /// is the matrix's limit for the error of a right model relative to the floor.
   double sensors_gap = 1.05;
-  /// [1] The evidence of an effect is about the square of its certainty. Evidence of this many times as much
-  /// has a fit that has not arrived: it goes on. Less may be noise that is not white. Chosen.
+  /// [1] The evidence of an effect is about the square of its certainty. If it is this many times larger, the
+  /// fit has not converged and is continued. A smaller ratio can come from noise that is not white. Chosen.
   double unconverged_evidence_ratio = 4.0;
-  /// [ln of a ratio] Segments of a plain simulation may be this much further off in the mean. A tenth is
-  /// nothing to see. Chosen.
+  /// [ln of a ratio] The mean error of simulated held-out segments may grow by this. A tenth is not visible.
+  /// Chosen.
   double worse_simulation_by_chance = 0.1;
-  /// [ln of a ratio] And by one standard error of their scatter, which is at least this: while more is
-  /// missing, one and the other come out better or worse by half.
+  /// [ln of a ratio] It may also grow by one standard error of its scatter over the segments, which is taken
+  /// to be at least this: while another effect is missing, errors change by half in either direction.
   double least_simulation_scatter = 0.5;
-  /// [1] What was found stays while it has this share of `least_t`: what is believed already is not dropped
-  /// for being a little less certain beside others. Chosen.
+  /// [1] An effect that was found stays in the model while its t value is above this share of `least_t`. It
+  /// is not dropped because other effects make it slightly less certain. Chosen.
   double kept_t_share = 0.7;
 
-  /// [1] What gains this share of what the best does may be the same thing by another name, or half of it.
-  /// Chosen.
+  /// [1] Effects that gain this share of the gain of the best one are similar to it: they may be the same
+  /// force, or a part of it. Chosen.
   double resembling_share = 0.3;
-  /// [1] The score of one effect within this share of the best one's is close: both are fitted to the end
-  /// before one is chosen, for a fit that stopped a little early is no reason. Chosen.
+  /// [1] If the scores of two effects differ by less than this share, both fits are completed before one is
+  /// chosen, because a fit that stopped early must not decide. Chosen.
   double close_score_share = 0.05;
 };
 
-/// When a number of the plant file is off, and what an effect cannot be.
+/// When a number of the plant file is wrong, and which sizes are impossible.
 struct CorrectionPolicy {
   /// [standard errors] A correction of the plant file is listed from here on. As `least_certainty`. Chosen.
   double least_z = 4.0;
-  /// [standard errors] After the last fit, of all runs, a correction with fewer is none: a 95 percent
-  /// interval would include nothing.
+  /// [standard errors] A correction with less than this after the final fit to all runs is removed, because
+  /// its 95 % interval would contain zero.
   double least_certainty_of_all_runs = 2.0;
-  /// [prior standard deviations] A coefficient of the plant file that moved less is as believed: its number
-  /// is set right, but nothing was missing. Such coefficients move so far from day to day. Chosen.
-  double within_belief = 3.0;
-  /// [1] In the last fits a prior is this many times as wide: the plant file is believed, if less firmly,
-  /// even where the data correct it. Chosen.
-  double less_firmly = 4.0;
-  /// [encoder steps] An offset of the angle below this does not show. A step and a half. Chosen.
+  /// [prior standard deviations] A coefficient of the plant file that moved by less counts as unchanged: its
+  /// number is adjusted, but nothing was missing. Such coefficients change this much from day to day. Chosen.
+  double within_prior = 3.0;
+  /// [1] The factor by which priors are widened in the final fits. The plant file still has weight there, but
+  /// less, where the data correct it. Chosen.
+  double prior_widening = 4.0;
+  /// [encoder steps] A smaller offset of the angle is not visible in the encoder's counts. Chosen.
   double least_angle_offset_steps = 1.5;
-  /// [1] Bristles that bend over this share of the travel before they slide are a spring by another name.
-  /// Bristles of 14 N/m with 5 N of friction had stood for a spring (canterbury data).
+  /// [1] Bristles that bend over more than this share of the travel before they slide act as a spring and are
+  /// rejected. Bristles of 14 N/m with 5 N of friction had been found in place of a spring (canterbury data).
   double bristle_share_of_travel = 0.1;
-  /// [1] A scale this close to the end of its range is at the end, and stands for something else. Far above
-  /// what a bounded step leaves of the way to the end. Chosen.
+  /// [1] A scale within this relative distance of the end of its range is at the end, so it stands for
+  /// something else. Far larger than the distance that the last optimiser step leaves. Chosen.
   double end_of_range = 1e-3;
-  /// [ln of a scale] A number of the plant file that is off by more is noted: no data sheet is so far off.
-  /// Chosen.
+  /// [ln of a scale] A number of the plant file that is further off is named in a note, because no data sheet
+  /// is so wrong. Chosen.
   double doubtful_scale = 0.2;
 };
 
-/// When two explanations are not told apart.
+/// When two effects are confusable.
 struct DistinctionPolicy {
-  /// [evidence] Two explanations that differ by less are not told apart: odds of 3000 to 1, or four standard
-  /// errors. Chosen.
+  /// [evidence] Two effects that differ by less are confusable. Odds of 3000 to 1, or four standard errors.
+  /// Chosen.
   double indistinguishable_evidence = 16.0;
-  /// [evidence] Or by less than its own scatter, but however much it scatters by this at most: ten times the
-  /// above. Chosen.
+  /// [evidence] The most that a difference within its own scatter may be. Ten times the limit above. Chosen.
   double most_scattered_evidence = 160.0;
-  /// [standard errors] What counts as within its own scatter: t of the difference below this, a 95 percent
-  /// interval.
+  /// [standard errors] A difference is within its own scatter if its t value is below this: a 95 % interval.
   double scattered_t = 2.0;
-  /// [standard errors] An effect that is fewer from nothing once another is left open may be that other: as
-  /// much as evidence of 16.
+  /// [standard errors] An effect whose certainty falls below this once another effect is left open may be
+  /// that other effect. Equivalent to an evidence of 16.
   double least_distance = 4.0;
-  /// [1] And the other must be what takes the certainty away: to less than this share of it. Chosen.
+  /// [1] The other effect must reduce the certainty to less than this share of it. Chosen.
   double least_loss = 0.5;
-  /// [1] What has this share of the evidence of the effect that was taken, and is told apart from it, is
-  /// named as next best. Chosen, for the reader only: it decides nothing.
+  /// [1] An effect with this share of the evidence of the effect that was added, and not confusable with it,
+  /// is named as next best. Chosen for the reader; it decides nothing.
   double next_best_share = 1.0 / 3.0;
 };
 
-/// What moves, turns or is driven at all, and what an unmodelled force may follow: absolute scales, those of
-/// a small cart. Made relative to the plant they would change what is measured now, so they are not here. All
+/// Which motion counts as motion, and what an unmodelled force may depend on. The scales are absolute, for a
+/// small cart. Scales relative to the plant would change the measured results, so they are not used. All are
 /// chosen.
 struct MotionPolicy {
-  /// [m/s] Below it the cart's direction is not known.
+  /// [m/s] Below this speed the direction of the cart is not known.
   double still_cart_mps = 2e-3;
-  /// [rad/s] Below it the pendulum's direction is not known.
+  /// [rad/s] Below this rate the direction of the pendulum is not known.
   double still_pendulum_radps = 0.02;
-  /// [V] Below it the voltage's direction is not known.
+  /// [V] Below this voltage its sign is not used.
   double no_voltage_v = 0.02;
 
-  // What an unmodelled force may follow after a reversal: it fades over these times. Two for the cart's
-  // motion, since presliding and the drive settle differently.
+  /// [s] A force after a reversal of the cart decays over this time, or over the next one: two times, since
+  /// presliding and the drive settle differently.
   double fading_after_motion_s = 0.03;
+  /// [s] The longer of the two times after a reversal of the cart.
   double slow_fading_after_motion_s = 0.15;
+  /// [s] The same after a reversal of the voltage.
   double fading_after_voltage_s = 0.05;
+  /// [s] The same after a reversal of the pendulum.
   double fading_after_pendulum_s = 0.1;
 };
 
-/// What the tests on a fit's innovations measure, and what they tolerate of noise.
+/// What the tests of the innovations measure, and what they accept as noise.
 struct ResidualPolicy {
-  /// [s] Blocks whose innovations are compared: longer than single samples, shorter than a stroke of the
-  /// cart. Chosen.
+  /// [s] The length of the blocks of innovations that are compared: longer than single samples, shorter than
+  /// a stroke of the cart. Chosen.
   double block_s = 0.15;
-  /// [samples] And at least so many. Chosen.
+  /// [samples] The least number of samples in a block. Chosen.
   double least_block_samples = 20.0;
-  /// [samples] The weight a block must have in it to count, for quantised samples that repeat weigh less.
-  /// Chosen.
+  /// [samples] The least sum of weights in a block. Repeated quantised samples weigh less than one. Chosen.
   double least_block_weight = 10.0;
-  /// [sensor noise] A block that scatters less is a cart at rest: within a step of its encoder it shows no
+  /// [sensor noise] A block with less scatter belongs to a cart at rest: within one encoder step it shows no
   /// noise. Chosen.
   double at_rest = 0.1;
-  /// [blocks] Fewer say nothing about how they scatter. Chosen.
+  /// [blocks] Fewer blocks do not show how they scatter. Chosen.
   std::size_t least_blocks = 20;
-  /// [percent] The large blocks, whose size over the median is the dispersion. Chosen.
+  /// [percent] The percentile of block sizes whose ratio to the median is the dispersion. Chosen.
   std::size_t large_block_percentile = 95;
-  /// [sensor noise] A white force that moves its sensor by less within a block is the sensor's steps by
-  /// another name: its pulses are not looked at. Chosen.
+  /// [sensor noise] A white force that moves its sensor by less within a block is indistinguishable from
+  /// encoder steps. Its pulses are not tested. Chosen.
   double visible_push = 0.1;
-  /// [pulses] Fewer do not show how large they are at most. Chosen.
+  /// [pulses] Fewer pulses do not show how large they can be. Chosen.
   std::size_t least_pulses = 30;
-  /// [1] Pulses are at most so many times as large as most of them are: half as much again is what chance
-  /// makes of so few. Chosen.
+  /// [1] The RMS of few pulses may exceed the size of most of them by this factor by chance. Chosen.
   double pulses_by_chance = 1.5;
 
-  /// [sensor noise] A plain simulation that is no further off leaves the sensors' own noise, and nothing is
+  /// [sensor noise] If a plain simulation has a smaller error, only sensor noise remains and nothing is
   /// tested. Chosen.
   double sensors_noise_ratio = 1.15;
-  /// [standard errors] What is left goes with something from here on: of the dozen dependences that are
-  /// tried, chance makes one in two hundred times. From that count. The certainty of heavy tails too.
+  /// [standard errors] A dependence of the residual counts from here on. A dozen dependences are tried, and
+  /// chance gives one in two hundred diagnoses. Computed from that number. Also the certainty of heavy tails.
   double least_dependence = 3.5;
-  /// [1] Dispersion (95th percentile of block rms over its median) of what comes in bursts. Chosen.
-  double bursts = 1.6;
-  /// [1] Two signs together, each of which chance makes alone: where nothing was missing in the end, of 317
-  /// cases of the matrix 7 were as uneven (dispersion) and 12 went with something as much, none did both.
-  /// Backlash does.
-  double uneven = 1.3;
-  /// [standard errors] The other sign.
-  double suspected_dependence = 2.5;
-  /// [1] No sensor is perfect: a shift of what it shows counts when it accounts for this share of what is
-  /// left. 27 to 31 percent where a drive gave way (aau data).
-  double least_sensor_share = 0.05;
-  /// [kurtosis] Of the pulses of a disturbance that does not come in bursts at most. A Gaussian's is 3.
+  /// [1] Above this dispersion (95th percentile of block RMS over the median) the residual comes in bursts.
   /// Chosen.
+  double bursts = 1.6;
+  /// [1] Dispersion that counts together with a suspected dependence; chance produces either one alone. Of
+  /// 317 cases of the matrix in which nothing was missing, 7 had this dispersion, 12 such a dependence, and
+  /// none had both. Backlash has both.
+  double uneven = 1.3;
+  /// [standard errors] A suspected dependence. It counts only together with another sign.
+  double suspected_dependence = 2.5;
+  /// [1] No sensor is perfect, so a shift of a sensor counts only if it accounts for this share of the
+  /// residual. A flexible drive accounted for 27 to 31 percent (aau data).
+  double least_sensor_share = 0.05;
+  /// [kurtosis] Above this kurtosis of its pulses a disturbance comes in bursts. A Gaussian has 3. Chosen.
   double heaviest_tails = 5.5;
-  /// [kurtosis] Two signs together, where there is too little to be certain of one: forces that last, and
-  /// come in bursts. Sensors that err by much now and then have heavy tails alone, a steady disturbance lasts
-  /// alone. (Of 1151 right answers on the matrix one had both, of 15 that missed what no effect describes
-  /// five.)
+  /// [kurtosis] Kurtosis that counts together with a slow residual, where the data are too few for one sign
+  /// alone. Sensors with rare large errors have heavy tails only; a steady disturbance is slow only. Of 1151
+  /// right answers on the matrix one had both signs, of 15 that missed an unknown effect five.
   double heavy_tails = 5.0;
-  /// [1] The other sign.
+  /// [1] How slow a residual must be to count together with heavy tails.
   double rather_slow = 1.4;
-  /// [1] What is left may push this many times as hard over a tenth of a second and more as white noise that
-  /// accounts for single samples. A disturbance of 10 Hz makes it 1.8 here at most (measured on the matrix),
-  /// forces that go with the motion more.
+  /// [1] Over a tenth of a second and more, the residual may be this many times as large as white noise that
+  /// accounts for single samples. A disturbance of 10 Hz reaches at most 1.8 (measured on the matrix); forces
+  /// that depend on the motion reach more.
   double slowest = 2.5;
-  /// [1] Or less than this: then it is no force, but in what the sensors show, of which a force is the second
-  /// derivative. Of play 0.15 to 0.55 is left here, of right answers 1 and more.
+  /// [1] If the residual is less than this many times as large, it comes from the sensor and not from a
+  /// force, because a force is the second derivative of the sensor's value. Backlash gives 0.15 to 0.55,
+  /// right answers 1 and more.
   double quickest = 0.6;
-  /// [1] With a suspected dependence. Between the two. Chosen.
+  /// [1] The same limit together with a suspected dependence. Between the two values above. Chosen.
   double rather_quick = 0.75;
-  /// [1] A plain simulation may be this many times as far off as noise like what is left makes it at most;
-  /// and held-out runs by as much again. Chosen.
+  /// [1] A plain simulation may be this many times as far off as the largest of the noise draws, and held-out
+  /// runs this many times further. Chosen.
   double most_excess = 2.0;
 };
 
-/// Where a residual sits: the features it is held against. For the sentence beside an effect; it decides
-/// nothing.
+/// How the residual is located: the regression of the residual force on measured quantities. Its result is
+/// the sentence beside an effect. It decides nothing.
 struct LocationPolicy {
-  /// [m/s] A cart that is faster moves: only then does its position point at the pitch of a periodic force.
-  /// Of a small cart, as the scales below. Chosen.
+  /// [m/s] A faster cart moves, so its position indicates the pitch of a periodic force. For a small cart, as
+  /// all scales below. Chosen.
   double moving_cart_mps = 1e-3;
-  /// [s] Means over blocks shorter than an effect takes, longer than the smoother's memory. Chosen.
+  /// [s] The length of the blocks over which means are taken: shorter than an effect acts, longer than the
+  /// smoother's memory. Chosen.
   double block_s = 0.03;
-  /// [1] Ridge on features of unit size, as a share of their number. Chosen.
+  /// [1] The ridge on features of unit size, as a share of their number. Chosen.
   double ridge = 0.01;
-  /// Rows for each feature, below which nothing is said. Chosen.
+  /// [rows] The least number of rows for each feature. With fewer, nothing is reported. Chosen.
   std::size_t rows_per_feature = 4;
 
-  ResidualWalk walk;  ///< of the smoother
+  ResidualWalk walk;  ///< of the smoother that estimates the residual force
 };
 
-/// What is believed of parameters before the data are looked at.
+/// The prior distributions of parameters.
 struct PriorPolicy {
-  /// [1] Standard deviation of a number in a plant file, relative to its value: data sheets and scales are a
-  /// few percent off.
+  /// [1] The standard deviation of a base parameter relative to its value in the plant file: data sheets and
+  /// scales are a few percent off.
   double base_parameter = 0.05;
-  /// [1] Friction measured on another day is off by more. As above, chosen.
+  /// [1] The same for friction, which changes more from day to day. Chosen.
   double friction = 0.10;
-  /// [1] A scale may be wrong, but not by any amount. Chosen.
+  /// [1] The same for a scale of a sensor or a gain, which may be wrong, but not by any amount. Chosen.
   double scale = 0.25;
-  /// [rad] How well a pendulum at rest shows where down is. Chosen.
+  /// [rad] How accurately a pendulum at rest shows the vertical. Chosen.
   double rest_rad = 1e-3;
-  /// [1] Of the typical size of a parameter, the least that its belief refers to. Chosen.
+  /// [1] Relative priors refer to at least this share of the typical size of a parameter. Chosen.
   double least_share_of_typical = 0.2;
-  /// [1] Forces at work in a run, whatever the size of the rig: this share of the motor's. A few percent.
-  /// Chosen.
+  /// [1] The typical size of forces in a run, as a share of the motor's largest force. Chosen.
   double share_of_motor_force = 0.03;
-  /// [1] Dry friction that the motor cannot overcome would hold the cart for good: at most this many times
-  /// its force. A fit with 1430 N took minutes.
+  /// [1] The most dry friction, as a multiple of the motor's largest force, since the motor must be able to
+  /// overcome it. Without this limit a fit with 1430 N took minutes.
   double most_share_of_motor_force = 2.0;
 
-  // The exponent of a Stribeck curve: 2 is a Gaussian's, 1 an exponential's. Chosen.
+  /// [1] The mean of the exponent of a Stribeck curve: 2 is a Gaussian, 1 an exponential. Chosen.
   double shape_mean = 2.0;
+  /// [1] Its standard deviation. Chosen.
   double shape_sigma = 0.5;
+  /// [1] The smallest exponent. Chosen.
   double least_shape = 0.5;
+  /// [1] The largest exponent. Chosen.
   double most_shape = 4.0;
-  /// [m/s] Slowest Stribeck velocity. Chosen.
+  /// [m/s] The slowest Stribeck velocity. Chosen.
   double least_stribeck_mps = 1e-3;
-  /// [1] And the fastest, as a share of the largest speed: a curve beyond it is not seen. Chosen.
+  /// [1] The fastest Stribeck velocity, as a share of the largest speed: the data do not show a faster one.
+  /// Chosen.
   double most_stribeck_share = 0.5;
-  /// [m/s] But this at least. Chosen.
+  /// [m/s] The fastest Stribeck velocity is at least this. Chosen.
   double fastest_stribeck_mps = 0.02;
-  /// [m] Shortest pitch of a force along the track. Chosen.
+  /// [m] The shortest pitch of a periodic force along the track. Chosen.
   double least_pitch_m = 5e-4;
-  /// [crests] A force counts as one that repeats when the run passes so many.
+  /// [crests] A force is periodic only if the run passes this many of its crests.
   double crests_of_pitch = 3.0;
-  /// [m] But a pitch up to this is always looked for. Chosen.
+  /// [m] Pitches up to this are always searched. Chosen.
   double least_longest_pitch_m = 0.002;
-  /// [m] Standard deviation of the middle of a spring about where the cart is. Of a track of a metre. Chosen.
+  /// [m] The standard deviation of the centre of a spring about the mean position of the cart, for a track of
+  /// a metre. Chosen.
   double spring_center_m = 0.5;
-  // [N/m] Stiffness of bristles. Softer ones are a spring, stiffer ones cannot be told from a rigid contact.
-  // Chosen.
+  /// [N/m] The softest bristles. Softer ones act as a spring. Chosen.
   double least_bristle_stiffness_n_per_m = 5.0;
+  /// [N/m] The stiffest bristles. Stiffer ones are indistinguishable from a rigid contact. Chosen.
   double most_bristle_stiffness_n_per_m = 3e4;
-  /// [s] Longest delay of the input. Chosen.
+  /// [s] The longest delay of the input. Chosen.
   double most_delay_s = 0.2;
-  /// [sample periods] A lag well below the sample period does not show.
+  /// [sample periods] The shortest lag of the motor. Shorter ones are not visible.
   double least_lag_periods = 0.2;
-  /// [s] Longest lag of the motor. Chosen.
+  /// [s] The longest lag of the motor. Chosen.
   double most_lag_s = 0.5;
-  // How far a scale may go. Further, something else is missing: a strong backlash had been explained by 0.3
-  // times the mass.
+  /// [1] The smallest scale. If a smaller one is needed, something else is missing: a strong backlash had
+  /// been explained by 0.3 times the mass.
   double least_scale = 0.3;
+  /// [1] The largest scale. The same reason.
   double most_scale = 3.0;
 };
 
 /// What the runs can show at all.
 struct ExcitationPolicy {
-  /// [sensor steps] A signal that moves by no more shows nothing. Chosen.
+  /// [sensor steps] A signal that moves by no more contains no information. Chosen.
   double least_steps = 30.0;
-  /// [m] A third of the runs is held out by how lively they are: speed of the cart, and of the tip of a
-  /// pendulum of this length beside it. That of a small rig; it weighs one against the other only. Chosen.
+  /// [m] The length of the pendulum when runs are sorted by the speed of the cart and of the pendulum's tip,
+  /// to hold out a third of them. Typical of a small rig; it only weighs the two speeds. Chosen.
   double arm_m = 0.3;
-  /// [s] Speeds are differences over so long, for over one sample they are the encoder's steps. Chosen.
+  /// [s] Speeds are differences over this time. Over one sample they would be encoder steps. Chosen.
   double speed_window_s = 0.02;
 };
 

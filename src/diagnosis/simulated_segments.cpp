@@ -8,7 +8,7 @@ std::vector<SimulatedSegment> simulate_segments(const Plant& plant, const std::v
                                                 const std::vector<Segment>& segments) {
   const FitData data{&runs, segments};
   // Without force and torque noise the filter is a plain simulation.
-  const FitPoint guess{plant, guess_starts(runs, segments, plant), {}};
+  const FitPoint guess{plant, estimate_initial_states(runs, segments, plant), {}};
   const FitPoint point = fit_initial_states(data, guess).point;
   const std::vector<std::vector<LinearStep>> steps = linearise(data, point);
   std::vector<SimulatedSegment> traces;

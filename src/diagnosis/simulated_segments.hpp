@@ -1,5 +1,5 @@
-// Measured and simulated side by side: every segment simulated with the recorded voltages and nothing else,
-// from the initial state that suits the model best.
+// Measured and simulated segments: each segment is simulated open loop with the recorded voltages, from the
+// initial state that fits the model best.
 #pragma once
 
 #include <vector>
@@ -8,7 +8,7 @@
 
 namespace upright {
 
-/// One segment. What a run does not measure, or the model does not have, is empty.
+/// One segment. Quantities that the run does not measure or the model does not have are empty.
 struct SimulatedSegment {
   std::size_t run = 0;
   std::vector<double> time_s, voltage_v;

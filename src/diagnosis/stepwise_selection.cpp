@@ -25,7 +25,7 @@ StepwiseSelection::StepwiseSelection(Search& search, const DiagnosisOptions& opt
       record_(record) {}
 
 void StepwiseSelection::begin() {
-  options_.tell(0.02, "comparing the model as given");
+  options_.tell(0.02, "fitting the model as given");
   given_ = search_.baseline();
   if (!std::isfinite(given_.train.objective))
     throw ConfigError("the model cannot be simulated with these runs: check the plant file");
@@ -33,38 +33,38 @@ void StepwiseSelection::begin() {
 }
 
 void StepwiseSelection::find() {
-  grow(0, budget_.most_rounds, false);
+  select_forward(0, budget_.most_rounds, false);
   try_pairs(finalists_);
-  prune();
+  eliminate_backward();
 }
 
-bool StepwiseSelection::begin_anew() {
-  options_.tell(0.83, "beginning anew");
-  Hypothesis h = search_.begun_anew(current_);
-  if (!is_better_place(current_.train.objective - h.train.objective, policy_.acceptance)) return false;
+bool StepwiseSelection::renew_initial_states() {
+  options_.tell(0.83, "fitting again from new initial states");
+  Hypothesis h = search_.with_new_initial_states(current_);
+  if (!is_better_optimum(current_.train.objective - h.train.objective, policy_.acceptance)) return false;
   current_ = std::move(h);
   return true;
 }
 
 bool StepwiseSelection::find_pairs_of_all() {
   if (!try_pairs(resembling_)) return false;
-  prune();
+  eliminate_backward();
   return true;
 }
 
 bool StepwiseSelection::find_thoroughly(bool certainly_missing) {
   const std::vector<std::size_t> before = found_;
   const double objective = current_.train.objective;
-  grow(budget_.most_rounds, 2 * budget_.most_rounds, true);
+  select_forward(budget_.most_rounds, 2 * budget_.most_rounds, true);
   // What certainly is missing shows on a part of many data too.
   const double share = search_.screening_share();
   if (share < 1.0 && !(certainly_missing && share < budget_.certain_screening_share)) {
     search_.screen_on_all();
-    grow(2 * budget_.most_rounds, 3 * budget_.most_rounds, false);
+    select_forward(2 * budget_.most_rounds, 3 * budget_.most_rounds, false);
   }
   // On the way a better place may have been found for the noise alone.
-  if (found_ == before) return is_better_place(objective - current_.train.objective, policy_.acceptance);
-  prune();
+  if (found_ == before) return is_better_optimum(objective - current_.train.objective, policy_.acceptance);
+  eliminate_backward();
   return true;
 }
 
@@ -75,37 +75,38 @@ std::vector<std::size_t> StepwiseSelection::open_candidates() const {
   return candidates;
 }
 
-std::vector<std::size_t> StepwiseSelection::promising(const Hypothesis& from,
-                                                      const std::vector<std::size_t>& candidates, int round) {
-  const std::vector<double> promised = search_.promised_gains(from, candidates);
+std::vector<std::size_t> StepwiseSelection::promising_candidates(const Hypothesis& from,
+                                                                 const std::vector<std::size_t>& candidates,
+                                                                 int round) {
+  const std::vector<double> predicted = search_.predicted_gains(from, candidates);
   std::vector<std::size_t> ranking(candidates.size());
   std::iota(ranking.begin(), ranking.end(), std::size_t{0});
   std::stable_sort(ranking.begin(), ranking.end(),
-                   [&](std::size_t a, std::size_t b) { return promised[a] > promised[b]; });
+                   [&](std::size_t a, std::size_t b) { return predicted[a] > predicted[b]; });
   double best = 0.0;
-  for (const double gain : promised)
+  for (const double gain : predicted)
     if (std::isfinite(gain)) best = std::max(best, gain);
   std::vector<std::size_t> chosen;
   std::size_t kept = 0;
   for (const std::size_t i : ranking) {
-    const bool unknown = !std::isfinite(promised[i]);
-    if (unknown || kept < budget_.least_screened || promised[i] > budget_.promise_share * best) {
+    const bool unknown = !std::isfinite(predicted[i]);
+    if (unknown || kept < budget_.least_screened || predicted[i] > budget_.predicted_gain_share * best) {
       chosen.push_back(candidates[i]);
       kept += unknown ? 0 : 1;
     } else if (round == 0) {
-      record_.candidates.push_back({candidates[i], 0.0, std::max(promised[i], 0.0)});
+      record_.candidates.push_back({candidates[i], 0.0, std::max(predicted[i], 0.0)});
     }
   }
   return chosen;
 }
 
-double StepwiseSelection::price_of(std::size_t effect) const {
-  return policy_.acceptance.parameter_price *
+double StepwiseSelection::penalty_of(std::size_t effect) const {
+  return policy_.acceptance.parameter_penalty *
          static_cast<double>(effect_registry()[effect].parameters.size() - 1);
 }
 
-double StepwiseSelection::price_of_change(const Hypothesis& from, const Hypothesis& to) const {
-  return policy_.acceptance.parameter_price *
+double StepwiseSelection::penalty_of_change(const Hypothesis& from, const Hypothesis& to) const {
+  return policy_.acceptance.parameter_penalty *
          (static_cast<double>(to.free.size()) - static_cast<double>(from.free.size()));
 }
 
@@ -129,9 +130,9 @@ Decision StepwiseSelection::decided(Evidence& e, Hypothesis& h, std::size_t effe
     switch (decision.waits_for) {
       case MissingFit::none:
         return decision;
-      case MissingFit::levelled_noise:
-        level_noise(h);
-        e.levelled = compare(current_, h);
+      case MissingFit::equal_noise:
+        equalise_noise(h);
+        e.at_equal_noise = compare(current_, h);
         break;
       case MissingFit::simulation:
         e.simulated_gap = search_.simulate(h).gap;
@@ -140,7 +141,7 @@ Decision StepwiseSelection::decided(Evidence& e, Hypothesis& h, std::size_t effe
         e.simulated_segments = simulation_change(h);
         break;
       case MissingFit::all_runs:
-        e.certainty_of_all_runs = search_.certainty(search_.on_all(h), effect);
+        e.certainty_of_all_runs = search_.certainty(search_.fitted_to_all_runs(h), effect);
         break;
       case MissingFit::converged:
         converge(h);
@@ -151,12 +152,12 @@ Decision StepwiseSelection::decided(Evidence& e, Hypothesis& h, std::size_t effe
 }
 
 void StepwiseSelection::converge(Hypothesis& h) {
-  for (int turn = 0; turn < budget_.most_turns; ++turn) {
+  for (int refit = 0; refit < budget_.max_refits; ++refit) {
     Hypothesis further = h;
     search_.refine(h, further);
     const double gain = h.train.objective - further.train.objective;
     if (gain > 0.0) h = std::move(further);
-    if (!(gain > budget_.least_turn_gain)) break;
+    if (!(gain > budget_.min_refit_gain)) break;
   }
 }
 
@@ -175,24 +176,24 @@ SimulationChange StepwiseSelection::simulation_change(Hypothesis& h) {
   return {now.size(), mean, std::sqrt(std::max(square - mean * mean, 0.0))};
 }
 
-void StepwiseSelection::end_doubt() {
-  if (!standing_) return;
+void StepwiseSelection::resolve_doubt() {
+  if (!checkpoint_) return;
   // What stood before is the answer until the held-out runs are on the side of what was added.
-  Standing grown = std::move(*standing_);
-  standing_.reset();
-  std::swap(current_, grown.hypothesis);
-  std::swap(found_, grown.found);
-  Evidence e = evidence_of(Change::trust_grown, current_, grown.hypothesis, {});
-  if (decided(e, grown.hypothesis, 0).accepted) {
-    current_ = std::move(grown.hypothesis);
-    found_ = std::move(grown.found);
+  Checkpoint added = std::move(*checkpoint_);
+  checkpoint_.reset();
+  std::swap(current_, added.hypothesis);
+  std::swap(found_, added.found);
+  Evidence e = evidence_of(Change::trust_added, current_, added.hypothesis, {});
+  if (decided(e, added.hypothesis, 0).accepted) {
+    current_ = std::move(added.hypothesis);
+    found_ = std::move(added.found);
   } else {
     contradicted_ = true;
     record_step();
   }
 }
 
-void StepwiseSelection::level_noise(const Hypothesis& richer) {
+void StepwiseSelection::equalise_noise(const Hypothesis& richer) {
   Hypothesis again = current_;
   again.train.point.noise = richer.train.point.noise;
   search_.refine(again, again);
@@ -201,7 +202,7 @@ void StepwiseSelection::level_noise(const Hypothesis& richer) {
 
 std::string StepwiseSelection::locate(const Hypothesis& h) const {
   const FitData& train = search_.train_data();
-  const ResidualPlace place = locate_residual(train, h.train.point, policy_);
+  const ResidualLocation place = locate_residual(train, h.train.point, policy_);
   std::size_t worst = 0;
   double largest = 0.0;
   for (std::size_t s = 0; s < h.train.segment_chi_square.size(); ++s) {
@@ -215,7 +216,7 @@ std::string StepwiseSelection::locate(const Hypothesis& h) const {
   std::ostringstream text;
   text.precision(3);
   text << "in the " << (place.in_pendulum ? "pendulum" : "cart") << " equation: the residual "
-       << (place.in_pendulum ? "torque" : "force") << " goes with " << place.goes_with << " ("
+       << (place.in_pendulum ? "torque" : "force") << " goes with " << place.depends_on << " ("
        << std::lround(100.0 * place.share) << " percent of it can be predicted); the worst stretch is "
        << run.name << " from " << run.time_s[segment.first] << " to " << run.time_s[segment.last] << " s";
   return text.str();
@@ -241,105 +242,105 @@ void StepwiseSelection::record_step() {
   record_.steps.push_back(std::move(step));
 }
 
-void StepwiseSelection::grow(int first_round, int last_round, bool calmly) {
-  for (int round = first_round; round < last_round && add_best(round, calmly); ++round) {
+void StepwiseSelection::select_forward(int first_round, int last_round, bool with_low_noise) {
+  for (int round = first_round; round < last_round && add_best(round, with_low_noise); ++round) {
   }
-  end_doubt();
+  resolve_doubt();
 }
 
-bool StepwiseSelection::add_best(int round, bool calmly) {
+bool StepwiseSelection::add_best(int round, bool with_low_noise) {
   const double done = std::min(0.05 + 0.2 * round, 0.7);
-  const std::vector<Screened> screened = screen(round, calmly, done);
-  std::vector<Believed> believed = believe(round, screened, calmly, done);
-  if (believed.empty()) return false;
-  take(round, believed[choose(believed)], screened);
+  const std::vector<ScreenedCandidate> screened = screen(round, with_low_noise, done);
+  std::vector<Finalist> accepted = fit_finalists(round, screened, with_low_noise, done);
+  if (accepted.empty()) return false;
+  take(round, accepted[choose(accepted)], screened);
   while (exchange() || simplify()) {
   }
   return true;
 }
 
-std::vector<StepwiseSelection::Screened> StepwiseSelection::screen(int round, bool calmly, double done) {
-  options_.tell(done, "looking for what is missing");
+std::vector<StepwiseSelection::ScreenedCandidate> StepwiseSelection::screen(int round, bool with_low_noise,
+                                                                            double done) {
+  options_.tell(done, "ranking the candidates");
   Hypothesis from = current_;
-  if (calmly) from.train.point.noise = reduced_process_noise(from.train.point.noise);
-  const std::vector<std::size_t> candidates = promising(from, open_candidates(), round);
+  if (with_low_noise) from.train.point.noise = reduced_process_noise(from.train.point.noise);
+  const std::vector<std::size_t> candidates = promising_candidates(from, open_candidates(), round);
   const double on_screening_subset = search_.on_screening_subset(from).train.objective;
-  std::vector<Screened> screened;
+  std::vector<ScreenedCandidate> screened;
   for (std::size_t c = 0; c < candidates.size(); ++c) {
     options_.tell(done + 0.02 + 0.1 * static_cast<double>(c) / static_cast<double>(candidates.size()),
                   "trying " + kind_of(candidates[c]));
     Hypothesis h = search_.screened(from, candidates[c]);
-    const double gain = on_screening_subset - h.train.objective - price_of(candidates[c]);
+    const double gain = on_screening_subset - h.train.objective - penalty_of(candidates[c]);
     if (round == 0) record_.candidates.push_back({candidates[c], 0.0, std::max(gain, 0.0)});
     screened.push_back({candidates[c], std::move(h), gain});
   }
   return screened;
 }
 
-std::vector<StepwiseSelection::Believed> StepwiseSelection::believe(int round,
-                                                                    const std::vector<Screened>& screened,
-                                                                    bool calmly, double done) {
-  std::vector<const Screened*> ranking;
+std::vector<StepwiseSelection::Finalist> StepwiseSelection::fit_finalists(
+    int round, const std::vector<ScreenedCandidate>& screened, bool with_low_noise, double done) {
+  std::vector<const ScreenedCandidate*> ranking;
   ranking.reserve(screened.size());
-  for (const Screened& s : screened) ranking.push_back(&s);
+  for (const ScreenedCandidate& s : screened) ranking.push_back(&s);
   std::stable_sort(ranking.begin(), ranking.end(),
-                   [](const Screened* a, const Screened* b) { return a->gain > b->gain; });
+                   [](const ScreenedCandidate* a, const ScreenedCandidate* b) { return a->gain > b->gain; });
   if (round == 0)
-    for (const Screened* s : ranking)
+    for (const ScreenedCandidate* s : ranking)
       if (resembling_.size() < budget_.most_resembling &&
           s->gain > policy_.acceptance.resembling_share * ranking[0]->gain)
         resembling_.emplace_back(s->effect, s->hypothesis);
-  std::vector<Believed> believed, doubtful;
+  std::vector<Finalist> accepted, doubtful;
   const double least_gain =
       budget_.least_screening_evidence_share * policy_.acceptance.least_evidence * search_.screening_share();
   for (std::size_t place = 0; place < std::min(budget_.most_finalists, ranking.size()); ++place) {
-    const Screened& finalist = *ranking[place];
+    const ScreenedCandidate& finalist = *ranking[place];
     if (finalist.gain < std::max(least_gain, budget_.least_gain_share * ranking[0]->gain)) break;
     options_.tell(
         done + 0.12 + 0.08 * static_cast<double>(place) / static_cast<double>(budget_.most_finalists),
         "fitting " + kind_of(finalist.effect));
-    Believed fitted{finalist.effect, finalist.hypothesis, 0.0};
-    const Decision decision = try_finalist(round, calmly, fitted);
+    Finalist fitted{finalist.effect, finalist.hypothesis, 0.0};
+    const Decision decision = try_finalist(round, with_low_noise, fitted);
     if (decision.accepted)
-      believed.push_back(std::move(fitted));
+      accepted.push_back(std::move(fitted));
     else if (decision.in_doubt())
       doubtful.push_back(std::move(fitted));
   }
-  if (!believed.empty() || doubtful.empty()) return believed;
-  if (!standing_) standing_.emplace(Standing{current_, found_});
+  if (!accepted.empty() || doubtful.empty()) return accepted;
+  if (!checkpoint_) checkpoint_.emplace(Checkpoint{current_, found_});
   return doubtful;
 }
 
-Decision StepwiseSelection::try_finalist(int round, bool calmly, Believed& finalist) {
+Decision StepwiseSelection::try_finalist(int round, bool with_low_noise, Finalist& finalist) {
   auto& [effect, h, score] = finalist;
   search_.refine(current_, h);
   if (round == 0) search_.simulate(h);
   if (round == 0) finalists_.emplace_back(effect, h);
   Evidence e = evidence_of(Change::add, current_, h, {effect});
-  e.price = price_of(effect);
-  e.bends_another = bends_another(h, effect, &Search::can_be);
+  e.penalty = penalty_of(effect);
+  e.bends_another = bends_another(h, effect, &Search::is_admissible);
   e.is_correction = current_.train.point.plant.find(effect) != nullptr;
-  e.with_little_noise = calmly;
+  e.with_low_noise = with_low_noise;
   record_trial(round, effect, h, e.improvement);
   const Decision decision = decided(e, h, effect);
   record_.trials.back().rule = name_of(decision.rule);
   const bool as_first_seen = decision.rule == Rule::held_out_in_doubt;
-  score = (as_first_seen ? e.improvement : compare(current_, h)).train - price_of(effect);
+  score = (as_first_seen ? e.improvement : compare(current_, h)).train - penalty_of(effect);
   return decision;
 }
 
-std::size_t StepwiseSelection::choose(std::vector<Believed>& believed) {
+std::size_t StepwiseSelection::choose(std::vector<Finalist>& accepted) {
   const auto largest = [&] {
     double score = -infinity;
-    for (const Believed& b : believed) score = std::max(score, b.score);
+    for (const Finalist& b : accepted) score = std::max(score, b.score);
     return score;
   };
   const double to_reach = (1.0 - policy_.acceptance.close_score_share) * largest();
-  if (std::count_if(believed.begin(), believed.end(), [&](const Believed& b) { return b.score > to_reach; }) >
+  if (std::count_if(accepted.begin(), accepted.end(), [&](const Finalist& b) { return b.score > to_reach; }) >
       1)
-    for (Believed& b : believed) {
+    for (Finalist& b : accepted) {
       if (b.score <= to_reach) continue;
-      options_.tell(0.8, "fitting " + kind_of(b.effect) + " to the end");
+      options_.tell(0.8, "completing the fit of " + kind_of(b.effect));
       Hypothesis further = b.hypothesis;
       search_.refine(b.hypothesis, further);
       const double gain = b.hypothesis.train.objective - further.train.objective;
@@ -348,25 +349,25 @@ std::size_t StepwiseSelection::choose(std::vector<Believed>& believed) {
       b.score += gain;
     }
   std::vector<Contender> contenders;
-  contenders.reserve(believed.size());
-  for (const Believed& b : believed)
+  contenders.reserve(accepted.size());
+  for (const Finalist& b : accepted)
     contenders.push_back({b.effect, b.score, compare(current_, b.hypothesis).held});
   return best_of(contenders, policy_.acceptance);
 }
 
-void StepwiseSelection::take(int round, Believed& best, const std::vector<Screened>& screened) {
+void StepwiseSelection::take(int round, Finalist& best, const std::vector<ScreenedCandidate>& screened) {
   const std::size_t effect = best.effect;
   where_[effect] = locate(current_);
   for (Trial& trial : record_.trials)
     if (trial.round == static_cast<std::size_t>(round) && trial.effect == effect) trial.taken = true;
   current_ = std::move(best.hypothesis);
   found_.push_back(effect);
-  const auto winner =
-      std::find_if(screened.begin(), screened.end(), [&](const Screened& s) { return s.effect == effect; });
-  for (const Screened& s : screened)
+  const auto winner = std::find_if(screened.begin(), screened.end(),
+                                   [&](const ScreenedCandidate& s) { return s.effect == effect; });
+  for (const ScreenedCandidate& s : screened)
     if (s.effect != effect &&
         (s.gain > policy_.acceptance.resembling_share * winner->gain || is_half_of(s.effect, effect)))
-      near_[effect].push_back(s.effect);
+      similar_effects_[effect].push_back(s.effect);
   record_step();
 }
 
@@ -378,32 +379,32 @@ bool StepwiseSelection::exchange() {
   for (std::size_t i = 0; i + 1 < found_.size(); ++i) {
     const std::size_t effect = found_[i];
     std::vector<std::size_t> others;
-    for (const std::size_t other : near_[effect])
+    for (const std::size_t other : similar_effects_[effect])
       if (!is_found(other) && !exchanged_.contains({effect, other})) others.push_back(other);
     if (others.empty()) continue;
-    options_.tell(0.8, "is it still " + kind_of(effect));
+    options_.tell(0.8, "looking for a replacement of " + kind_of(effect));
     const Hypothesis without = search_.without(current_, effect);
     if (!std::isfinite(without.train.objective)) continue;
-    const double to_beat = search_.on_screening_subset(current_).train.objective - price_of(effect);
+    const double to_beat = search_.on_screening_subset(current_).train.objective - penalty_of(effect);
     const double worth = search_.on_screening_subset(without).train.objective - to_beat;
     for (const std::size_t other : others) {
       // The other half of the force may be found later.
       if (!is_half_of(other, effect)) exchanged_.insert({effect, other});
       Hypothesis h = search_.screened(without, other);
       // What was found beside the one is of the wrong size for the other: the way is longer than a few steps.
-      if (h.train.objective + price_of(other) < to_beat + budget_.exchange_share * worth)
-        search_.settle_on_subset(h);
-      if (!(h.train.objective + price_of(other) < to_beat + policy_.distinction.indistinguishable_evidence))
+      if (h.train.objective + penalty_of(other) < to_beat + budget_.exchange_share * worth)
+        search_.converge_on_subset(h);
+      if (!(h.train.objective + penalty_of(other) < to_beat + policy_.distinction.indistinguishable_evidence))
         continue;
       search_.refine(without, h);
       Evidence e = evidence_of(Change::exchange, current_, h, {other});
-      e.price = price_of(other);
-      e.price_saved = price_of(effect);
+      e.penalty = penalty_of(other);
+      e.penalty_saved = penalty_of(effect);
       e.is_plainer = is_plainer(other, effect);
       if (!decided(e, h, other).accepted) continue;
       where_[other] = where_.at(effect);
-      near_[other] = near_[effect];
-      near_[other].push_back(effect);
+      similar_effects_[other] = similar_effects_[effect];
+      similar_effects_[other].push_back(effect);
       current_ = std::move(h);
       found_[i] = other;
       record_step();
@@ -437,18 +438,18 @@ std::vector<StepwiseSelection::Simpler> StepwiseSelection::simpler_forms() const
 bool StepwiseSelection::simplify() {
   for (const Simpler& form : simpler_forms()) {
     if (!simplified_.insert({form.effect, found_.size()}).second) continue;
-    options_.tell(0.8, "is it simpler than " + kind_of(form.effect));
+    options_.tell(0.8, "trying to simplify " + kind_of(form.effect));
     Hypothesis h = search_.exchanged(current_, form.effect, form.others);
     std::vector<std::size_t> brought;
     for (const PlantEffect& other : form.others) brought.push_back(other.number);
     Evidence e = evidence_of(Change::simplify, current_, h, brought);
-    e.price = price_of_change(current_, h);
+    e.penalty = penalty_of_change(current_, h);
     if (!decided(e, h, brought.front()).accepted) continue;
     current_ = std::move(h);
     auto place = found_.erase(std::find(found_.begin(), found_.end(), form.effect));
     for (const PlantEffect& other : form.others) {
       where_[other.number] = where_.at(form.effect);
-      near_[other.number] = near_[form.effect];
+      similar_effects_[other.number] = similar_effects_[form.effect];
       place = std::next(found_.insert(place, other.number));
     }
     record_step();
@@ -473,7 +474,7 @@ bool StepwiseSelection::try_pairs(const std::vector<std::pair<std::size_t, Hypot
       if (!(quick.train.objective < *to_beat)) continue;
       Hypothesis h = search_.with_pair(given_, contenders[a].second, contenders[b].second);
       Evidence e = evidence_of(Change::pair, so_far, h, {first, second});
-      e.price = price_of_change(so_far, h);
+      e.penalty = penalty_of_change(so_far, h);
       if (!decided(e, h, first).accepted) continue;
       best = std::move(h);
       best_found = {first, second};
@@ -488,16 +489,16 @@ bool StepwiseSelection::try_pairs(const std::vector<std::pair<std::size_t, Hypot
   return true;
 }
 
-void StepwiseSelection::prune() {
+void StepwiseSelection::eliminate_backward() {
   bool again = found_.size() > 1;
   while (again) {
     again = false;
     for (std::size_t i = 0; i < found_.size(); ++i) {
-      options_.tell(0.85, "is " + kind_of(found_[i]) + " still needed");
+      options_.tell(0.85, "checking whether " + kind_of(found_[i]) + " is needed");
       Hypothesis h = search_.without(current_, found_[i]);
       if (!std::isfinite(h.train.objective)) continue;
       Evidence e = evidence_of(Change::keep, h, current_, {});
-      e.price = price_of(found_[i]);
+      e.penalty = penalty_of(found_[i]);
       e.bends_another = bends_another(h, found_[i], &Search::is_plausible);
       if (decided(e, current_, found_[i]).accepted) continue;
       current_ = std::move(h);

@@ -28,7 +28,7 @@ class StepwiseSelection {
   void find();
   /// What is left is more than noise: the same model from initial states as the data show them. Whether that
   /// is better.
-  bool begin_anew();
+  bool renew_initial_states();
   /// What is left is more than noise: pairs of all that resembled the best effect. Whether the model changed.
   bool find_pairs_of_all();
   /// What is left is more than the sensors' noise: as the data show with little noise beyond it, and, unless
@@ -44,7 +44,7 @@ class StepwiseSelection {
   /// against it.
   bool contradicted() const { return contradicted_; }
   /// What gained a fair share of what this one did, when it was added.
-  const std::vector<std::size_t>& near(std::size_t effect) { return near_[effect]; }
+  const std::vector<std::size_t>& similar_effects(std::size_t effect) { return similar_effects_[effect]; }
   /// Where model and data disagreed before this one was added.
   const std::string& where(std::size_t effect) { return where_[effect]; }
   /// The best effects of the first round, each fitted by itself.
@@ -52,21 +52,21 @@ class StepwiseSelection {
 
  private:
   /// A candidate after a few steps on a part of the data, and what it saves beyond its price.
-  struct Screened {
+  struct ScreenedCandidate {
     std::size_t effect = 0;
     Hypothesis hypothesis;
     double gain = 0.0;
   };
 
   /// An effect that might be added, and what it saves beyond its price.
-  struct Believed {
+  struct Finalist {
     std::size_t effect = 0;
     Hypothesis hypothesis;
     double score = 0.0;
   };
 
   /// What was found before an effect was added that held-out runs spoke against.
-  struct Standing {
+  struct Checkpoint {
     Hypothesis hypothesis;
     std::vector<std::size_t> found;
   };
@@ -74,12 +74,12 @@ class StepwiseSelection {
   std::vector<std::size_t> open_candidates() const;
   /// Those that promise a share of what the best one does, some at least, and all that cannot promise. A
   /// promise is kept within a factor of a few (measured on the matrix), so that the best is among them.
-  std::vector<std::size_t> promising(const Hypothesis& from, const std::vector<std::size_t>& candidates,
-                                     int round);
+  std::vector<std::size_t> promising_candidates(const Hypothesis& from,
+                                                const std::vector<std::size_t>& candidates, int round);
 
-  double price_of(std::size_t effect) const;
+  double penalty_of(std::size_t effect) const;
   /// What the parameters must save that one hypothesis has beyond the other; negative where it has fewer.
-  double price_of_change(const Hypothesis& from, const Hypothesis& to) const;
+  double penalty_of_change(const Hypothesis& from, const Hypothesis& to) const;
   /// What the fits made so far say of a change to a model with what it brings. Prices, and what else the
   /// change asks for, are the caller's.
   Evidence evidence_of(Change change, const Hypothesis& from, const Hypothesis& to,
@@ -95,32 +95,33 @@ class StepwiseSelection {
   SimulationChange simulation_change(Hypothesis& h);
   /// What held-out runs spoke against while more was missing must have them on its side in the end, or all
   /// that was added since goes.
-  void end_doubt();
+  void resolve_doubt();
   /// Gives the simpler hypothesis the richer one's noise to start from, so that a better estimate of the
   /// noise is not taken for an effect. What `current_` becomes is at least as good as before.
-  void level_noise(const Hypothesis& richer);
+  void equalise_noise(const Hypothesis& richer);
   /// Where a hypothesis and the data disagree most: in which equation, with what it goes, and when.
   std::string locate(const Hypothesis& h) const;
   void record_trial(int round, std::size_t effect, const Hypothesis& h, const Improvement& improvement);
   void record_step();
 
-  /// Adds effects one at a time, the best first, for as long as the data ask for one. `calmly`: as they show
-  /// with little noise, for much noise can account for the whole of an effect.
-  void grow(int first_round, int last_round, bool calmly);
+  /// Adds effects one at a time, the best first, for as long as the data ask for one. `with_low_noise`: as
+  /// they show with little noise, for much noise can account for the whole of an effect.
+  void select_forward(int first_round, int last_round, bool with_low_noise);
   /// One round: whether an effect was added.
-  bool add_best(int round, bool calmly);
+  bool add_best(int round, bool with_low_noise);
   /// All promising candidates. `done`: how far the work is.
-  std::vector<Screened> screen(int round, bool calmly, double done);
+  std::vector<ScreenedCandidate> screen(int round, bool with_low_noise, double done);
   /// The best of them fitted in full: those that the data believe, or, where there are none, those that only
   /// held-out runs speak against.
-  std::vector<Believed> believe(int round, const std::vector<Screened>& screened, bool calmly, double done);
+  std::vector<Finalist> fit_finalists(int round, const std::vector<ScreenedCandidate>& screened,
+                                      bool with_low_noise, double done);
   /// Fits one of these in full, and decides on it.
-  Decision try_finalist(int round, bool calmly, Believed& finalist);
+  Decision try_finalist(int round, bool with_low_noise, Finalist& finalist);
   /// The one with the largest score. Close ones are fitted to the end first, for a fit that stopped a little
   /// early is no reason. Scores that are equal then leave it to the held-out runs, and where those say the
   /// same, to the plainer effect.
-  std::size_t choose(std::vector<Believed>& believed);
-  void take(int round, Believed& best, const std::vector<Screened>& screened);
+  std::size_t choose(std::vector<Finalist>& accepted);
+  void take(int round, Finalist& best, const std::vector<ScreenedCandidate>& screened);
   /// What was the best name while another effect was still missing need not be the best beside it: each but
   /// the last is exchanged for what had resembled it, where that does better now, or as well and is plainer.
   /// Whether one was.
@@ -143,7 +144,7 @@ class StepwiseSelection {
   /// these is tried in the place of what was found of them, once. Whether one is better.
   bool try_pairs(const std::vector<std::pair<std::size_t, Hypothesis>>& contenders);
   /// Backward deletion: what is no longer needed once others are there goes.
-  void prune();
+  void eliminate_backward();
   /// What the search says of one effect of a hypothesis.
   using Holds = bool (Search::*)(const Hypothesis&, std::size_t) const;
   /// Whether it holds of another effect that was found now, and no longer with `h`.
@@ -157,11 +158,11 @@ class StepwiseSelection {
   Diagnosis& record_;
   Hypothesis given_, current_;
   std::vector<std::size_t> found_;
-  std::optional<Standing> standing_;
+  std::optional<Checkpoint> checkpoint_;
   bool contradicted_ = false;
   std::set<std::pair<std::size_t, std::size_t>> exchanged_;   ///< tried already
   std::set<std::pair<std::size_t, std::size_t>> simplified_;  ///< tried already, beside so many
-  std::map<std::size_t, std::vector<std::size_t>> near_;
+  std::map<std::size_t, std::vector<std::size_t>> similar_effects_;
   std::map<std::size_t, std::string> where_;
   std::vector<std::pair<std::size_t, Hypothesis>> finalists_;
   std::vector<std::pair<std::size_t, Hypothesis>> resembling_;  ///< screened, of the first round

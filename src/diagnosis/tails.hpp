@@ -1,4 +1,4 @@
-// How heavy the tails of numbers are that should have a variance of 1 at least.
+// The heaviness of the tails of numbers with an expected variance of at least 1.
 #pragma once
 
 #include <vector>
@@ -6,12 +6,12 @@
 namespace upright {
 
 struct Tails {
-  double kurtosis = 3.0;   ///< 3: as a Gaussian's
-  double certainty = 0.0;  ///< that they are heavier than a Gaussian's [standard errors of so many numbers]
+  double kurtosis = 3.0;   ///< 3 for a Gaussian
+  double certainty = 0.0;  ///< of tails heavier than a Gaussian's [standard errors for this count]
 };
 
-/// Of numbers whose mean should be 0. Where they scatter by less than 1, no tail of theirs is heavy. Fewer
-/// than 30 numbers show nothing. Certainty: Anscombe and Glynn, Biometrika 70 (1983) 227.
+/// For numbers with an expected mean of 0. If they scatter by less than 1, the tails are not heavy. Fewer
+/// than 30 numbers give no result. Certainty: Anscombe and Glynn, Biometrika 70 (1983) 227.
 Tails tails_of(const std::vector<double>& values);
 
 }  // namespace upright

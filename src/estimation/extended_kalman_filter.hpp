@@ -12,20 +12,19 @@
 
 namespace upright {
 
-/// Covariance, gains and innovation variances of the filter, whose innovations are white under the right
-/// model.
+/// Covariance, gains and innovation variances of the filter. Under the right model its innovations are white.
 class EkfCovariance {
  public:
   EkfCovariance(const Measurement& run, const Plant& plant, const Noise& noise);
 
-  /// Carries the covariance to the next sample.
+  /// Propagates the covariance to the next sample.
   void predict(const LinearStep& step);
 
-  /// Whether a channel is measured, and of something that the plant has.
+  /// Whether a channel is measured and the plant has the quantity.
   bool present(int channel) const { return present_[channel]; }
 
-  /// Updates with one channel: its gain and innovation variance. What is only a part of a measurement
-  /// corrects by as much less.
+  /// Updates with one channel. Returns its gain and innovation variance. A weight below one reduces the
+  /// correction.
   void update(const LinearStep& step, int channel);
 
   double variance() const { return variance_; }
@@ -34,10 +33,10 @@ class EkfCovariance {
  private:
   static constexpr int states = LinearStep::states;
 
-  /// Dry friction under white force: a contact that rests in the model creeps at random in truth.
+  /// Dry friction under white force: a contact that rests in the model creeps randomly in reality.
   struct Creep {
-    double speed = 0.0;  ///< standard deviation; 0: it rests
-    double keeps = 0.0;  ///< share of a speed that is left a sample later
+    double speed = 0.0;  ///< standard deviation; 0 at rest
+    double keeps = 0.0;  ///< share of a speed that remains one sample later
     double moves_s = 0.0;
     double rate_variance = 0.0, covariance = 0.0, place_variance = 0.0;
   };

@@ -22,16 +22,17 @@ void iterate(const FitData& data, const FitOptions& options, GaussNewton& solver
     return estimate_noise(data, solver.linearised(), factors, solver.point());
   };
   double objective = solver.evaluate();
-  if (options.or_noise && objective_with(*options.or_noise) < objective_with(solver.point().noise)) {
-    solver.point().noise = *options.or_noise;
+  if (options.alternative_noise &&
+      objective_with(*options.alternative_noise) < objective_with(solver.point().noise)) {
+    solver.point().noise = *options.alternative_noise;
     objective = solver.evaluate();
   }
   if (options.noise_rounds == 0) solver.descend(objective);
-  if (options.noise_last && std::isfinite(objective)) {
+  if (options.noise_at_end && std::isfinite(objective)) {
     estimate({4.0, 1.5, 1.15});
     objective = solver.evaluate();
   }
-  for (int round = 0; round < options.noise_rounds && std::isfinite(objective) && solver.may_go_on();
+  for (int round = 0; round < options.noise_rounds && std::isfinite(objective) && solver.is_within_bound();
        ++round) {
     const double before = objective;
     constexpr double settled = 2.0, no_matter = 0.5;
@@ -82,8 +83,8 @@ FitResult result_of(const GaussNewton& solver, const std::vector<FreeParameter>&
                                           solver.prior().information(), at_bounds(result.point.plant, free));
   if (!std::isfinite(result.objective)) return result;
   const GaussNewton::Step further = solver.further_step();
-  result.bounded_fall = further.promised_fall;
-  if (!further.cut_short) result.promised_fall = further.promised_fall;
+  result.bounded_reduction = further.predicted_reduction;
+  if (!further.cut_short) result.predicted_reduction = further.predicted_reduction;
   return result;
 }
 

@@ -37,13 +37,14 @@ double longest_step(const FreeParameter& p, double value) {
 
 }  // namespace
 
-Prior::Prior(const std::vector<FreeParameter>& free, const std::optional<Belief>& belief) : free_(free) {
+Prior::Prior(const std::vector<FreeParameter>& free, const std::optional<GaussianPrior>& joint)
+    : free_(free) {
   const auto np = static_cast<Eigen::Index>(free.size());
   mean_.setZero(np);
   information_.setZero(np, np);
-  if (belief) {
-    information_ = belief->information;
-    mean_ = belief->mean;
+  if (joint) {
+    information_ = joint->information;
+    mean_ = joint->mean;
     return;
   }
   for (Eigen::Index j = 0; j < np; ++j) {
@@ -83,7 +84,7 @@ GaussNewton::GaussNewton(const FitData& data, const FitPoint& start, const std::
       free_(free),
       options_(options),
       point_(start),
-      prior_(free, options.belief),
+      prior_(free, options.joint_prior),
       linearised_(data.segments.size()),
       former_(data.segments.size()),
       order_(data.segments.size()) {
@@ -108,7 +109,7 @@ double GaussNewton::evaluate() {
 /// The same after a step. Infinity where one segment, in which the cart sticks or slides for all the others
 /// say, is further off than the others can make up for: the rest are not looked at, and it is looked at first
 /// from then on.
-double GaussNewton::evaluate_step(double promised_fall) {
+double GaussNewton::evaluate_step(double predicted_reduction) {
   constexpr double out_of_reach = 3.0;
   count_work();
   const std::size_t none = order_.size();
@@ -119,7 +120,7 @@ double GaussNewton::evaluate_step(double promised_fall) {
     linearise(s);
     const double rise =
         linearised_[s].normal.likelihood.objective() - former_[s].normal.likelihood.objective();
-    if (!(rise < out_of_reach * promised_fall)) rejecting_segment = i;
+    if (!(rise < out_of_reach * predicted_reduction)) rejecting_segment = i;
   });
   if (rejecting_segment == none) return objective_of_normals() + prior_.objective(point_.plant);
   const auto place = order_.begin() + static_cast<std::ptrdiff_t>(rejecting_segment.load());
@@ -142,8 +143,8 @@ double GaussNewton::sample_count() const {
 void GaussNewton::descend(double& objective) {
   double damping = least_damping;
   converged_ = false;
-  for (int iteration = 0; iteration < options_.most_iterations && std::isfinite(objective) && may_go_on();
-       ++iteration) {
+  for (int iteration = 0;
+       iteration < options_.max_iterations && std::isfinite(objective) && is_within_bound(); ++iteration) {
     const double least_fall = options_.tolerance * sample_count() * 0.1 + 0.02;
     const double next_objective = try_steps(objective, least_fall, damping);
     if (!(next_objective < objective)) {
@@ -166,26 +167,26 @@ double GaussNewton::try_steps(double objective, double least_fall, double& dampi
   double next_objective = infinity, rejected = infinity;
   for (int attempt = 0; attempt < 4; ++attempt) {
     Step next = step(damping);
-    if (next.promised_fall < least_fall && attempt == 0) next = step(damping = hardly_damped);
-    const bool promises = next.promised_fall >= least_fall;
+    if (next.predicted_reduction < least_fall && attempt == 0) next = step(damping = negligible_damping);
+    const bool promises = next.predicted_reduction >= least_fall;
     if (!promises && !next.cut_short) break;
     // A step that hardly differs from one that was rejected is not worth looking at, nor is one that does
     // not even promise to fall.
     constexpr double alike = 0.9;
-    if (promises && next.promised_fall < alike * rejected) {
+    if (promises && next.predicted_reduction < alike * rejected) {
       point_ = std::move(next.point);
       linearised_.swap(former_);
-      next_objective = evaluate_step(std::max(next.promised_fall, least_fall));
+      next_objective = evaluate_step(std::max(next.predicted_reduction, least_fall));
       if (next_objective < objective) break;
       point_ = former;
       linearised_.swap(former_);
-      rejected = next.promised_fall;
+      rejected = next.predicted_reduction;
     }
     damping = std::max(damping, least_damping) * 30.0;
   }
   // Where a step had to be damped, the next one has to be too.
   if (next_objective < objective && !std::isfinite(rejected))
-    damping = std::max(damping * 0.1, hardly_damped);
+    damping = std::max(damping * 0.1, negligible_damping);
   return next_objective;
 }
 
@@ -236,8 +237,8 @@ GaussNewton::Step GaussNewton::step(double damping) const {
   Eigen::VectorXd delta = bounded_step(reduced, damping, result.cut_short);
   move_parameters(delta, result);
   const Eigen::VectorXd to_belief = -prior_.information() * prior_.deviation(point_.plant);
-  result.promised_fall = promise(prior_.information(), to_belief, delta);
-  follow_sensors(result.point.starts, point_.plant, result.point.plant);
+  result.predicted_reduction = promise(prior_.information(), to_belief, delta);
+  convert_initial_states(result.point.starts, point_.plant, result.point.plant);
   move_initial_states(reduced, delta, result);
   return result;
 }
@@ -270,7 +271,8 @@ void GaussNewton::move_initial_states(const ReducedEquations& reduced, const Eig
       way[i] = std::clamp(way[i], -longest[i], longest[i]);
       *values[static_cast<std::size_t>(i)] += way[i];
     }
-    result.promised_fall += promise(linearised_[s].normal.information, linearised_[s].normal.score, way);
+    result.predicted_reduction +=
+        promise(linearised_[s].normal.information, linearised_[s].normal.score, way);
   }
 }
 

@@ -13,7 +13,7 @@ namespace upright {
 /// What is believed of the free parameters beforehand: a Gaussian.
 class Prior {
  public:
-  Prior(const std::vector<FreeParameter>& free, const std::optional<Belief>& belief);
+  Prior(const std::vector<FreeParameter>& free, const std::optional<GaussianPrior>& joint);
 
   const Eigen::MatrixXd& information() const { return information_; }
   /// How far the parameters of a plant are from its mean.
@@ -35,8 +35,8 @@ class GaussNewton {
 
   struct Step {
     FitPoint point;
-    double promised_fall = 0.0;  ///< of the objective, were the residuals linear
-    bool cut_short = false;      ///< at a bound, or for its length
+    double predicted_reduction = 0.0;  ///< of the objective, were the residuals linear
+    bool cut_short = false;            ///< at a bound, or for its length
   };
 
   /// Linearises at the present point; its objective.
@@ -51,9 +51,11 @@ class GaussNewton {
   };
   Information information() const;
   /// The next step, were it hardly damped.
-  Step further_step() const { return step(hardly_damped); }
+  Step further_step() const { return step(negligible_damping); }
   /// Whether the bound of the data leaves more to do.
-  bool may_go_on() const { return data_.bound == nullptr || !data_.bound->is_reached_with(work_samples_); }
+  bool is_within_bound() const {
+    return data_.bound == nullptr || !data_.bound->is_reached_with(work_samples_);
+  }
 
   FitPoint& point() { return point_; }
   const FitPoint& point() const { return point_; }
@@ -66,13 +68,13 @@ class GaussNewton {
   static constexpr double least_damping = 1e-4;  ///< of a first step
   /// Parameters that are one force are told apart by what is believed of them alone: next to nothing beside
   /// what is known of each by itself, and damping goes by that.
-  static constexpr double hardly_damped = 1e-9;
+  static constexpr double negligible_damping = 1e-9;
 
   struct ReducedEquations;
 
   void linearise(std::size_t s);
   void count_work();
-  double evaluate_step(double promised_fall);
+  double evaluate_step(double predicted_reduction);
   double objective_of_normals() const;
   double sample_count() const;
   double try_steps(double objective, double least_fall, double& damping);

@@ -40,7 +40,7 @@ std::pair<double, double> local_fit(const std::vector<double>& t, const std::vec
 }
 
 /// The state of which the sensors show these values.
-void undo_sensors(const Dynamics<double>& dynamics, PlantState<double>& state) {
+void state_from_outputs(const Dynamics<double>& dynamics, PlantState<double>& state) {
   const auto [cart_gain, theta_gain] = sensor_gains(dynamics);
   state.cart_mps /= cart_gain;
   state.theta_radps /= theta_gain;
@@ -51,8 +51,8 @@ void undo_sensors(const Dynamics<double>& dynamics, PlantState<double>& state) {
   state.theta_rad = (state.theta_rad - shown.theta_rad) / theta_gain;
 }
 
-PlantState<double> guess_start(const Measurement& run, const Segment& segment, const Plant& plant,
-                               const Dynamics<double>& dynamics) {
+PlantState<double> estimate_initial_state(const Measurement& run, const Segment& segment, const Plant& plant,
+                                          const Dynamics<double>& dynamics) {
   constexpr double width_s = 0.03;
   PlantState<double> s;
   // Unmeasured angle: hanging at rest.
@@ -62,7 +62,7 @@ PlantState<double> guess_start(const Measurement& run, const Segment& segment, c
   if (run.has_theta() && plant.pendulum)
     std::tie(s.theta_rad, s.theta_radps) =
         local_fit(run.time_s, run.theta_rad, segment.first, segment, width_s);
-  undo_sensors(dynamics, s);
+  state_from_outputs(dynamics, s);
   if (dynamics.has_bristle_state() && s.cart_mps != 0.0) {
     const double direction = s.cart_mps > 0.0 ? 1.0 : -1.0;
     s.bristle_m = direction * dynamics.cart_dry_level(s.cart_m, std::abs(s.cart_mps), direction) /
@@ -102,7 +102,7 @@ FitResult fit_initial_state(const FitData& segment, const FitPoint& point, const
 
 }  // namespace
 
-void follow_sensors(std::vector<PlantState<double>>& starts, const Plant& from, const Plant& to) {
+void convert_initial_states(std::vector<PlantState<double>>& starts, const Plant& from, const Plant& to) {
   const PlantModel<double> model_from = make_model<double>(from), model_to = make_model<double>(to);
   const Dynamics<double> before(model_from), after(model_to);
   const auto [cart_gain, theta_gain] = sensor_gains(before);
@@ -112,25 +112,26 @@ void follow_sensors(std::vector<PlantState<double>>& starts, const Plant& from, 
     state.theta_rad = shown.theta_rad;
     state.cart_mps *= cart_gain;
     state.theta_radps *= theta_gain;
-    undo_sensors(after, state);
+    state_from_outputs(after, state);
   }
 }
 
-std::vector<PlantState<double>> guess_starts(const std::vector<Measurement>& runs,
-                                             const std::vector<Segment>& segments, const Plant& plant) {
+std::vector<PlantState<double>> estimate_initial_states(const std::vector<Measurement>& runs,
+                                                        const std::vector<Segment>& segments,
+                                                        const Plant& plant) {
   const PlantModel<double> model = make_model<double>(plant);
   const Dynamics<double> dynamics(model);
   std::vector<PlantState<double>> starts;
   starts.reserve(segments.size());
   for (const Segment& segment : segments)
-    starts.push_back(guess_start(runs[segment.run], segment, plant, dynamics));
+    starts.push_back(estimate_initial_state(runs[segment.run], segment, plant, dynamics));
   return starts;
 }
 
-FitResult fit_initial_states(const FitData& data, const FitPoint& start, int most_iterations) {
+FitResult fit_initial_states(const FitData& data, const FitPoint& start, int max_iterations) {
   FitOptions options;
   options.noise_rounds = 0;
-  options.most_iterations = most_iterations;
+  options.max_iterations = max_iterations;
   if (data.bound != nullptr) data.bound->check();
   std::vector<FitResult> found(data.segments.size());
   parallel_for(found.size(), [&](std::size_t s) {

@@ -10,12 +10,12 @@
 
 namespace upright {
 
-/// Of one segment: initial state (first) and parameters, whitened.
+/// Whitened normal equations of one segment: initial state first, then parameters.
 struct NormalEquations {
   Eigen::MatrixXd information;
   Eigen::VectorXd score;
   Likelihood likelihood;
-  std::vector<double> blocks;  ///< its objective, a stretch of time at a time
+  std::vector<double> blocks;  ///< its objective, in blocks of time
 };
 
 struct LinearisedSegment {
@@ -23,8 +23,8 @@ struct LinearisedSegment {
   NormalEquations normal;
 };
 
-/// Linearises segment number `s` of the data. Without free parameters `normal` may be null: then there are
-/// steps alone. A residual that is not finite ends it, with an infinite likelihood.
+/// Linearises segment number `s` of the data. Without free parameters `normal` may be null; then only the
+/// steps are computed. A residual that is not finite ends it with an infinite likelihood.
 void linearise_segment(const FitData& data, std::size_t s, const FitPoint& point,
                        const std::vector<FreeParameter>& free, std::vector<LinearStep>& steps,
                        NormalEquations* normal);

@@ -1,4 +1,4 @@
-// The noise of the filter, by maximum likelihood along segments that are linearised.
+// Maximum likelihood estimation of the noise of the filter, along linearised segments.
 #pragma once
 
 #include <vector>
@@ -7,12 +7,12 @@
 
 namespace upright {
 
-/// Minus twice the log likelihood of the data, had the noise been another.
+/// Minus twice the log likelihood of the data with another noise.
 double noise_objective(const FitData& data, const Plant& plant,
                        const std::vector<LinearisedSegment>& linearised, const Noise& noise);
 
-/// Maximum likelihood of the noise of a point by a pattern search with these factors, finer and finer. By how
-/// much it brings the objective down.
+/// Maximum likelihood estimate of the noise of a point, by a pattern search with these factors, which become
+/// finer. Returns the fall of the objective.
 double estimate_noise(const FitData& data, const std::vector<LinearisedSegment>& linearised,
                       const std::vector<double>& factors, FitPoint& point);
 

@@ -1,19 +1,19 @@
-// How far a plain simulation of a right model would be from the measurement, for the noise alone.
+// The error of a plain simulation with the right model, caused by noise alone.
 #pragma once
 
 #include "upright/estimation/fit.hpp"
 
 namespace upright {
 
-/// Root mean square of what disturbances and sensors make of a plain simulation with fitted initial states,
-/// in units of the sensors' noise: 1 without disturbances.
+/// RMS error that disturbances and sensor noise cause in a plain simulation with fitted initial states, in
+/// units of the sensor noise. 1 without disturbances.
 struct SimulationFloor {
-  double usual = 1.0;    ///< in the middle of all draws
+  double usual = 1.0;    ///< the median draw
   double highest = 1.0;  ///< the largest draw
 };
 
-/// `point` holds the plant, starts for the segments and the noise; disturbances are drawn from it (always the
-/// same ones), `draws` times, and carried along the linearised motion.
+/// `point` has the plant, the initial states of the segments and the noise. Disturbances are drawn from this
+/// noise `draws` times with a fixed seed, and propagated along the linearised motion.
 SimulationFloor simulation_floor(const FitData& data, const FitPoint& point, std::size_t draws);
 
 }  // namespace upright

@@ -8,8 +8,8 @@ namespace upright {
 
 /// Covariance of the parameters, robust to noise that is not white (sandwich estimator): from the information
 /// of likelihood and prior together, the scatter of the scores over segments, and the information of the
-/// prior. `held`: of each parameter whether it stands at a bound. Such a one is not estimated but held there,
-/// and lends the others no doubt.
+/// prior. `held`: whether each parameter is at a bound. Such a parameter is treated as fixed and adds no
+/// uncertainty to the others.
 Eigen::MatrixXd sandwich_covariance(const Eigen::MatrixXd& information, const Eigen::MatrixXd& spread,
                                     const Eigen::MatrixXd& prior, const std::vector<bool>& held);
 

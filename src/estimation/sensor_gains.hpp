@@ -1,4 +1,4 @@
-// What the sensors show of the state, to which they are linear.
+// The gains of the sensors. Their values are linear in the state.
 #pragma once
 
 #include <array>
@@ -7,7 +7,7 @@
 
 namespace upright {
 
-/// Of a unit of cart and pendulum.
+/// The sensor value for a unit of cart position or pendulum angle.
 template <class S>
 std::array<S, 2> sensor_gains(const Dynamics<S>& dynamics) {
   PlantState<S> unit;

@@ -1,5 +1,5 @@
-// What is left over, as a force on the cart and a torque on the pendulum: estimated by a Kalman smoother
-// along the simulated trajectory, with the force and the torque as extra states that wander.
+// The residual as a force on the cart and a torque on the pendulum, estimated by a Kalman smoother along the
+// simulated trajectory. Force and torque are additional states that follow random walks.
 #pragma once
 
 #include <array>
@@ -12,13 +12,13 @@ namespace upright {
 
 /// The residual force and torque as random walks.
 struct ResidualWalk {
-  // How fast they may wander: across their whole size within a few hundredths of a second. Of a small cart.
+  // The intensities of the walks: their typical size within a few hundredths of a second. For a small cart.
   // Chosen.
   double force_n_per_sqrt_s = 3.0;
   double torque_nm_per_sqrt_s = 0.3;
   /// Variances at the beginning of a segment: of position, angle, their rates and the bristles' deflection
-  /// [m2, rad2, (m/s)2, (rad/s)2, m2], and of the residual force and torque [N2, (N m)2]. Of a small cart
-  /// too. Chosen.
+  /// [m2, rad2, (m/s)2, (rad/s)2, m2], and of the residual force and torque [N2, (N m)2]. For a small cart.
+  /// Chosen.
   std::array<double, 7> start_variances = {1e-6, 1e-4, 1e-2, 1e-1, 1e-6, 4.0, 0.04};
 };
 

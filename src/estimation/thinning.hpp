@@ -1,4 +1,4 @@
-// Which segments of many data to work on.
+// The choice of segments if the data are many.
 #pragma once
 
 #include <vector>
@@ -7,10 +7,10 @@
 
 namespace upright {
 
-/// Segments in which something moves; those that rest say nothing more than that they rest.
+/// Segments with motion. Segments at rest carry no other information.
 std::vector<Segment> moving_segments(const std::vector<Measurement>& runs);
 
-/// Every n-th segment, so that about `most` samples are left and every run keeps its share.
+/// Every n-th segment, so that about `most` samples remain and each run keeps its share.
 std::vector<Segment> thinned(const std::vector<Segment>& segments, double most);
 
 }  // namespace upright

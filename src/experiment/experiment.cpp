@@ -17,7 +17,7 @@ constexpr double longest_trial_s = 7200.0;
 constexpr double zero_patience_s = 2.0;
 /// A swing-up that fails is tried again; one that fails so often has a cause that stays.
 constexpr int most_attempts = 3;
-constexpr const char* again = "; the same command makes this piece again";
+constexpr const char* again = "; start the same command again to repeat this piece";
 
 std::string section_of(const ExperimentSetup& setup, const Piece& piece, const ScriptContext& context) {
   return "experiment:\n  name: " + setup.experiment.name + "\n  why: " + yaml_quoted(setup.experiment.why) +
@@ -53,8 +53,7 @@ void start_folder(const ExperimentSetup& setup, const std::vector<Piece>& pieces
   out << experiment_record(setup, pieces);
   out.close();
   write_plant_file(setup.plant, folder / "plan_plant.yaml", {"What the plan was made with."});
-  if (!out)
-    throw ConfigError("cannot write " + file.string() + ": name a folder that can be written with --out");
+  if (!out) throw ConfigError("cannot write " + file.string() + ": choose a writable folder with --out");
 }
 
 /// A trial that was made. Without an outcome: why, and whether it may be made again without anybody's hands.
@@ -136,8 +135,8 @@ class TrialMaker {
     attempt.result.run_directory = done.directory.filename().string();
     if (reason == StopReason::duration && !script_over) {
       attempt.result.outcome.clear();
-      attempt.sentence = "the piece " + piece.label + " was not over after the " +
-                         exact_text(longest_trial_s) + " s that a run may last: make it shorter";
+      attempt.sentence = "the piece " + piece.label + " did not end within " + exact_text(longest_trial_s) +
+                         " s, the longest time of a run: make the piece shorter";
     } else {
       attempt.sentence = sentence_of(done.outcome, limits);
     }
@@ -171,7 +170,7 @@ ExperimentResult run_experiment(const ExperimentSetup& setup, const std::vector<
     const Piece& piece = pieces[trial->piece];
     if (options.announce) options.announce(piece, *trial);
     if (signal.load() != 0) {
-      result.sentence = "it was stopped: start the same command again to go on";
+      result.sentence = "the experiment was stopped: start the same command again to continue";
       return result;
     }
     const Attempt attempt = maker.make(piece, *trial);
@@ -182,7 +181,8 @@ ExperimentResult run_experiment(const ExperimentSetup& setup, const std::vector<
       if (attempt.may_repeat && attempts < most_attempts && attempt.stop.done()) continue;
       result.sentence = attempt.sentence;
       if (attempts > 1)
-        result.sentence += "; " + std::to_string(attempts) + " attempts in a row ended before they balanced";
+        result.sentence +=
+            "; " + std::to_string(attempts) + " attempts in a row ended before the pendulum balanced";
       return result;
     }
     attempts = 0;

@@ -130,7 +130,8 @@ std::vector<TrialResult> read_trials(const std::filesystem::path& folder, const 
 std::vector<TrialResult> read_trials(const std::filesystem::path& folder, const ExperimentSetup& setup,
                                      const std::vector<Piece>& pieces);
 
-/// `hand` is null on hardware, whose rig is opened anew for each trial.
+/// `hand` is null on hardware, whose rig is opened anew for each trial. Seven parameters: what is run (two),
+/// on what (three), and how; each caller has them apart.
 ExperimentResult run_experiment(const ExperimentSetup& setup, const std::vector<Piece>& pieces, Rig& rig,
                                 SimulatedRigWithHand* hand, Clock& clock, const SignalFlag& signal,
                                 const ExperimentOptions& options);

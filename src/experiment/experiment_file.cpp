@@ -23,7 +23,7 @@ void refuse_long_times(const YamlMap& item, const PieceKind& kind, double& total
               "make the piece shorter than " + exact_text(longest_piece_s) + " s");
   total_s += kind.runs() * time.duration_s;
   if (total_s > longest_experiment_s)
-    item.fail(time.key, "makes the experiment last more than a day", "make it shorter, or split the file");
+    item.fail(time.key, "makes the experiment last longer than a day", "shorten it, or split the file");
 }
 
 Experiment read(const YamlMap& document, std::string text) {
@@ -32,7 +32,7 @@ Experiment read(const YamlMap& document, std::string text) {
   experiment.name = map.text("name");
   if (!is_plain_name(experiment.name, longest_name))
     map.fail("name", "is '" + experiment.name.substr(0, 60) + "'",
-             "use at most 60 lower-case letters, digits, '-' and '_', it names folders");
+             "the name is used for folders, so use at most 60 lower-case letters, digits, '-' and '_'");
   experiment.why = map.text("why");
   if (map.has("plant")) experiment.plant = map.path("plant");
   if (map.has("gains")) experiment.gains = map.path("gains");
@@ -46,8 +46,8 @@ Experiment read(const YamlMap& document, std::string text) {
   for (const YamlMap& item : map.maps("pieces")) {
     Piece piece = read_piece(item);
     if (balances(piece) && !compares(piece) && experiment.gains.empty())
-      item.fail("kind", "is one that balances, and the experiment names no gains",
-                "add gains: a gain file to the experiment");
+      item.fail("kind", "needs gains to balance with, and the experiment names none",
+                "add 'gains: FILE' with a gain file to the experiment");
     const std::string label = piece.label;
     for (int i = 2; labels.contains(piece.label); ++i) piece.label = label + "-" + std::to_string(i);
     labels.insert(piece.label);
@@ -58,7 +58,7 @@ Experiment read(const YamlMap& document, std::string text) {
   }
   if (experiment.pieces.empty() || experiment.pieces.size() > 100)
     map.fail("pieces", "has " + std::to_string(experiment.pieces.size()) + " entries",
-             "give 1 to 100 pieces");
+             "list 1 to 100 pieces");
   map.finish();
   document.finish();
   experiment.text = std::move(text);

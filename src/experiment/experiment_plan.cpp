@@ -42,8 +42,8 @@ void refuse_beyond_limits(const ExperimentSetup& setup, double amplifier_limit_v
   const Experiment& e = setup.experiment;
   const double widest = setup.rig.track_limit_m - room_to_limit_m;
   if (e.travel_m > widest) {
-    const std::string cause = "the rig stops at " + brief_text(setup.rig.track_limit_m) + " m, and " +
-                              e.name + " plans to " + brief_text(e.travel_m) + " m";
+    const std::string cause = "the rig stops at " + brief_text(setup.rig.track_limit_m) + " m, but " +
+                              e.name + " asks for a travel of " + brief_text(e.travel_m) + " m";
     const std::string remedy = "lower travel_m to " + brief_text(widest) + " or less";
     if (e.source) e.source->fail("travel_m", "(" + cause + ")", remedy);
     throw ConfigError(cause + ": " + remedy);
@@ -51,11 +51,12 @@ void refuse_beyond_limits(const ExperimentSetup& setup, double amplifier_limit_v
   for (const Piece& piece : e.pieces) {
     const KeyedVoltage most = largest_voltage(*piece.kind);
     if (most.key && most.voltage_v > amplifier_limit_v)
-      refuse(piece, most.key, "asks for " + brief_text(most.voltage_v) + " V",
-             "lower its voltage to the amplifier's " + brief_text(amplifier_limit_v) + " V");
+      refuse(piece, most.key,
+             "asks for " + brief_text(most.voltage_v) + " V, more than the amplifier can give",
+             "lower it to at most " + brief_text(amplifier_limit_v) + " V");
     if (!setup.plant.pendulum && piece.kind->needs_pendulum())
-      refuse(piece, "kind", "needs a pendulum, and the plant has none",
-             "use a plant with a pendulum, or leave the piece out");
+      refuse(piece, "kind", "needs a pendulum, but the plant has none",
+             "use a plant with a pendulum, or remove the piece");
   }
 }
 
@@ -197,17 +198,19 @@ class Planner {
     Rehearsal r = rehearse(first_trial_of(piece), setup_, setup_.plant, {steps_left_, true});
     steps_left_ -= std::min(steps_left_, r.steps);
     if (r.too_long && !r.script_over)
-      refuse(piece, "kind", "is too long to be rehearsed, with those before it",
-             "make the pieces shorter, lower the sample rate, or split the file; or check the plant file for "
-             "a stiffness or damping that is far too large");
+      refuse(
+          piece, "kind", "and the pieces before it are too long to rehearse",
+          "make the pieces shorter, lower the sample rate, or split the file; a stiffness or damping in the "
+          "plant file that is far too large has the same effect");
     return r;
   }
 
   [[noreturn]] void refuse_for(const Piece& piece, const Rehearsal& r) {
     const std::string travel = "+-" + brief_text(setup_.experiment.travel_m) + " m";
-    const std::string when = " after " + brief_text(r.outcome.time_s) + " s by the plan";
+    const std::string when = " after " + brief_text(r.outcome.time_s) + " s in the rehearsal";
     if (r.outcome.reason == StopReason::not_ready)
-      refuse(piece, "kind", "would not come to rest where it starts", "check the plant file and travel_m");
+      refuse(piece, "kind", "would not come to rest at its starting point",
+             "check the plant file and travel_m");
     if (r.outcome.reason == StopReason::not_finite)
       refuse(piece, "kind", "would ask for a voltage that is not a number" + when,
              "check the gains, the plant file and the piece");
@@ -223,10 +226,10 @@ class Planner {
       refuse(piece, amplitude.key,
              "would leave the travel of " + travel + " at " + brief_text(amplitude.voltage_v) + " V",
              std::string("lower ") + amplitude.key + " to " +
-                 brief_text(amplitude_of(*smaller.kind).voltage_v) + " or set fit_to_travel: true");
+                 brief_text(amplitude_of(*smaller.kind).voltage_v) + ", or set fit_to_travel: true");
     }
     refuse(piece, "kind", "would leave the travel of " + travel + when,
-           "enlarge travel_m or make the piece smaller");
+           "increase travel_m, or reduce the motion of the piece");
   }
 
   const ExperimentSetup& setup_;
@@ -261,8 +264,8 @@ void read_controllers(ExperimentSetup& setup, std::optional<double> sample_rate_
       if (control.sample_rate_hz != rate_hz)
         refuse(piece, "gains",
                "has the gains " + controller.name + " at " + brief_text(control.sample_rate_hz) +
-                   " Hz, and the experiment runs at " + brief_text(rate_hz) + " Hz",
-               "use gain files of one rate, or give sample_rate_hz");
+                   " Hz, but the experiment runs at " + brief_text(rate_hz) + " Hz",
+               "use gain files with the same rate, or set sample_rate_hz");
       setup.controllers[controller.file] = control;
     }
 }
@@ -287,7 +290,7 @@ ExperimentSetup resolve_experiment(const std::filesystem::path& file, const std:
     setup.plant = read_plant_file(e.plant);
   else
     throw ConfigError(
-        "there is no plant to plan with, for the rig is not simulated: name one with --plant, or as plant "
+        "planning needs a plant file, because the rig is not simulated: name one with --plant, or as 'plant' "
         "in " +
         file.string());
   if (!sample_rate_hz && e.sample_rate_hz > 0.0) sample_rate_hz = e.sample_rate_hz;

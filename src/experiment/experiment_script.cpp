@@ -53,7 +53,7 @@ double sign(double value) {
 const char* words_for(ScriptPhase phase) noexcept {
   switch (phase) {
     case ScriptPhase::settling:
-      return "to the start and to rest";
+      return "moving to the start";
     case ScriptPhase::waiting:
       return "waiting for you";
     case ScriptPhase::swinging_up:

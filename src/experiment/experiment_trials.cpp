@@ -75,8 +75,8 @@ bool read_line(const std::string& line, TrialResult& r) {
 [[noreturn]] void refuse_line(const std::filesystem::path& file, std::size_t number) {
   throw ConfigError(
       file.string() + ":" + std::to_string(number) +
-      ": not a trial of this experiment: restore the line from a copy, or choose another folder "
-      "with --out");
+      ": this line is not a trial of this experiment: restore the file from a copy, or choose another "
+      "folder with --out");
 }
 
 void write_whole(const std::filesystem::path& file, const std::string& text) {
@@ -88,18 +88,17 @@ void write_whole(const std::filesystem::path& file, const std::string& text) {
   if (out) std::filesystem::rename(partial, file, problem);
   if (!out || problem)
     throw Error(ExitCode::stopped,
-                "cannot write " + file.string() + ": free space where the experiment goes");
+                "cannot write " + file.string() + ": free some space on the disk of the experiment folder");
 }
 
 /// What trials.csv lists is there: data that somebody removed are not passed over.
 void refuse_lost_runs(const std::filesystem::path& folder, const std::vector<TrialResult>& results) {
   std::error_code ignored;
   const std::string remedy =
-      ": restore it, or choose another folder with --out, and leave that alone until the experiment has "
-      "ended";
+      ": restore it, or choose another folder with --out, and do not change that folder until the experiment "
+      "has ended";
   if (!std::filesystem::exists(folder / "experiment.yaml", ignored))
-    throw Error(ExitCode::stopped,
-                folder.string() + " was removed or moved while the experiment went on" + remedy);
+    throw Error(ExitCode::stopped, folder.string() + " was removed or moved during the experiment" + remedy);
   for (const TrialResult& r : results)
     if (!std::filesystem::exists(folder / r.run_directory / "samples.csv", ignored))
       throw Error(ExitCode::stopped, (folder / r.run_directory).string() +
@@ -134,7 +133,7 @@ double frequency_of(RowIterator first, RowIterator last, std::int64_t from_ns, d
 
 Piece piece_of(const ExperimentTrial& trial, const Piece& piece) {
   Piece one = piece;
-  one.kind->become(trial);
+  one.kind->set_trial(trial);
   return one;
 }
 
@@ -152,8 +151,9 @@ std::string missing_transitions(const std::vector<Piece>& pieces, const std::vec
     for (int repeat = 0; repeat < sweep->repeats; ++repeat) {
       if (!std::isnan(pieces::falls_from_s(pieces::of_repeat(done, i, repeat)))) continue;
       return "the delay sweep " + pieces[i].label + " is not complete: in repeat " +
-             std::to_string(repeat + 1) + " nothing fell up to " + exact_text(sweep->delays_s.back() * 1e3) +
-             " ms, so that it is not known from which delay on it falls: add longer delays to delay_s";
+             std::to_string(repeat + 1) + " the pendulum did not fall up to " +
+             exact_text(sweep->delays_s.back() * 1e3) +
+             " ms, so the delay at which it falls is unknown: add longer delays to delay_s";
     }
   }
   return "";
@@ -236,8 +236,9 @@ std::vector<TrialResult> read_trials(const std::filesystem::path& folder, const 
   std::stringstream text;
   text << record->rdbuf();
   if (text.str() != experiment_record(setup, pieces))
-    throw ConfigError(folder.string() +
-                      " holds another experiment, or another rig's: choose another folder with --out");
+    throw ConfigError(
+        folder.string() +
+        " holds another experiment, or the same one on another rig: choose another folder with --out");
   return read_trials(folder, pieces);
 }
 

@@ -63,14 +63,14 @@ Piece read_piece(const YamlMap& map) {
   piece.label = map.text_or("label", word);
   if (!is_plain_name(piece.label, longest_label))
     map.fail("label", "is '" + piece.label.substr(0, 60) + "'",
-             "use at most 60 lower-case letters, digits, '-' and '_', it names folders");
+             "the name is used for folders, so use at most 60 lower-case letters, digits, '-' and '_'");
   piece.operator_does = map.text_or("operator", "");
   read_keys(*piece.kind, map);
   if (piece.kind->may_fit()) piece.fit_to_travel = map.flag_or("fit_to_travel", false);
   piece.turned = map.flag_or("turned", false);
   const char* for_hands = piece.turned ? "turned" : piece.kind->key_for_hands();
   if (for_hands && piece.operator_does.empty())
-    map.fail(for_hands, "needs somebody's hands", "say under operator what to do");
+    map.fail(for_hands, "needs an operator", "describe under 'operator' what to do");
   map.finish();
   piece.source = map;
   return piece;

@@ -95,7 +95,7 @@ class PieceKind {
   /// The trials whose rehearsals stand for all of them.
   virtual std::vector<ExperimentTrial> rehearsals() const;
   /// Becomes what one trial runs.
-  virtual void become(const ExperimentTrial& /*trial*/) {}
+  virtual void set_trial(const ExperimentTrial& /*trial*/) {}
   /// What tells the runs of its trials from each other, after the label: in names of folders, and in words.
   virtual std::string suffix(const ExperimentTrial& /*trial*/) const { return ""; }
   virtual std::string words(const ExperimentTrial& /*trial*/) const { return ""; }

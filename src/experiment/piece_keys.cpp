@@ -28,7 +28,7 @@ class KeyReader final : public PieceKeys, public YamlKeyReader {
       values = list(key, range);
     for (std::size_t i = 1; i < values.size(); ++i)
       if (!(values[i] > values[i - 1]))
-        map_.fail(key, "does not grow", "order the delays from short to long, each once");
+        map_.fail(key, "is not increasing", "sort the delays and list each once");
   }
   void voltage(const char* key, double& value) override { value = map_.number(key, any_voltage); }
   void voltages(const char* key, std::vector<double>& values) override { values = list(key, any_voltage); }
@@ -50,23 +50,22 @@ class KeyReader final : public PieceKeys, public YamlKeyReader {
     const YamlMap files = map_.map(key);
     for (const std::string& name : files.keys()) {
       if (!is_plain_name(name, longest_controller_name))
-        files.fail(name, "is no name for a controller",
-                   "use at most " + std::to_string(longest_controller_name) +
-                       " lower-case letters, digits, '-' and '_', it names folders");
+        files.fail(name, "is not a valid name for a controller",
+                   "the name is used for folders, so use at most " + std::to_string(longest_controller_name) +
+                       " lower-case letters, digits, '-' and '_'");
       controllers.push_back({name, files.path(name)});
     }
     files.finish();
     if (controllers.size() < 2 || controllers.size() > most_controllers)
-      map_.fail(
-          key, "has " + std::to_string(controllers.size()) + " controllers",
-          "give it 2 to " + std::to_string(most_controllers) + ", as {name: gain file, name: gain file}");
+      map_.fail(key, "has " + std::to_string(controllers.size()) + " controllers",
+                "list 2 to " + std::to_string(most_controllers) + ", as {NAME: FILE, NAME: FILE}");
   }
 
  private:
   std::vector<double> list(const char* key, const Range& range) const {
     std::vector<double> values = map_.numbers(key, range);
     if (values.empty() || values.size() > most_list)
-      map_.fail(key, "has " + std::to_string(values.size()) + " numbers", "give it 1 to 1000 numbers");
+      map_.fail(key, "has " + std::to_string(values.size()) + " numbers", "list 1 to 1000 numbers");
     return values;
   }
 

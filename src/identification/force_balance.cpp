@@ -86,9 +86,55 @@ ForceTrace force_trace(const Measurement& run, const Plant& plant) {
   return trace;
 }
 
+namespace {
+
+using Regressors = Eigen::Matrix<double, Eigen::Dynamic, 4>;
+
+/// Acceleration, velocity, sign of the velocity, -1, force.
+using Row = std::array<double, 5>;
+
+/// The samples of a run in motion, decimated to what the filter lets through, so that rows are nearly
+/// independent. The sign of the velocity passes the filter as every other term does, so that reversals count;
+/// a cart at rest (slower than `slowest_mps`) does not, because its friction is whatever holds it.
+void append_rows(const ForceTrace& t, double slowest_mps, std::vector<Row>& rows) {
+  const double period = t.time_s.size() > 1 ? t.time_s[1] - t.time_s[0] : 1.0;
+  const auto stride = std::max<std::size_t>(1, static_cast<std::size_t>(0.5 / (cutoff_hz * period)));
+  const auto margin = static_cast<std::size_t>(0.03 / period) + 1;
+  std::vector<double> signs;
+  for (const double v : t.cart_mps) signs.push_back(v < 0.0 ? -1.0 : 1.0);
+  signs = smooth(signs, period);
+  // Slow for longer than a reversal takes: at rest, and the filter's reach around it.
+  std::vector<bool> rests(t.time_s.size(), false);
+  std::size_t since = 0;
+  for (std::size_t k = 0; k < t.time_s.size(); ++k) {
+    if (std::abs(t.cart_mps[k]) > slowest_mps) since = k + 1;
+    if (static_cast<double>(k + 1 - since) * period < rest_window_s) continue;
+    for (std::size_t j = since > margin ? since - margin : 0; j < std::min(k + margin, rests.size()); ++j)
+      rests[j] = true;
+  }
+  for (std::size_t k = margin; k + margin < t.time_s.size(); k += stride)
+    if (!rests[k]) rows.push_back({t.cart_mps2[k], t.cart_mps[k], signs[k], -1.0, t.force_n[k]});
+}
+
+/// Covariance of the score of a least-squares estimate whose residuals are autocorrelated (Newey and West,
+/// Econometrica 55 (1987) 703, over half a second).
+Eigen::Matrix4d score_covariance(const Regressors& a, const Eigen::VectorXd& residual) {
+  const int lag = static_cast<int>(0.5 * 2.0 * cutoff_hz);
+  Eigen::Matrix4d spread = Eigen::Matrix4d::Zero();
+  for (int l = 0; l <= lag; ++l) {
+    Eigen::Matrix4d sum = Eigen::Matrix4d::Zero();
+    for (Eigen::Index i = l; i < residual.size(); ++i)
+      sum += residual[i] * residual[i - l] * a.row(i).transpose() * a.row(i - l);
+    const double weight = 1.0 - l / (lag + 1.0);
+    spread += l == 0 ? sum : Eigen::Matrix4d(weight * (sum + sum.transpose()));
+  }
+  return spread;
+}
+
+}  // namespace
+
 std::optional<ForceBalance> balance_forces(const std::vector<Measurement>& runs, const Plant& plant) {
-  // Decimated to what the filter lets through, so that rows are nearly independent.
-  std::vector<std::array<double, 5>> rows;
+  std::vector<Row> rows;
   double fastest = 0.0;
   std::vector<ForceTrace> traces;
   for (const Measurement& run : runs) {
@@ -96,31 +142,10 @@ std::optional<ForceBalance> balance_forces(const std::vector<Measurement>& runs,
     traces.push_back(force_trace(run, plant));
     for (const double v : traces.back().cart_mps) fastest = std::max(fastest, std::abs(v));
   }
-  // The sign of the velocity passes the filter as every other term does, so that reversals count; a cart at
-  // rest does not, its friction is whatever holds it.
-  const double slowest = 0.01 * fastest;
-  for (const ForceTrace& t : traces) {
-    const double period = t.time_s.size() > 1 ? t.time_s[1] - t.time_s[0] : 1.0;
-    const auto stride = std::max<std::size_t>(1, static_cast<std::size_t>(0.5 / (cutoff_hz * period)));
-    const auto margin = static_cast<std::size_t>(0.03 / period) + 1;
-    std::vector<double> signs;
-    for (const double v : t.cart_mps) signs.push_back(v < 0.0 ? -1.0 : 1.0);
-    signs = smooth(signs, period);
-    // Slow for longer than a reversal takes: at rest, and the filter's reach around it.
-    std::vector<bool> rests(t.time_s.size(), false);
-    std::size_t since = 0;
-    for (std::size_t k = 0; k < t.time_s.size(); ++k) {
-      if (std::abs(t.cart_mps[k]) > slowest) since = k + 1;
-      if (static_cast<double>(k + 1 - since) * period < rest_window_s) continue;
-      for (std::size_t j = since > margin ? since - margin : 0; j < std::min(k + margin, rests.size()); ++j)
-        rests[j] = true;
-    }
-    for (std::size_t k = margin; k + margin < t.time_s.size(); k += stride)
-      if (!rests[k]) rows.push_back({t.cart_mps2[k], t.cart_mps[k], signs[k], -1.0, t.force_n[k]});
-  }
+  for (const ForceTrace& trace : traces) append_rows(trace, 0.01 * fastest, rows);
   if (rows.size() < 50) return std::nullopt;
   const auto n = static_cast<Eigen::Index>(rows.size());
-  Eigen::Matrix<double, Eigen::Dynamic, 4> a(n, 4);
+  Regressors a(n, 4);
   Eigen::VectorXd f(n);
   for (Eigen::Index i = 0; i < n; ++i) {
     for (int j = 0; j < 4; ++j) a(i, j) = rows[static_cast<std::size_t>(i)][static_cast<std::size_t>(j)];
@@ -129,16 +154,8 @@ std::optional<ForceBalance> balance_forces(const std::vector<Measurement>& runs,
   const Eigen::Matrix4d information = a.transpose() * a;
   const Eigen::Matrix4d inverse = information.inverse();
   const Eigen::Vector4d p = inverse * (a.transpose() * f);
-  const Eigen::VectorXd left = f - a * p;
-  // What is left is coloured: neighbours belong together (Newey and West over half a second).
-  const int lag = static_cast<int>(0.5 * 2.0 * cutoff_hz);
-  Eigen::Matrix4d spread = Eigen::Matrix4d::Zero();
-  for (int l = 0; l <= lag; ++l) {
-    Eigen::Matrix4d sum = Eigen::Matrix4d::Zero();
-    for (Eigen::Index i = l; i < n; ++i) sum += left[i] * left[i - l] * a.row(i).transpose() * a.row(i - l);
-    const double weight = 1.0 - l / (lag + 1.0);
-    spread += l == 0 ? sum : Eigen::Matrix4d(weight * (sum + sum.transpose()));
-  }
+  const Eigen::VectorXd residual = f - a * p;
+  const Eigen::Matrix4d spread = score_covariance(a, residual);
   const Eigen::Vector4d sigma = (inverse * spread * inverse).diagonal().cwiseMax(0.0).cwiseSqrt();
   ForceBalance balance;
   balance.mass_kg = p[0] - (plant.pendulum ? plant.pendulum->mass_kg : 0.0);
@@ -149,7 +166,7 @@ std::optional<ForceBalance> balance_forces(const std::vector<Measurement>& runs,
   balance.damping_sigma = sigma[1];
   balance.coulomb_sigma = sigma[2];
   balance.constant_sigma = sigma[3];
-  balance.relative_error = left.norm() / f.norm();
+  balance.relative_error = residual.norm() / f.norm();
   balance.rows = rows.size();
   return balance;
 }

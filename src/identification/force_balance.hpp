@@ -1,5 +1,5 @@
-// The motor's force against what moves, sample by sample: the classical inverse-dynamics regression. Velocity
-// and acceleration come from a zero-phase filter that every term passes alike.
+// The classical inverse-dynamics regression: the motor force against the motion, sample by sample. Velocity
+// and acceleration come from a zero-phase filter, which is applied to every term.
 #pragma once
 
 #include <optional>
@@ -10,11 +10,11 @@
 
 namespace upright {
 
-/// A run as forces: what the motor and the pendulum do to the cart, and how it moves.
+/// A run as forces: the forces of motor and pendulum on the cart, and its motion.
 struct ForceTrace {
   std::vector<double> time_s, cart_mps, cart_mps2;
   std::vector<double> force_n;  ///< motor at standstill (force per volt times voltage) and pendulum reaction
-  std::vector<double> friction_n;  ///< what slows the cart beyond its inertia, back-EMF taken out
+  std::vector<double> friction_n;  ///< force that slows the cart, without inertia and back-EMF
 };
 ForceTrace force_trace(const Measurement& run, const Plant& plant);
 
@@ -22,26 +22,25 @@ ForceTrace force_trace(const Measurement& run, const Plant& plant);
 struct ForceBalance {
   double mass_kg = 0.0, damping_n_per_mps = 0.0, coulomb_n = 0.0, constant_n = 0.0;
   double mass_sigma = 0.0, damping_sigma = 0.0, coulomb_sigma = 0.0, constant_sigma = 0.0;
-  double relative_error = 0.0;  ///< norm of what is left over norm of the force
+  double relative_error = 0.0;  ///< norm of the residual divided by the norm of the force
   std::size_t rows = 0;
 };
-/// None where no run moves the cart enough.
+/// Empty if no run moves the cart enough.
 std::optional<ForceBalance> balance_forces(const std::vector<Measurement>& runs, const Plant& plant);
 
-/// The voltage grew slowly from rest, as one ramp, until the cart went under that same ramp.
+/// A breakaway: the voltage increased slowly from rest, as one ramp, until the cart moved.
 struct Breakaway {
   std::size_t run = 0;
   double time_s = 0.0;
-  double force_n = 0.0;  ///< signed, pendulum reaction included
+  double force_n = 0.0;  ///< signed, including the reaction of the pendulum
 };
 std::vector<Breakaway> find_breakaways(const std::vector<Measurement>& runs, const Plant& plant);
 
-/// A stretch of constant voltage along which the speed stays the same, but for what the sensor's noise makes
-/// of it.
+/// A stretch of constant voltage with constant speed, apart from sensor noise.
 struct SteadyPoint {
   std::size_t run = 0;
   double cart_mps = 0.0;
-  double friction_n = 0.0;  ///< what friction takes, back-EMF taken out; positive against motion toward +x
+  double friction_n = 0.0;  ///< without back-EMF; positive if it acts against motion toward +x
 };
 std::vector<SteadyPoint> find_steady_points(const std::vector<Measurement>& runs, const Plant& plant);
 

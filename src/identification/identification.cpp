@@ -97,27 +97,27 @@ class Identifier {
     whole_ = {&runs_, thinned(segments, most_samples)};
     trial_ = {&runs_, thinned(segments, trial_samples)};
     few_ = {&runs_, thinned(segments, few_samples)};
-    tell(0.05, "balance of forces");
+    tell(0.05, "force balance");
     Model model = start();
     model = fitted(model, trial_, 8, 1);
     so_far_ = model;
-    Model calm = model;
-    calm.fit.point.noise = reduced_process_noise(calm.fit.point.noise);
-    calm = fitted(calm, trial_, 16, 1);
-    if (rank_of(calm) < rank_of(model)) model = std::move(calm);
+    Model low_noise = model;
+    low_noise.fit.point.noise = reduced_process_noise(low_noise.fit.point.noise);
+    low_noise = fitted(low_noise, trial_, 16, 1);
+    if (rank_of(low_noise) < rank_of(model)) model = std::move(low_noise);
     so_far_ = model;
     const bool transition = range_.cart_moves && starts_from_rest() && grow(model);
     so_far_ = model;
-    tell(0.6, "fitting everything");
+    tell(0.6, "fitting all parameters");
     model = fitted(model, whole_, 12, 2);
     so_far_ = model;
-    tell(0.75, "does it explain the data");
+    tell(0.75, "testing the residual");
     judge(model);
     report(model);
     if (result_.verdict == Verdict::explained) {
-      doubt_what_is_not_shown();
+      flag_undetermined_parameters();
     } else if (!transition && result_.balance) {
-      prefer_balance();
+      use_force_balance();
     }
   }
 
@@ -142,14 +142,14 @@ class Identifier {
       return;
     }
     ResidualTests left = examine_fit(whole_, model.fit.point, policy_, budget_);
-    search.judge(judged, sensors_only(judged.train.point.noise));
+    search.filter_held_out(judged, sensors_only(judged.train.point.noise));
     if (!left.structured) compare_held_out(search, judged, left);
     const SimulationFloor noise = left.structured ? SimulationFloor{} : held_out_floor(search, judged, left);
     const double floor = noise.usual;
     result_.gap_after = search.gap_of(judged) / floor;
     if (!left.structured) {
-      const PromisedEffect missing = most_promising_effect(data.train, trained.fit, judged.free, search,
-                                                           {"stribeck_friction", "bristle_friction"});
+      const ScoreTestResult missing = best_by_score_test(data.train, trained.fit, judged.free, search,
+                                                         {"stribeck_friction", "bristle_friction"});
       left.structured = missing.fall > most_promised;
       if (left.structured)
         left.sentence = "what is left looks like " + kind_of(missing.effect) +
@@ -165,14 +165,14 @@ class Identifier {
     }
     Hypothesis given;
     given.train.point = {base_, {}, judged.train.point.noise};
-    search.judge(given, sensors_only(judged.train.point.noise));
+    search.filter_held_out(given, sensors_only(judged.train.point.noise));
     result_.gap_before = search.gap_of(given) / floor;
     result_.residual = left.sentence;
     if (!left.structured) result_.verdict = Verdict::explained;
   }
 
   /// Numbers that account for the data are the rig's only where the data leave them no choice.
-  void doubt_what_is_not_shown() {
+  void flag_undetermined_parameters() {
     // So far off, a mass or a friction is of no use for a controller.
     constexpr double widest = 0.25;
     for (const IdentifiedParameter& p : result_.parameters) {
@@ -244,10 +244,10 @@ class Identifier {
     point.plant = model.plant;
     point.noise = model.fit.covariance.size() > 0 ? model.fit.point.noise : Noise{};
     if (model.fit.covariance.size() == 0) point.noise.force = 0.01 * range_.largest_force_n;
-    point.starts = guess_starts(runs_, data.segments, model.plant);
+    point.starts = estimate_initial_states(runs_, data.segments, model.plant);
     point = with_fitted_initial_states(data, std::move(point));
     FitOptions fit_options;
-    fit_options.most_iterations = iterations;
+    fit_options.max_iterations = iterations;
     fit_options.noise_rounds = noise_rounds;
     model.fit = fit(data, point, parameters_of(model, mass_known_to), fit_options);
     if (std::isfinite(model.fit.objective)) model.plant = model.fit.point.plant;
@@ -382,16 +382,16 @@ class Identifier {
         }
       }
     }
-    tell(0.15, "Stribeck rise");
+    tell(0.15, "fitting Stribeck friction");
     const Model risen = best_of(
         richer(plain, {on_top(0.05, 1.5), on_top(0.15, 2.0), on_top(0.3, 2.0), part(plain, 0.15, 2.0)}));
     bool found = keep(model, risen, {"stribeck_friction"});
-    tell(0.25, "bristles");
+    tell(0.25, "fitting bristle friction");
     const Model bristled = best_of(richer(plain, bristles));
     found = keep(model, bristled, {"bristle_friction"}) || found;
     // Each may hide behind the other: a rise that is seen through bristles, and bristles through a rise. And
     // what has both can do no worse than what has one, from where that one ended.
-    tell(0.4, "both");
+    tell(0.4, "fitting Stribeck and bristle friction");
     std::vector<Model> models = richer(plain, both);
     if (std::isfinite(risen.fit.objective))
       for (const Start& start : bristles) models.push_back(richer(risen, start));
@@ -456,7 +456,7 @@ class Identifier {
 
   /// Where friction is viscous and Coulomb only, the balance of forces is the better witness: what no model
   /// explains (an asymmetry, a flexibility) stays in the force where it is and does not drift the simulation.
-  void prefer_balance() {
+  void use_force_balance() {
     const ForceBalance& b = *result_.balance;
     const auto take = [&](const char* name, double value, double sigma) {
       for (IdentifiedParameter& p : result_.parameters) {

@@ -1,5 +1,5 @@
-// Friction and motor constants of a cart from measured runs: direct readings first (breakaway from ramps,
-// speeds at constant voltages, the balance of forces), then a fit of the whole model that starts there.
+// Friction and motor constants of a cart from measured runs: first direct readings (breakaway from ramps,
+// speeds at constant voltages, force balance), then a fit of the complete model that starts from them.
 #pragma once
 
 #include <atomic>
@@ -14,29 +14,29 @@
 
 namespace upright {
 
-/// A number that was identified.
+/// An identified parameter.
 struct IdentifiedParameter {
   std::string name;  ///< e.g. coulomb_friction.force_n, cart_mass_kg, breakaway_n
   std::string unit;
   double value = 0.0;
   double low = 0.0, high = 0.0;  ///< 95 percent
-  std::string source;            ///< what in the data shows it
-  std::string goodness;          ///< how well, in words with numbers
+  std::string source;            ///< what in the data determines it
+  std::string goodness;          ///< how accurately, as text
 };
 
 struct Identification {
-  /// `explained`: what the model leaves is noise, and what two thirds of the runs say accounts for the others
-  /// too; the numbers are the rig's. `unexplained`: something else moves the rig, and the numbers make up for
-  /// it. `not_excited`: the data cannot show it.
+  /// `explained`: the residual is noise, and a model of two thirds of the runs accounts for the others; the
+  /// parameters are valid for the rig. `unexplained`: another effect acts on the rig, and the parameters
+  /// compensate for it. `not_excited`: the data cannot show the parameters.
   Verdict verdict = Verdict::unexplained;
-  /// A signal ended it: the numbers are the best so far, of which nothing is known.
+  /// A signal ended the work: the parameters are the best so far and were not tested.
   bool interrupted = false;
-  /// Held-out simulation error over the noise floor, as in a Diagnosis: of the plant as given, and of the
-  /// identified model fitted to the other runs. Not a number: not measured.
+  /// Held-out simulation error divided by the noise floor, as in a Diagnosis: of the plant as given, and of
+  /// the identified model fitted to the other runs. NaN if not measured.
   double gap_before = std::numeric_limits<double>::quiet_NaN();
   double gap_after = std::numeric_limits<double>::quiet_NaN();
-  std::string residual;  ///< what is left, in words
-  /// Whether the numbers may be used.
+  std::string residual;  ///< the residual, as a sentence
+  /// Whether the parameters may be used.
   bool is_trustworthy() const { return verdict == Verdict::explained && !interrupted; }
 
   Plant plant;
@@ -50,15 +50,15 @@ struct Identification {
 };
 
 struct IdentificationOptions {
-  /// Once it is not zero the work is given up, within some tenths of a second. Null: never.
+  /// When it becomes nonzero, the work ends within some tenths of a second. May be null.
   const std::atomic<int>* signal = nullptr;
   std::function<void(double, const std::string&)> progress;
 };
 
-/// `base` gives masses, length and the motor's force per volt; its effects of friction are estimated anew.
-/// The result does not depend on the order of the runs. The force per volt is the scale of every force, so
-/// the cart's mass is estimated and not believed. Its work is bounded: a few thousand times what following
-/// some ten thousand samples takes, however many there are.
+/// `base` gives masses, length and the motor's force per volt; its friction is estimated again. The result
+/// does not depend on the order of the runs. The force per volt is the scale of every force, so the cart's
+/// mass is estimated without a prior. The work is bounded: some ten thousand samples are followed a few
+/// thousand times, for any amount of data.
 Identification identify(const Plant& base, const std::vector<Measurement>& runs,
                         const IdentificationOptions& options = {});
 

@@ -1,5 +1,5 @@
-// An order of runs that does not depend on the order in which they were read: which segments are left out,
-// and how sums round, then do not depend on it either.
+// An order of runs that does not depend on the order in which they were read. Then the choice of segments and
+// the rounding of sums do not depend on it either.
 #pragma once
 
 #include <algorithm>
@@ -12,7 +12,7 @@
 
 namespace upright {
 
-/// Places of the runs, sorted by what they hold.
+/// Indices of the runs, sorted by their contents.
 inline std::vector<std::size_t> canonical_order(const std::vector<Measurement>& runs) {
   std::vector<std::size_t> order(runs.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
@@ -34,7 +34,7 @@ inline std::vector<Measurement> arranged(const std::vector<Measurement>& runs,
   return sorted;
 }
 
-/// What was read in each arranged run, in the order in which the runs were given.
+/// Results of the arranged runs, in the order in which the runs were given.
 template <class Reading>
 std::vector<Reading> in_given_order(std::vector<Reading> readings, const std::vector<std::size_t>& order) {
   for (Reading& reading : readings) reading.run = order[reading.run];

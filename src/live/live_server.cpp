@@ -103,7 +103,7 @@ class Listener {
     if (socket_ >= 0) ::close(socket_);
     throw ConfigError(
         "127.0.0.1:" + std::to_string(port) +
-        " cannot be had, it may be in use: choose another port with --live PORT (0: any free one)");
+        " cannot be opened and may be in use: choose another port with --live PORT (0: any free port)");
   }
   ~Listener() { ::close(socket_); }
   Listener(const Listener&) = delete;
@@ -123,7 +123,7 @@ class Bell {
   Bell() : descriptor_(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)) {
     if (descriptor_ < 0)
       throw DeviceError(
-          "the live page could not open what it needs: raise the limit on open files (ulimit -n)");
+          "the live page's server could not open its files: raise the limit on open files (ulimit -n)");
   }
   ~Bell() { ::close(descriptor_); }
   Bell(const Bell&) = delete;
@@ -215,7 +215,8 @@ class LiveServer::Implementation {
       case HeadReading::too_large:
         return refuse(connection, HttpStatus::head_too_large, "send a shorter request", now);
       case HeadReading::malformed:
-        return refuse(connection, HttpStatus::bad_request, "this is not an HTTP request", now);
+        return refuse(connection, HttpStatus::bad_request,
+                      "this is not an HTTP request: open the page with a browser", now);
     }
   }
 
@@ -271,19 +272,19 @@ class LiveServer::Implementation {
       return connection.answer(whole("text/html; charset=utf-8", page(), HttpStatus::ok), now);
     if (request.method == "GET" && request.path == "/events") return stream(connection, now);
     if (request.method == "POST" && request.path == "/stop") return press(connection, request, now);
-    refuse(connection, HttpStatus::not_found, "there is only the page", now);
+    refuse(connection, HttpStatus::not_found, "not found: the page is at /", now);
   }
 
   void stream(HttpConnection& connection, Time now) {
     if (feed_.readers() >= most_streams)
       return refuse(connection, HttpStatus::too_many_pages,
-                    "close another page of this run: too many are open", now);
+                    "too many pages of this run are open: close one of them", now);
     connection.stream(head(HttpStatus::ok, "text/event-stream") + "\r\n", feed_, now);
   }
 
   void press(HttpConnection& connection, const HttpRequest& request, Time now) {
     if (request.value_of(token_header) != token_)
-      return refuse(connection, HttpStatus::forbidden, "reload the page: this button is of another run", now);
+      return refuse(connection, HttpStatus::forbidden, "this page belongs to another run: reload it", now);
     stop_();
     connection.answer(whole("text/plain; charset=utf-8", "stopping\n", HttpStatus::ok), now);
   }

@@ -6,7 +6,7 @@
 
 namespace upright {
 
-/// Least squares with every coefficient between bounds.
+/// Least squares with bounded coefficients.
 class BoundedFit {
  public:
   static constexpr int most = 5;
@@ -20,7 +20,7 @@ class BoundedFit {
     squares_ += target * target;
   }
 
-  /// The share of the target's squares that is accounted for.
+  /// The share of the target's sum of squares that the fit accounts for.
   double accounted(const Row& low, const Row& high) const {
     if (!(squares_ > 0.0)) return 0.0;
     Row p{};

@@ -83,8 +83,9 @@ void undo_delays(Measurement& run, const Dataset& dataset) {
                  piece < run.breaks.size() ? run.breaks[piece] : run.size(), kept);
   constexpr std::size_t fewest = 10;
   if (kept.size() < fewest)
-    throw ConfigError(dataset.file.string() + " is hardly longer than delay_s, " +
-                      exact_text(delays.largest()) + " s: give delay_s in seconds");
+    throw ConfigError(dataset.file.string() + " is too short for a delay_s of " +
+                      exact_text(delays.largest()) +
+                      " s: check that delay_s is in seconds, or record a longer run");
   run.time_s = std::move(kept.time_s);
   run.voltage_v = std::move(kept.voltage_v);
   run.cart_m = std::move(kept.cart_m);

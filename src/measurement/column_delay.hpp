@@ -1,4 +1,4 @@
-// Columns that were written down later than they were measured or commanded.
+// Columns that were recorded later than they were measured or commanded.
 #pragma once
 
 #include "dataset_file.hpp"
@@ -6,8 +6,8 @@
 
 namespace upright {
 
-/// Moves the columns with a delay_s to where they belong; the last rows of each piece, for which there is
-/// nothing then, are left out. Throws ConfigError where nothing is left.
+/// Shifts columns with a delay_s back in time. Drops the last rows of each piece, which then lack values.
+/// Throws ConfigError if too few rows remain.
 void undo_delays(Measurement& run, const Dataset& dataset);
 
 }  // namespace upright

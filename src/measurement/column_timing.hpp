@@ -7,8 +7,8 @@
 
 namespace upright {
 
-/// The reading with what is certainly late taken as late, and said; nothing where nothing is. That the motion
-/// comes after the voltage is a rig's own delay and no mistake.
+/// The reading with late columns corrected and named; empty if none is certainly late. A motion that comes
+/// after the voltage is a delay of the rig and not a mistake.
 std::optional<DataReading> with_lateness(const ReadingJudge& judge, DataReading reading);
 
 }  // namespace upright

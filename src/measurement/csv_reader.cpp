@@ -62,14 +62,15 @@ constexpr std::array signatures = {
 void refuse_what_is_no_text(const fs::path& file, string_view block) {
   for (const Signature& s : signatures)
     if (block.size() >= s.at + s.bytes.size() && block.substr(s.at, s.bytes.size()) == s.bytes)
-      refuse(file, 1, std::string("this is ") + s.what + ", not a table of text", s.remedy);
+      refuse(file, 1, std::string("this is ") + s.what + ", not a text table", s.remedy);
   const std::size_t zero = block.find('\0');
   if (zero == string_view::npos) return;
   // Latin text in UTF-16 has a zero in every second byte.
   const auto zeros = static_cast<std::size_t>(std::count(block.begin(), block.end(), '\0'));
-  if (zeros * 3 > block.size()) refuse(file, 1, "this is UTF-16 text without a mark, not UTF-8", from_utf16);
+  if (zeros * 3 > block.size())
+    refuse(file, 1, "this is UTF-16 text without a byte order mark, not UTF-8", from_utf16);
   const auto line = 1 + std::count(block.begin(), block.begin() + static_cast<std::ptrdiff_t>(zero), '\n');
-  refuse(file, static_cast<std::size_t>(line), "a zero byte: this is no table of text",
+  refuse(file, static_cast<std::size_t>(line), "the line contains a zero byte, so this is not a text table",
          "export the signals as CSV");
 }
 
@@ -97,7 +98,8 @@ class Lines {
       }
       searched_ = buffer_.size();
       if (buffer_.size() - at_ > longest_line_bytes)
-        refuse(file_, number_ + 1, "a line of more than 4 MiB", "this is no table of text; export it as CSV");
+        refuse(file_, number_ + 1, "the line is longer than 4 MiB, so this is not a table",
+               "export it as CSV");
       if (fill()) continue;
       if (at_ >= buffer_.size()) return std::nullopt;
       cut_off_ = true;
@@ -294,7 +296,7 @@ class Reader {
       return !cell.empty() && numbers.read(cell).has_value();
     });
     if (format_.header && all_numbers && line != 0)
-      refuse(file_, line, "the first row holds numbers, not the names of the columns",
+      refuse(file_, line, "the first row contains numbers instead of column names",
              "set header: false in a dataset file and name the columns by number");
     for (const std::string& name : wanted_) {
       const auto at = std::find(table_.names.begin(), table_.names.end(), name);
@@ -345,11 +347,11 @@ class Reader {
                     [](string_view cell) { return cell.empty(); }))
       return;
     refuse(file_, line,
-           std::to_string(cells_.size()) + " cells in a table of " + std::to_string(table_.names.size()) +
-               " columns",
-           delimiter_ == ','
-               ? "if it has decimal commas, export it with semicolons between the cells; else repair the row"
-               : "repair the row, or set delimiter in a dataset file");
+           "the row has " + std::to_string(cells_.size()) + " cells, but the table has " +
+               std::to_string(table_.names.size()) + " columns",
+           delimiter_ == ',' ? "if it has decimal commas, export it with semicolons between the cells; "
+                               "otherwise correct the row"
+                             : "correct the row, or set delimiter in a dataset file");
   }
 
   [[noreturn]] void refuse_cell(std::size_t line, std::size_t column, string_view cell) const {
@@ -360,10 +362,9 @@ class Reader {
     refuse(file_, line,
            table_.names[columns_[column]] + " is '" + shown + "', not a finite number" +
                (sign ? " with the decimal sign of this file" : ""),
-           sign
-               ? "write all numbers with the same decimal sign and none between thousands, or set decimal in "
-                 "a dataset file"
-               : "repair the row or remove it");
+           sign ? "write all numbers with the same decimal sign and without separators of thousands, or set "
+                  "decimal in a dataset file"
+                : "correct the row or remove it");
   }
 
   const fs::path& file_;

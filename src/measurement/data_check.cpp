@@ -152,14 +152,14 @@ class Suspicion {
   void list() {
     if (fold_) add(folding, folded_words(), [every = *fold_](DataReading& r) { r.fold = every; });
     if (is_mirrored())
-      add(folding, "theta_rad is mirrored at an end of its range, as an absolute value is",
+      add(folding, "theta_rad is mirrored at an end of its range, like an absolute value",
           [](DataReading& r) { r.mirrored = true; });
     const bool cart = judge_.has(cart_channel), theta = judge_.has(theta_channel);
     const bool driven = cart && judge_.has(voltage_channel);
     if (driven)
       add_factor(voltage_sign, voltage_channel, -1.0,
                  theta ? "voltage_v has the wrong sign"
-                       : "voltage_v has the wrong sign (or cart_m has: these data do not tell which)");
+                       : "voltage_v has the wrong sign (or cart_m has: these data do not show which)");
     if (driven && theta) add_factor(cart_sign, cart_channel, -1.0, "cart_m has the wrong sign");
     if (cart && theta) add_factor(theta_sign, theta_channel, -1.0, "theta_rad has the wrong sign");
     if (theta)
@@ -207,7 +207,7 @@ class Suspicion {
       for (const int counts : {4096, 2048, 1024, 8192, 16384, 1000, 2000, 4000, 5000, 10000})
         add_factor(theta_unit, theta_channel, 2.0 * std::numbers::pi / counts,
                    "theta_rad is in counts of about 1/" + std::to_string(counts) +
-                       " turn (put in the encoder's own number)");
+                       " turn (use the exact number of your encoder)");
   }
 
   void list_cart_counts() {
@@ -216,7 +216,7 @@ class Suspicion {
     for (int i = 0; i <= steps; ++i) {
       const double factor = 1e-6 * std::pow(10.0, static_cast<double>(i) / a_decade);
       add_factor(cart_unit, cart_channel, factor,
-                 text("cart_m is in counts of about %.2g m (put in the encoder's own number)", factor));
+                 text("cart_m is in counts of about %.2g m (use the exact number of your encoder)", factor));
     }
   }
 
@@ -230,7 +230,7 @@ class Suspicion {
     if (driven && theta) {
       swap(voltage_channel, theta_channel);
       for (const bool forwards : {false, true})
-        add(order, "voltage_v and cart_m and theta_rad are interchanged", [forwards](DataReading& r) {
+        add(order, "voltage_v, cart_m and theta_rad are interchanged", [forwards](DataReading& r) {
           r.column = forwards ? std::array<std::size_t, channels>{1, 2, 0}
                               : std::array<std::size_t, channels>{2, 0, 1};
         });
@@ -361,7 +361,7 @@ std::optional<DataReading> with_steady_clock(const Measurement& run, std::option
   steady.steady_period_s = scatter->period_s * steady.time_factor;
   char words[200];
   std::snprintf(words, sizeof words,
-                "time_s scatters by %.3g ms about a steady clock of %.4g ms that the motion follows",
+                "time_s scatters by %.3g ms around a steady clock of %.4g ms, which the motion follows",
                 1e3 * scatter->scatter_s * steady.time_factor, 1e3 * short_number(steady.steady_period_s));
   steady.mistakes.emplace_back(words);
   return steady;
@@ -385,12 +385,13 @@ std::string implausible(const Measurement& run) {
     const auto [least, largest] = std::minmax_element(run.cart_m.begin(), run.cart_m.end());
     travel_m = *largest - *least;
   }
-  if (travel_m > longest_travel_m) return text("cart_m travels %.3g m, further than any such rig", travel_m);
+  if (travel_m > longest_travel_m)
+    return text("cart_m travels %.3g m, which is impossible for such a rig", travel_m);
   const double cart_mps = usual_rate(run, run.cart_m), pendulum_radps = usual_rate(run, run.theta_rad);
   if (cart_mps > fastest_cart_mps)
-    return text("cart_m moves at %.3g m/s, faster than any such rig", cart_mps);
+    return text("cart_m moves at %.3g m/s, which is impossible for such a rig", cart_mps);
   if (pendulum_radps > fastest_pendulum_radps)
-    return text("theta_rad turns at %.3g rad/s, faster than any such rig", pendulum_radps);
+    return text("theta_rad turns at %.3g rad/s, which is impossible for such a rig", pendulum_radps);
   return "";
 }
 
@@ -403,13 +404,14 @@ std::string unaccounted(const Accounted& as_read) {
         as_read.voltage_needed);
   if (as_read.cart && *as_read.cart < hardly_any)
     return text(
-        "the recorded motion accounts for %.2g %% of the recorded voltage, "
-        "whatever the masses, frictions and delays",
+        "the recorded motion accounts for only %.2g %% of the recorded voltage, for any masses, friction and "
+        "delays",
         100.0 * std::max(*as_read.cart, 0.0));
   if (as_read.pendulum && *as_read.pendulum < hardly_any)
     return text(
-        "gravity and the cart account for %.2g %% of the pendulum's recorded acceleration, whatever "
-        "its length and friction",
+        "gravity and the cart account for only %.2g %% of the pendulum's recorded acceleration, for any "
+        "length "
+        "and friction",
         100.0 * std::max(*as_read.pendulum, 0.0));
   return "";
 }
@@ -448,17 +450,16 @@ void refuse_mistakes(const std::vector<Measurement>& runs, const Plant& plant) {
   const std::string file = run.dataset ? run.dataset->file.string() : run.name;
   std::string others;
   for (std::size_t i = 1; i < mistakes.size(); ++i)
-    others += (others.empty() ? "; likewise " : ", ") + runs[mistakes[i].run].name;
+    others += (others.empty() ? "; the same applies to " : ", ") + runs[mistakes[i].run].name;
   const std::string remedy =
-      first.lines.empty() ? "correct in a dataset file (docs/reference/dataset-files.md) which columns are "
-                            "read, and their units by scale, "
-                            "or the plant file"
+      first.lines.empty() ? "correct the columns or their scale in a dataset file "
+                            "(docs/reference/dataset-files.md), or correct the plant file"
                           : "put into the columns of its dataset file (docs/reference/dataset-files.md): " +
                                 joined(first.lines, "; ");
   const std::string alternatives =
-      first.or_else.empty() ? "" : "; or it may be that " + joined(first.or_else, ", or that ");
+      first.or_else.empty() ? "" : "; alternatively, " + joined(first.or_else, ", or ");
   throw ConfigError(file + " contradicts the plant file: " + first.cause + ": " + remedy + alternatives +
-                    " (or --trust-data goes on with the data as they are)" + others);
+                    " (--trust-data skips this check)" + others);
 }
 
 }  // namespace upright

@@ -1,4 +1,4 @@
-// What may be wrong with a file's description, and how well the plant's equations then fit its data.
+// Possible mistakes in the description of a file, and how well the equations of the plant then fit its data.
 #pragma once
 
 #include <array>
@@ -18,44 +18,44 @@ namespace upright {
 /// The channels of a record, in the order of `measured_quantities` without the time.
 enum Channel : std::size_t { voltage_channel, cart_channel, theta_channel, channels };
 
-/// A reading of the file: which column is which quantity, and what each is multiplied by and shifted by.
+/// An interpretation of the file: the column, factor and offset of each quantity.
 struct DataReading {
   std::array<std::size_t, channels> column = {voltage_channel, cart_channel, theta_channel};
   std::array<double, channels> factor = {1.0, 1.0, 1.0};
   double theta_offset_rad = 0.0;
   double time_factor = 1.0;
-  double steady_period_s = 0.0;  ///< of the clock about which the stamps scatter; 0: as stamped
-  /// How much later than measured, or commanded, a channel was written down.
+  double steady_period_s = 0.0;  ///< of the clock around which the stamps scatter; 0: as stamped
+  /// How much later a channel was recorded than measured or commanded.
   std::array<double, channels> later_s = {0.0, 0.0, 0.0};
   double fold = 0.0;  ///< the angle was taken modulo this, in the file's unit; 0: modulo a turn, if at all
   bool mirrored = false;              ///< the angle was mirrored at the ends of its range
-  std::vector<std::string> mistakes;  ///< in words; none: as the file is read now
+  std::vector<std::string> mistakes;  ///< in words; empty: as the file is read now
 };
 
-/// What the angle is unfolded by, once it is in radians.
+/// The period of the folded angle in radians.
 double folded_every_rad(const DataReading& reading);
 
-/// Shares of the motor's voltage and of the pendulum's acceleration that the equations account for; nothing
-/// where too little shows. Below 0: they make it worse.
+/// The shares of the motor voltage and of the pendulum's acceleration that the equations account for. Empty
+/// if the data show too little. Negative if the equations make it worse.
 struct Accounted {
   std::optional<double> cart, pendulum;
-  /// To choose between readings: logarithms of the shares that are left over, with the plant's numbers nearly
-  /// as the file has them.
+  /// To choose between readings: logarithms of the unexplained shares, with numbers close to those of the
+  /// plant file.
   double left_over = 0.0;
-  /// How many times the recorded voltage the motion needs at the least.
+  /// The least multiple of the recorded voltage that the motion needs.
   double voltage_needed = 0.0;
 };
 
-/// How much is left over of an equation as the channels are, and at best where one of them is taken to have
-/// been written down later than measured (negative: the others).
+/// The residual of an equation with the channels as they are, and with the best delay of one of them
+/// (negative: of the others).
 struct Lateness {
   double later_s = 0.0;
   double left = 1.0, left_at_best = 1.0;
-  /// left / left_at_best in that third of the record where it is least.
+  /// The smallest left / left_at_best of the thirds of the record.
   double least_gain = 1.0;
 };
 
-/// Holds readings of one run against a plant.
+/// Compares readings of one run with a plant.
 class ReadingJudge {
  public:
   ReadingJudge(const Measurement& run, const Plant& plant);
@@ -63,12 +63,15 @@ class ReadingJudge {
   bool has(std::size_t channel) const { return !raw_[channel].empty(); }
   const std::vector<double>& raw(std::size_t channel) const { return raw_[channel]; }
   double period_s() const { return period_s_; }
-  /// What the angle was folded by, in the file's unit, where it is a whole part of a turn but no turn.
+  /// The period of the folded angle in the file's unit, if it is an integer fraction of a turn but not a
+  /// whole turn.
   std::optional<double> fold() const;
   Accounted judge(const DataReading& reading);
-  /// Of the angle against the cart, by the pendulum's equation; nothing where too little shows.
+  /// The delay of the angle relative to the cart, from the equation of the pendulum. Empty if the data show
+  /// too little.
   std::optional<Lateness> lateness_of_angle(const DataReading& reading) const;
-  /// Of the voltage against the motions, by the cart's; that it comes before them is a rig's own delay.
+  /// The delay of the voltage relative to the motion, from the equation of the cart. A voltage that comes
+  /// before the motion is a delay of the rig.
   std::optional<Lateness> lateness_of_voltage(const DataReading& reading) const;
 
  private:
@@ -79,7 +82,7 @@ class ReadingJudge {
     double length_s = 0.0;  ///< of the windows
   };
   using WindowRange = std::pair<std::size_t, std::size_t>;  ///< first, one past the last
-  struct Share;                                             ///< of an equation that is accounted for
+  struct Share;                                             ///< the explained share of an equation
   const Motion& motion_of(const DataReading& reading);
   Motion measure(const DataReading& reading, double length_s) const;
   Motion showing(const DataReading& reading) const;

@@ -62,7 +62,7 @@ DatasetColumn read_column(const YamlMap& columns, const std::string& name) {
     column.folded_every_rad =
         source.optional_number("folded_every_rad", Range::positive()).value_or(column.folded_every_rad);
   if (column.scale == 0.0)
-    source.fail("scale", "is 0, which leaves nothing of the column", "give its factor");
+    source.fail("scale", "is 0, which makes the column zero", "give the factor from the column's unit to SI");
   source.finish();
   return column;
 }
@@ -122,7 +122,7 @@ Dataset read_dataset(const YamlMap& document) {
   dataset.format.delimiter = read_delimiter(map);
   dataset.format.decimal = read_decimal(map);
   if (dataset.format.delimiter == ',' && dataset.format.decimal == ',')
-    map.fail("decimal", "is a comma, and so is the delimiter", "export the file with semicolons");
+    map.fail("decimal", "is a comma, as is the delimiter", "export the file with semicolons");
   dataset.missing = read_missing(map);
   dataset.cart_locked = map.flag_or("cart_locked", false);
   dataset.from_s = map.optional_number("from_s");
@@ -140,7 +140,7 @@ Dataset read_dataset(const YamlMap& document) {
   }
   map.finish();
   if (!dataset.columns.contains("time_s"))
-    map.fail("columns", "names no time_s", "map time_s to the column that holds the time");
+    map.fail("columns", "does not contain time_s", "map time_s to the column with the time");
   return dataset;
 }
 

@@ -16,26 +16,26 @@ namespace upright {
 
 class YamlMap;
 
-/// What a measurement is made of, by the names that a CSV without a dataset file has.
+/// The quantities of a measurement, with their column names in a CSV file without a dataset file.
 inline constexpr std::array<std::string_view, 4> measured_quantities = {"time_s", "voltage_v", "cart_m",
                                                                         "theta_rad"};
 
-/// Where a quantity comes from: a column by name or by number; value = scale x cell + offset.
+/// The source of a quantity: a column by name or number; value = scale x cell + offset.
 struct DatasetColumn {
   std::string column;
   double scale = 1.0;
   double offset = 0.0;
-  bool scaled = false;    ///< the file gives a scale, so the unit has been thought of
-  double delay_s = 0.0;   ///< how much later than measured, or commanded, a cell was written; not of time_s
-  double period_s = 0.0;  ///< of time_s: the rows follow each other so, whatever the stamps; 0: as stamped
-  double folded_every_rad = 2.0 * std::numbers::pi;  ///< of theta_rad: it was taken modulo this
-  bool mirrored = false;  ///< of theta_rad: it was mirrored at the ends of its range, as an absolute value is
+  bool scaled = false;    ///< the file gives a scale, so the unit is known
+  double delay_s = 0.0;   ///< delay of recording after measurement or command; not for time_s
+  double period_s = 0.0;  ///< for time_s: the true period of the rows; 0: as stamped
+  double folded_every_rad = 2.0 * std::numbers::pi;  ///< for theta_rad: it was taken modulo this
+  bool mirrored = false;  ///< for theta_rad: it was mirrored at the ends of its range, like an absolute value
 };
 
-/// What becomes of a row in which a cell holds no number.
+/// The treatment of a row with a cell that is not a number.
 enum class MissingCells {
-  gap,   ///< it is left out, and nothing is followed across it
-  skip,  ///< it is left out as if it had not been recorded: the row before holds on
+  gap,   ///< it is dropped and leaves a gap in the record
+  skip,  ///< it is dropped without a gap: the previous row stays valid
   stop,  ///< the file is refused
 };
 
@@ -59,8 +59,8 @@ Dataset plain_dataset(const std::filesystem::path& csv);
 /// The line of a dataset file that says this, as in `cart_m: {column: x, scale: 0.001}`.
 std::string column_line(std::string_view quantity, const DatasetColumn& column);
 
-/// Factor from a unit's name to the unit of the quantity ("deg" of theta_rad: pi / 180); nothing where the
-/// name is not known.
+/// Factor from a named unit to the unit of the quantity ("deg" for theta_rad: pi / 180). Empty if the name is
+/// unknown.
 std::optional<double> factor_of_unit(std::string_view quantity, std::string_view unit);
 
 }  // namespace upright

@@ -148,11 +148,12 @@ class Collector {
     if (period_s == 0.0 || rows_ < 2 ||
         std::abs(off_s) <= most_periods * period_s + most_share * (last_counted_s_ - first_stamp_s_))
       return;
-    throw ConfigError(dataset_.file.string() + ": the time stamps end " + exact_text(off_s) +
-                      " s after the last row by period_s, so the period is another or rows are missing: "
-                      "period_s: " +
-                      exact_text((last_stamp_s_ - first_stamp_s_) / static_cast<double>(rows_ - 1)) +
-                      " would agree with the stamps");
+    throw ConfigError(
+        dataset_.file.string() + ": the time stamps end " + exact_text(off_s) +
+        " s after the last row according to period_s, so period_s is wrong or rows are missing: "
+        "correct period_s (" +
+        exact_text((last_stamp_s_ - first_stamp_s_) / static_cast<double>(rows_ - 1)) +
+        " s would agree with the time stamps) or restore the rows");
   }
 
   void leave_out(std::size_t line, const std::array<double, 4>& values) {
@@ -160,7 +161,7 @@ class Collector {
       for (std::size_t q = 0; q < values.size(); ++q)
         if (!std::isfinite(values[q]))
           throw ConfigError(dataset_.file.string() + ":" + std::to_string(line) + ": " + sources_[q]->column +
-                            " holds no number, and the dataset file says missing: stop: repair the row, or "
+                            " holds no number, and the dataset file has missing: stop: correct the row, or "
                             "set missing to gap or skip");
     if (missing_rows_++ == 0) first_missing_line_ = line;
     broken_ = broken_ || dataset_.missing == MissingCells::gap;
@@ -168,10 +169,10 @@ class Collector {
 
   void refuse_bad_time(double time_s, std::size_t line) const {
     if (m_.time_s.empty() || time_s > m_.time_s.back()) return;
-    throw ConfigError(dataset_.file.string() + ":" + std::to_string(line) + ": time_s does not grow (" +
+    throw ConfigError(dataset_.file.string() + ":" + std::to_string(line) + ": time_s does not increase (" +
                       exact_text(m_.time_s.back()) + " then " + exact_text(time_s) +
-                      "): sort the rows by time and remove doubled ones; if the time was rounded, write it "
-                      "with more digits; if the rows are in order and came at a steady rate, give time_s its "
+                      "): sort the rows by time and remove duplicates; if the time was rounded, write it "
+                      "with more digits; if the rows are in order and have a constant rate, give time_s a "
                       "period_s in a dataset file (docs/reference/dataset-files.md)");
   }
 
@@ -206,8 +207,8 @@ void refuse_too_short(const Measurement& m, const Dataset& dataset) {
   const std::string head = dataset.file.string() + ":1: " + std::to_string(m.size()) + " samples" +
                            (m.missing_rows > 0 ? " without a missing cell" : "") +
                            (dataset.from_s || dataset.to_s ? " from from_s to to_s" : "") +
-                           ", fewer than 10, say nothing: ";
-  throw ConfigError(head + (m.missing_rows > 0               ? "repair the empty cells"
+                           ", fewer than 10, which is too few: ";
+  throw ConfigError(head + (m.missing_rows > 0               ? "fill the empty cells"
                             : dataset.from_s || dataset.to_s ? "widen from_s and to_s"
                                                              : "record a longer run"));
 }
@@ -224,10 +225,11 @@ void refuse_gaps_everywhere(const Measurement& m, const Dataset& dataset) {
     first = end;
   }
   if (m.breaks.empty() || longest_s >= least_s) return;
-  throw ConfigError(dataset.file.string() + ": " + std::to_string(m.missing_rows) +
-                    " rows have a cell without a number, with never more than " + exact_text(longest_s) +
-                    " s between them, so that nothing is left to be followed: set missing: skip in a dataset "
-                    "file if a sensor is written less often than the rows, else repair the cells");
+  throw ConfigError(
+      dataset.file.string() + ": " + std::to_string(m.missing_rows) +
+      " rows have a cell without a number, at most " + exact_text(longest_s) +
+      " s apart, so no stretch is long enough to analyse: set missing: skip in a dataset file if "
+      "a sensor is written less often than the rows, otherwise fill the cells");
 }
 
 Measurement load(const Dataset& dataset, const std::string& name) {
@@ -241,8 +243,7 @@ Measurement load(const Dataset& dataset, const std::string& name) {
   if (m.voltage_v.empty()) m.voltage_v.assign(m.size(), 0.0);
   const bool still =
       (m.cart_m.empty() || is_constant(m.cart_m)) && (m.theta_rad.empty() || is_constant(m.theta_rad));
-  if (still)
-    throw NothingMoves(dataset.file.string() + " holds constant data: record a run in which something moves");
+  if (still) throw NothingMoves(dataset.file.string() + " holds constant data: record a run with motion");
   const auto angle = dataset.columns.find("theta_rad");
   if (angle != dataset.columns.end() && angle->second.mirrored) unmirror(m.theta_rad);
   m.cart_resolution_m = dataset.cart_resolution_m.value_or(find_resolution(m.cart_m));
@@ -382,7 +383,8 @@ Measurement read_measurement(const fs::path& path) {
   if (fs::is_directory(path, problem)) {
     const fs::path samples = path / "samples.csv";
     if (!fs::exists(samples, problem))
-      throw ConfigError(path.string() + " has no samples.csv: name a run directory, a CSV or a dataset file");
+      throw ConfigError(path.string() +
+                        " has no samples.csv: give a run directory, a CSV file or a dataset file");
     return load(mapping_of_run(path),
                 path.filename().empty() ? path.parent_path().filename().string() : path.filename().string());
   }

@@ -1,5 +1,5 @@
-// A record's motion over short windows: what the equations of motion are held against when nothing is known
-// yet of noise, friction or units.
+// The motion of a record over short windows, for comparison with the equations of motion while noise,
+// friction and units are unknown.
 #pragma once
 
 #include <cstddef>
@@ -12,10 +12,10 @@ namespace upright {
 /// Level, rate and acceleration of a channel in the middle of each window.
 struct WindowedMotion {
   std::vector<double> level, rate, acceleration;
-  double acceleration_noise = 0.0;  ///< standard deviation, from what the parabolas leave
+  double acceleration_noise = 0.0;  ///< standard deviation, from the residuals of the parabolas
 };
 
-/// Windows of equal length over a record; those with a gap in them are left out.
+/// Windows of equal length over a record, without those that contain a gap.
 class MotionWindows {
  public:
   /// `breaks` as in Measurement. Around each window there are samples for `margin_s`.
@@ -23,14 +23,14 @@ class MotionWindows {
                 double margin_s = 0.0);
 
   std::size_t size() const { return windows_.size(); }
-  /// Of values that were written down `later_s` after they had been measured, no more than the margin.
+  /// The motion of values that were recorded `later_s` after the measurement; at most the margin.
   WindowedMotion motion(const std::vector<double>& values, double later_s = 0.0) const;
-  /// Mean of values that are held from row to row, as they were `earlier_s` before, with the weight that a
-  /// parabola gives to the acceleration.
+  /// The mean of values that are constant from row to row, as of `earlier_s` before, weighted like the
+  /// acceleration of a parabola.
   std::vector<double> held(const std::vector<double>& values, double earlier_s) const;
 
  private:
-  /// First and last sample of a window that is moved.
+  /// The first and last sample of a shifted window.
   std::pair<std::size_t, std::size_t> moved(std::size_t window, double by_s) const;
 
   const std::vector<double>& time_s_;

@@ -1,4 +1,4 @@
-// Time stamps that scatter about the clock by which the rows were really measured.
+// Time stamps that scatter around the clock of the measurement.
 #pragma once
 
 #include <optional>
@@ -8,11 +8,11 @@
 namespace upright {
 
 struct ScatteredStamps {
-  double period_s = 0.0;   ///< between rows, of the steady clock
-  double scatter_s = 0.0;  ///< standard deviation of the stamps about it
+  double period_s = 0.0;   ///< of the steady clock
+  double scatter_s = 0.0;  ///< standard deviation of the stamps around it
 };
 
-/// Nothing where the motion follows the stamps, or tells no difference.
+/// Empty if the motion follows the stamps, or shows no difference.
 std::optional<ScatteredStamps> find_scatter(const Measurement& run);
 
 }  // namespace upright

@@ -95,15 +95,15 @@ Plant without_dead_zone(Plant plant, LinearPlant& linear) {
   return plant;
 }
 
-void note_stiff_drive(const Plant& plant, LinearPlant& linear) {
+void record_stiff_drive(const Plant& plant, LinearPlant& linear) {
   if (plant.find("drive_compliance") != nullptr)
     linear.notes.emplace_back("drive_compliance: the drive is taken as stiff");
 }
 
 void refuse_not_finite(const LinearPlant& linear) {
   if (linear.a.allFinite() && linear.b.allFinite()) return;
-  throw ConfigError("the linearisation is not finite, " + matrix_text("A", linear.a) + ", " +
-                    matrix_text("b", linear.b) + ": correct the plant's parameters");
+  throw ConfigError("the linearised plant has values that are not finite, " + matrix_text("A", linear.a) +
+                    ", " + matrix_text("b", linear.b) + ": correct the plant's parameters");
 }
 
 }  // namespace
@@ -141,7 +141,7 @@ SampledPlant hold_input(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b, doub
 
 LinearPlant linearize(const Plant& plant, double smoothing) {
   if (!(smoothing > 0.0) || !std::isfinite(smoothing))
-    throw ConfigError("sgn(v) has no slope at rest: give a smoothing above 0");
+    throw ConfigError("sgn(v) cannot be linearised at rest without smoothing: use a smoothing above 0");
   LinearPlant linear;
   PlantModel<Dual> model = make_model<Dual>(without_dead_zone(plant, linear));
   model.smoothing = smoothing;
@@ -170,7 +170,7 @@ LinearPlant linearize(const Plant& plant, double smoothing) {
   linear.actuator_slope = dynamics.actuate(Dual(0.0, 0)).v(0);
   linear.input_delay_s = dynamics.input_delay_s().a;
   read_sensors(dynamics, linear);
-  note_stiff_drive(plant, linear);
+  record_stiff_drive(plant, linear);
   refuse_not_finite(linear);
   return linear;
 }

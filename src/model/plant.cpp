@@ -32,14 +32,14 @@ std::string fault_of(const Plant& plant) {
   const bool level =
       (coulomb != nullptr && coulomb->values[0] > 0.0) || (stribeck != nullptr && stribeck->values[0] > 0.0);
   if (plant.find("bristle_friction") != nullptr && !level)
-    return "bristle_friction renders a dry level, and the plant has none: add coulomb_friction or "
+    return "bristle_friction needs a dry friction level, and the plant has none: add coulomb_friction or "
            "stribeck_friction";
   if (plant.pendulum) return "";
   for (const PlantEffect& effect : plant.effects) {
     const std::string kind(effect_registry()[effect.number].kind);
     if (effect_registry()[effect.number].enters == Enters::pendulum || kind.starts_with("pendulum_") ||
         kind.starts_with("angle_"))
-      return "the plant is a cart alone, and has " + kind + ": add the pendulum, or remove " + kind;
+      return "the plant has no pendulum, but has " + kind + ": add the pendulum, or remove " + kind;
   }
   return "";
 }

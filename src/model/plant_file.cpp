@@ -26,8 +26,8 @@ Pendulum read_pendulum(const YamlMap& map) {
   pendulum.given_inertia_kgm2 = map.optional_number("inertia_about_pivot_kgm2", Range::positive());
   const double point_mass = pendulum.mass_kg * pendulum.length_to_com_m * pendulum.length_to_com_m;
   if (pendulum.given_inertia_kgm2 && *pendulum.given_inertia_kgm2 < point_mass * (1.0 - 1e-12))
-    map.fail("inertia_about_pivot_kgm2", "is less than that of a point mass",
-             "give it at least mass_kg length_to_com_m^2 = " + exact_text(point_mass));
+    map.fail("inertia_about_pivot_kgm2", "is smaller than the inertia of a point mass",
+             "set it to at least mass_kg length_to_com_m^2 = " + exact_text(point_mass));
   map.finish();
   return pendulum;
 }
@@ -47,7 +47,7 @@ Plant read_plant(const YamlMap& document) {
   for (const YamlMap& item : map.maps("effects")) {
     const PlantEffect effect = read_effect(item);
     if (plant.find(effect.number) != nullptr)
-      item.fail("kind", "stands twice", "keep one " + std::string(effect_registry()[effect.number].kind));
+      item.fail("kind", "appears twice", "keep one " + std::string(effect_registry()[effect.number].kind));
     plant.effects.push_back(effect);
   }
   const std::string fault = fault_of(plant);

@@ -102,8 +102,7 @@ RiccatiSolution solve_continuous_riccati(const MatrixXd& a, const VectorXd& b, c
   if (factored.info() != Eigen::Success || order_stable_first(schur) != n ||
       smallest < on_the_axis * hamiltonian.cwiseAbs().maxCoeff())
     refuse(a, b, q,
-           "the matrix pair (A, b) is not stabilizable or (A, Q) does not show every mode, so that the "
-           "Hamiltonian "
+           "the matrix pair (A, b) is not stabilizable or (A, Q) is not detectable, so the Hamiltonian "
            "matrix has eigenvalues on the imaginary axis");
   const ComplexMatrix top = schur.u.topLeftCorner(n, n), bottom = schur.u.bottomLeftCorner(n, n);
   const ComplexMatrix x = top.transpose().partialPivLu().solve(bottom.transpose()).transpose();
@@ -138,9 +137,7 @@ DiscreteRiccatiSolution solve_discrete_riccati(const MatrixXd& a, const MatrixXd
     f = f * w_f;
     if (!h.allFinite()) break;
   }
-  if (!done)
-    refuse(a, b, q,
-           "the matrix pair (A, b) is not stabilizable, or (A, Q) does not show every unstable mode");
+  if (!done) refuse(a, b, q, "the matrix pair (A, b) is not stabilizable, or (A, Q) is not detectable");
   DiscreteRiccatiSolution solution;
   solution.x = h;
   const MatrixXd cross = b.transpose() * h * a + s.transpose();

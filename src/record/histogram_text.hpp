@@ -1,4 +1,4 @@
-// Histograms of durations as a table for a terminal, side by side.
+// Histograms of durations side by side, as a table for a terminal.
 #pragma once
 
 #include <string>
@@ -13,11 +13,11 @@ struct NamedHistogram {
   const DurationHistogram& durations;
 };
 
-/// A header line, then a line for each of the bins 1, 2, 5, 10, ... microseconds from the first to the last
-/// that is not empty in all of them, with count and bar. A bar is as long as the logarithm of its count, so
-/// that one late wake-up among ten thousand is seen. Up to three histograms fit into 100 columns. Bins begin
-/// and end within 1/16 of what they say, which is how finely a DurationHistogram counts. Empty when nothing
-/// was counted.
+/// A header line, then one line per bin 1, 2, 5, 10, ... microseconds, from the first to the last
+/// that is not empty in all histograms, with count and bar. The length of a bar is logarithmic, so
+/// that a single late wake-up among ten thousand is visible. Up to three histograms fit into 100
+/// columns. Bin limits are accurate to 1/16, the resolution of a DurationHistogram. Empty when
+/// nothing was counted.
 std::vector<std::string> histogram_lines(const std::vector<NamedHistogram>& histograms);
 
 }  // namespace upright

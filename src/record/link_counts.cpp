@@ -33,17 +33,17 @@ std::string words_for(LinkTrouble trouble, std::uint64_t count) {
     case LinkTrouble::late:
       return counted(count, "late reply", "late replies");
     case LinkTrouble::no_reply:
-      return counted(count, "reply that never came", "replies that never came");
+      return counted(count, "missing reply", "missing replies");
     case LinkTrouble::no_connection:
       return counted(count, "period without a connection", "periods without a connection");
     case LinkTrouble::wrong_reply:
-      return counted(count, "wrong reply", "wrong replies");
+      return counted(count, "invalid reply", "invalid replies");
     case LinkTrouble::refused:
       return counted(count, "refused request", "refused requests");
     case LinkTrouble::other:
       break;
   }
-  return counted(count, "fault of the device", "faults of the device");
+  return counted(count, "device fault", "device faults");
 }
 
 }  // namespace
@@ -85,7 +85,7 @@ std::string sentence_of(const LinkCounts& counts) {
   if (counts.longest > 1) text += ", at most " + std::to_string(counts.longest) + " in a row";
   if (counts.recoveries > 0) {
     text += text.empty() ? "" : "; ";
-    text += "the link was brought back " + counted(counts.recoveries, "time", "times");
+    text += "the link was re-established " + counted(counts.recoveries, "time", "times");
   }
   return text;
 }

@@ -51,25 +51,25 @@ const char* words_for(RigFault fault) {
     case RigFault::link_timeout:
       return "no reply in time";
     case RigFault::link_lost:
-      return "the connection is gone";
+      return "the connection was lost";
     case RigFault::corrupt_reply:
       return "corrupt replies";
     case RigFault::device_restarted:
-      return "the device restarted, its counts begin anew";
+      return "the device restarted, so its counters were reset";
     case RigFault::counts_jumped:
-      return "the counts jumped by more than any motion explains";
+      return "the encoder counts jumped farther than fastest_mps or fastest_radps allows";
     case RigFault::device_refused:
       return "the device refused the request";
     case RigFault::device_busy:
       return "the device answered that it is busy";
     case RigFault::output_kept:
-      return "the device acknowledged zero volts and kept its voltage";
+      return "the device acknowledged zero volts but kept its voltage";
     case RigFault::not_finite:
-      return "a voltage that is not a number";
+      return "the voltage was not a finite number";
     case RigFault::out_of_range:
-      return "counts the hardware cannot mean";
+      return "an encoder reading was outside its valid range";
     case RigFault::emergency_stop:
-      return "emergency stop";
+      return "the emergency stop was pressed";
     case RigFault::limit_switch:
       return "a limit switch was hit";
     case RigFault::limit_switch_plus:
@@ -79,11 +79,11 @@ const char* words_for(RigFault fault) {
     case RigFault::line_failed:
       return "a digital line could not be read or set";
     case RigFault::edges_lost:
-      return "edges of an encoder were lost, its counts are wrong";
+      return "encoder edges were lost, so the counts are wrong";
     case RigFault::edges_too_fast:
-      return "an encoder's edges came faster than fastest_edges_per_s, some may be lost";
+      return "encoder edges came faster than fastest_edges_per_s, so some may be lost";
     case RigFault::watchdog_expired:
-      return "the device's own watchdog took the voltage away, for it was not served in time";
+      return "the device's own watchdog expired and switched the voltage off";
   }
   return "unknown fault";
 }
@@ -120,13 +120,12 @@ const char* remedy_for(RigFault fault) {
     case RigFault::line_failed:
       return "check the GPIO chip and its driver";
     case RigFault::edges_lost:
-      return "check the encoder's wiring and that nothing delays the kernel's interrupts, then take the zero "
-             "again";
+      return "check the encoder's wiring and what delays the interrupts, then start again to set a new zero";
     case RigFault::edges_too_fast:
-      return "let the encoder turn more slowly or use a hardware counter, then take the zero again";
+      return "turn the encoder more slowly or use a hardware counter, then start again to set a new zero";
     case RigFault::watchdog_expired:
-      return "start again, which unlocks the device; give its watchdog more time where the machine cannot be "
-             "made quieter";
+      return "start again, which unlocks the device; if it happens again, reduce the load on this computer "
+             "or lengthen the device's watchdog time";
     default:
       return "reset the device and start again";
   }
@@ -134,7 +133,7 @@ const char* remedy_for(RigFault fault) {
 
 std::string went_on_after(const LinkCounts& link) {
   const std::string troubles = sentence_of(link);
-  return troubles.empty() ? "" : " and went on after " + troubles;
+  return troubles.empty() ? "" : " despite " + troubles;
 }
 
 std::string brief(double value) {
@@ -143,54 +142,54 @@ std::string brief(double value) {
   return text;
 }
 
-/// Why a pendulum that was up fell, or ran the cart to the end: what is known of it, and what to do.
+/// The likely cause of a fall or of a cart at the end of the track, and the remedy.
 std::string why_not_held(const LoopOutcome& o, const LoopLimits& limits) {
-  constexpr double soon_s = 1.5;  // a wrong sign ends a run as soon as it began
+  constexpr double soon_s = 1.5;  // a wrong sign ends a run within this time
   if (limits.delay_exceeded)
-    return "; its delay or its gains are beyond what the plant bears: see upright margin";
+    return "; the gains do not stabilize this plant with this delay: see upright margin";
   if (limits.signs_unproven && o.time_s < soon_s)
-    return " soon after the start, and nobody checked the signs of this rig: check the signs of encoders and "
-           "amplifier with the motor off, then lift the pendulum again";
-  return ": see in the report whether a push, the voltage's limit or late periods came before it";
+    return " soon after the start, and the signs of this rig were not checked: switch the motor off, check "
+           "the signs of the encoders and the amplifier, then lift the pendulum again";
+  return ": look in the report for a push, voltage saturation or late periods before the stop";
 }
 
 std::string sentence_of_fall(const LoopOutcome& o, const LoopLimits& limits, const std::string& when) {
   const std::string limit = brief(limits.fall_angle_rad * 180.0 / std::numbers::pi) + " degrees";
   if (o.first_bad_tick == 0)
-    return "it fell before it began: the pendulum was beyond the limit of " + limit + " from upright" + when +
-           ": lift it upright, and hold it still until the motor takes over";
-  return "it fell, |theta| reached the limit of " + limit + when + why_not_held(o, limits);
+    return "the pendulum was already more than " + limit + " from upright at the start" + when +
+           ": lift it upright and hold it still until the motor takes over";
+  return "the pendulum fell past the limit of " + limit + when + why_not_held(o, limits);
 }
 
 std::string sentence_of_track(const LoopOutcome& o, const LoopLimits& limits, const std::string& when) {
-  const std::string back = ": bring the cart back to the middle";
+  const std::string back = ": move the cart back to the middle";
   if (is_limit_switch(o.fault)) return std::string(words_for(o.fault)) + when + back;
   const std::string limit = "the track limit of " + brief(limits.track_limit_m) + " m";
   const std::string at = ", at x = " + brief(o.last_cart_m) + " m";
-  if (o.first_bad_tick == 0) return "the cart was at " + limit + at + ", when the run began" + when + back;
-  return "the cart reached " + limit + ", or rolled towards it" + at + when + why_not_held(o, limits);
+  if (o.first_bad_tick == 0) return "the cart was already at " + limit + at + ", at the start" + when + back;
+  return "the cart reached " + limit + " or would have coasted to it" + at + when + why_not_held(o, limits);
 }
 
-/// The part of the periods that took longest tells what to look at.
+/// The phase of the period with the most overruns decides cause and remedy.
 std::string sentence_of_overrun(const LoopOutcome& o, const LoopLimits& limits, const std::string& when) {
   const LoopCounts& c = o.counts;
   const std::uint64_t link = c.overruns_read + c.overruns_write;
   std::string cause = "the processor was busy: ",
-              remedy = "free it, see upright doctor, or lower sample_rate_hz";
+              remedy = "reduce its load (see upright doctor) or lower sample_rate_hz";
   if (link > c.overruns_wake + c.overruns_compute) {
     cause = "reading and writing the rig took too long: ";
-    remedy = "check the link, or lower sample_rate_hz";
+    remedy = "check the link or lower sample_rate_hz";
   } else if (!o.realtime) {
-    cause = "the loop woke late and has no real-time scheduling: ";
-    remedy = "grant it, see upright doctor, free the processor, or lower sample_rate_hz";
+    cause = "the loop woke late because it has no real-time scheduling: ";
+    remedy = "grant it (see upright doctor), reduce the processor's load, or lower sample_rate_hz";
   }
-  return "more than " + std::to_string(limits.most_periods_late) + " periods in a row were late, first" +
+  return "more than " + std::to_string(limits.most_periods_late) + " periods in a row overran, starting" +
          when + "; " + cause + remedy;
 }
 
-/// Older counts than the watchdog allows, or none at all.
+/// For counts that are older than the watchdog allows, or missing.
 std::string for_longer_than(const LoopLimits& limits) {
-  return " for more than the watchdog's " + brief(limits.watchdog_s * 1e3) + " ms";
+  return " for more than the watchdog time of " + brief(limits.watchdog_s * 1e3) + " ms";
 }
 
 }  // namespace
@@ -199,7 +198,7 @@ std::string sentence_of(const LoopOutcome& o, const LoopLimits& limits) {
   const std::string when = " in cycle " + std::to_string(o.first_bad_tick) + " (" + brief(o.time_s) + " s)";
   switch (o.reason) {
     case StopReason::duration:
-      return "the run lasted its whole time" + went_on_after(o.counts.link);
+      return "the run completed its full duration" + went_on_after(o.counts.link);
     case StopReason::signal:
       return std::string("stopped by ") + name_of_signal(o.signal) + when + ": start again when ready";
     case StopReason::stop_button:
@@ -207,21 +206,23 @@ std::string sentence_of(const LoopOutcome& o, const LoopLimits& limits) {
     case StopReason::not_finite:
       return "a value was not a finite number" + when + ": check the gains and the sensors";
     case StopReason::stale_encoder:
-      return "no new counts came" + for_longer_than(limits) + ", first" + when + ": check the encoders' link";
+      return "no new encoder counts arrived" + for_longer_than(limits) + ", starting" + when +
+             ": check the link to the encoders";
     case StopReason::stuck_encoder:
       return (o.stuck == StuckEncoder::cart
-                  ? std::string(
-                        "the cart's encoder did not count although the applied voltages move the cart, "
-                        "first") +
+                  ? std::string("the cart encoder did not count although the applied voltages should have "
+                                "moved the cart, starting") +
                         when +
-                        ": check this encoder and its cable, that the amplifier is on and the cart free"
-                  : std::string("the pendulum's encoder did not count although the cart's motion moves the "
-                                "pendulum, first") +
-                        when + ": check this encoder and its cable") +
-             "; if they are good, encoder_watch in the rig file assumes too little friction or lag";
+                        ": check the encoder and its cable, that the amplifier is on, and that the cart "
+                        "moves freely"
+                  : std::string(
+                        "the pendulum encoder did not count although the cart's motion should have moved "
+                        "the pendulum, starting") +
+                        when + ": check the encoder and its cable") +
+             "; if all are good, allow for more friction and lag in encoder_watch of the rig file";
     case StopReason::link_lost:
-      return "the link failed" + for_longer_than(limits) + " (" + words_for(o) + "), first" + when +
-             ": check cable, address and device";
+      return "the link failed" + for_longer_than(limits) + " (" + words_for(o) + "), starting" + when +
+             ": check the cable, the address and the device";
     case StopReason::rig_fault:
       return words_for(o) + when + ": " + remedy_for(o.fault);
     case StopReason::track_limit:
@@ -233,10 +234,10 @@ std::string sentence_of(const LoopOutcome& o, const LoopLimits& limits) {
     case StopReason::emergency_stop:
       return "the emergency stop was pressed" + when + ": release it when it is safe";
     case StopReason::log_failed:
-      return "the log could not keep every row" + when;
+      return "the log could not record every row" + when;
     case StopReason::not_ready:
-      return "the rig did not come to where the experiment starts" + when +
-             ": bring it there (at rest, or held upright as it says)";
+      return "the rig did not reach the starting position of the experiment" + when +
+             ": bring it there (at rest, or held upright, as the experiment requires)";
   }
   return "unknown reason";
 }

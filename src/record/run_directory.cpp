@@ -8,6 +8,7 @@
 #include <cerrno>
 #include <cstring>
 #include <ctime>
+#include <type_traits>
 
 #include "provenance.hpp"
 #include "stop_report.hpp"
@@ -150,6 +151,18 @@ std::string yaml_of(const std::string& sentence) {
   return yaml_quoted(sentence);
 }
 
+std::string device_clock_text(const DeviceTiming& timing) {
+  std::string text;
+  for_each_fact(timing, [&](const char* name, auto value) {
+    text += (text.empty() ? "  device_clock: {" : ", ") + std::string(name) + ": ";
+    if constexpr (std::is_floating_point_v<decltype(value)>)
+      text += exact_text(value);
+    else
+      text += std::to_string(value);
+  });
+  return text + "}\n";
+}
+
 std::string outcome_text(const LoopOutcome& o, const LoopLimits& limits, const LogSummary& log) {
   std::string text = "outcome:\n  result: " + std::string(result_of(o)) + "\n  reason: " + name_of(o.reason) +
                      "\n  sentence: " + yaml_quoted(sentence_of(o, limits, log)) +
@@ -164,7 +177,9 @@ std::string outcome_text(const LoopOutcome& o, const LoopLimits& limits, const L
   text += "  rows_written: " + std::to_string(log.rows_written) +
           "\n  rows_dropped: " + std::to_string(log.rows_dropped) + "\n";
   if (!log.failure.empty()) text += "  log_failure: " + yaml_quoted(log.failure) + "\n";
-  text += "  counts: " + counts_text(o.counts) + "\n  link: " + counts_text(o.counts.link) + "\n  timing:\n";
+  text += "  counts: " + counts_text(o.counts) + "\n  link: " + counts_text(o.counts.link) + "\n";
+  if (o.device_clock) text += device_clock_text(*o.device_clock);
+  text += "  timing:\n";
   for_each_timing(o,
                   [&](const char* name, const auto& histogram) { text += histogram_text(name, histogram); });
   return text;
@@ -207,12 +222,12 @@ RunDirectory::RunDirectory(const std::filesystem::path& parent, const std::strin
   if (!is_plain(label))
     throw ConfigError(
         "the label '" + label +
-        "' has a character that folders should not have: use letters, digits, '.', '_' and '-' in --label");
+        "' has a character that folder names cannot have: use letters, digits, '.', '_' and '-' in --label");
   std::error_code problem;
   std::filesystem::create_directories(parent, problem);
   if (problem)
-    throw ConfigError("the folder " + parent.string() + " cannot be made or written (" + problem.message() +
-                      "): name another with --out");
+    throw ConfigError("the folder " + parent.string() + " cannot be created or written (" +
+                      problem.message() + "): name another with --out");
   started_utc_ = utc_now("%Y-%m-%dT%H:%M:%SZ");
   const std::string name = utc_now("%Y%m%dT%H%M%SZ") + "-" + label;
   constexpr int most_tries = 10000;
@@ -224,7 +239,7 @@ RunDirectory::RunDirectory(const std::filesystem::path& parent, const std::strin
     }
     if (problem) break;
   }
-  throw ConfigError("cannot make " + path_.string() + " (" + problem.message() +
+  throw ConfigError("cannot create " + path_.string() + " (" + problem.message() +
                     "): name a folder that can be written");
 }
 
@@ -272,7 +287,7 @@ void RunDirectory::write_start(const RunSetup& setup) {
   if (!write_file(descriptor_, "run.yaml", text, 0) ||
       !write_file(descriptor_, completed_name, "", room_for_outcome))
     throw ConfigError("cannot write " + (path_ / "run.yaml").string() +
-                      ": free space where the run directory goes");
+                      ": free space on the disk of the run directory");
   ::fsync(descriptor_);
 }
 

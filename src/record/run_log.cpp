@@ -105,7 +105,8 @@ RunLog::RunLog(const std::filesystem::path& file, const Options& options)
     keeper_ = std::thread([this] { keep_loop(); });
   } catch (const std::exception&) {
     close();
-    throw Error(ExitCode::device, "the log's writer could not start: raise the limit on threads (ulimit -u)");
+    throw Error(ExitCode::device,
+                "the log's writer thread could not start: raise the limit on threads (ulimit -u)");
   }
 }
 
@@ -271,25 +272,24 @@ std::string RunLog::failure() const {
       std::error_code ignored;
       const bool folder_left = std::filesystem::exists(file_.parent_path(), ignored);
       return (folder_left ? file : "the run directory " + file_.parent_path().string()) +
-             " was removed while the run went on, so its rows are lost: leave it alone until the run has "
-             "ended";
+             " was removed during the run, so its rows are lost: do not change it before the run has ended";
     }
     case LogFileState::moved:
       return file +
-             " was moved away or replaced while the run went on: leave the run directory alone until the run "
-             "has ended";
+             " was moved or replaced during the run: do not change the run directory before the run has "
+             "ended";
     case LogFileState::cut:
       return file +
-             " was cut short by another program while the run went on, so rows are lost: leave the run "
-             "directory alone until the run has ended";
+             " was truncated by another program during the run, so rows are lost: do not change the run "
+             "directory before the run has ended";
   }
   if (!cannot_write() && rows_dropped() == 0)
-    return "the disk held up " + file + " for longer than the log waits: use a faster disk for --out";
+    return "writing " + file + " took longer than the log waits: use a faster disk for --out";
   if (!cannot_write())
-    return "the disk held up " + file + " until " + std::to_string(rows_dropped()) +
+    return "writing " + file + " took so long that " + std::to_string(rows_dropped()) +
            " rows were lost: use a faster disk for --out";
   return file + " could not be written (" + std::strerror(error_.load(std::memory_order_relaxed)) +
-         "): free space where the run directory goes";
+         "): free space on the disk of the run directory";
 }
 
 }  // namespace upright

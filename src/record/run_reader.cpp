@@ -104,7 +104,7 @@ class Header {
 };
 
 /// Nothing but what a power cut leaves behind the last row: blanks and bytes never written.
-bool is_waste(std::string_view text) {
+bool is_padding(std::string_view text) {
   constexpr std::string_view waste("\0\n\r", 3);
   return text.find_first_not_of(waste) == std::string_view::npos;
 }
@@ -140,9 +140,9 @@ class Lines {
   }
 
   /// Everything from here on is waste.
-  bool rest_is_waste() {
+  bool rest_is_padding() {
     do {
-      if (!is_waste(std::string_view(text_).substr(begin_))) return false;
+      if (!is_padding(std::string_view(text_).substr(begin_))) return false;
       begin_ = text_.size();
     } while (read_more());
     return true;
@@ -192,9 +192,9 @@ class SampleReader::Implementation {
     }
     ++line_number_;
     if (complete && header_->read(line, cells_, row)) return true;
-    if (!lines_.rest_is_waste())
+    if (!lines_.rest_is_padding())
       throw ConfigError(file_.string() + ":" + std::to_string(line_number_) +
-                        ": not a row of samples: restore the line from a copy");
+                        ": this line is not a row of samples: restore it from a copy");
     truncated_ = true;
     return false;
   }
@@ -239,7 +239,7 @@ Samples read_samples(const std::filesystem::path& file) {
 RunRecord read_run_without_samples(const std::filesystem::path& directory) {
   std::error_code problem;
   if (!std::filesystem::is_directory(directory, problem))
-    throw ConfigError(directory.string() + " is no folder: name a run directory");
+    throw ConfigError(directory.string() + " is not a folder: name a run directory");
   if (!std::filesystem::exists(directory / "run.yaml", problem))
     throw ConfigError(directory.string() + " has no run.yaml: name a run directory");
   const YamlMap document = YamlMap::from_file(directory / "run.yaml");

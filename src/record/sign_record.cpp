@@ -36,17 +36,18 @@ bool signs_are_checked(const RigFile& rig) {
 
 void require_checked_signs(const RigFile& rig, const std::string& otherwise) {
   if (is_simulated(rig) || signs_are_checked(rig)) return;
-  throw ConfigError("no sign check was done on this rig as it is wired (there is no matching " +
-                    sign_record_of(rig).string() +
-                    "), and with a wrong sign the loop drives the cart into the end stop: run upright "
-                    "experiment config/experiments/sign-check.yaml --rig " +
-                    rig.file.string() + " first" + otherwise);
+  throw ConfigError(
+      "the signs of this rig have not been checked with its present wiring (there is no matching " +
+      sign_record_of(rig).string() +
+      "); with a wrong sign the loop drives the cart into the end stop: run upright "
+      "experiment config/experiments/sign-check.yaml --rig " +
+      rig.file.string() + " first" + otherwise);
 }
 
 void write_sign_record(const RigFile& rig, const std::string& sentence) {
   const std::filesystem::path file = sign_record_of(rig);
   std::ofstream out(file, std::ios::binary);
-  out << "# Signs checked: " << sentence << ". Of this wiring:\n" << wiring_of(rig);
+  out << "# Signs checked: " << sentence << ". Valid for this wiring:\n" << wiring_of(rig);
   out.close();
   if (!out) throw ConfigError("cannot write " + file.string() + ": make the folder of the rig file writable");
 }

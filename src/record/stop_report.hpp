@@ -1,4 +1,4 @@
-// The words for whether the motor is known to be at zero volts.
+// Descriptions of a stop: whether the motor is known to be at zero volts.
 #pragma once
 
 #include <string>
@@ -10,13 +10,13 @@ namespace upright {
 /// "confirmed" or "not_confirmed".
 const char* name_of_zero(const StopReport& report) noexcept;
 
-/// What is known, in one sentence; in capitals, and with what to do, where somebody has to act.
+/// The state in one sentence; in capitals and with the remedy where a person must act.
 std::string sentence_of(const StopReport& report);
 
 /// Why zero volts is not confirmed yet: "no reply in time", "exception 06 (device busy)", ...
 std::string reason_of(const StopReport& report);
 
-/// Calls see(name, fact) for what is known of a stop, as run.yaml and --json list it.
+/// Calls see(name, fact) for each fact of a stop, as in run.yaml and --json.
 template <class See>
 void for_each_fact(const StopReport& report, See&& see) {
   see("zero_volts", name_of_zero(report));

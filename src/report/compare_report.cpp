@@ -14,7 +14,7 @@ namespace upright {
 namespace {
 
 constexpr double per_degree = 57.29577951308232;
-constexpr std::size_t most_drawn = 6;  // more curves over each other cannot be told apart
+constexpr std::size_t most_drawn = 6;  // more curves in one plot are not distinguishable
 
 std::string in_units(double value, const Quantity& quantity) {
   return number_text(value * quantity.per_si_unit, 3) + " " + std::string(quantity.unit);
@@ -29,10 +29,11 @@ std::string estimate_text(const Estimate& estimate, const Quantity& quantity) {
 }
 
 void add_table(HtmlPage& page, const std::vector<RunBehaviour>& runs) {
-  HtmlTable table{{"run", "folder", "rate [Hz]", "end"},
-                  {},
-                  "Over the last third of each run, in brackets the interval that holds with 95 percent. "
-                  "Lateness: median, 99 percent and largest, in microseconds."};
+  HtmlTable table{
+      {"run", "folder", "rate [Hz]", "outcome"},
+      {},
+      "Values over the last third of each run, with 95 % confidence intervals in brackets. Lateness of the "
+      "control loop: median, 99th percentile and maximum, in microseconds."};
   for (const Quantity& quantity : quantities)
     table.header.push_back(std::string(quantity.name) + " [" + std::string(quantity.unit) + "]");
   table.header.emplace_back("lateness");
@@ -62,7 +63,7 @@ constexpr DrawnQuantity drawn_quantities[] = {
     {"cart position", "x [mm]", &LogRecord::cart_m, 1e3},
     {"voltage", "V", &LogRecord::voltage_v, 1.0}};
 
-/// The runs over each other, each from its own beginning.
+/// The runs in one plot for each quantity. Time is counted from the first row of each.
 std::vector<Plot> overlays(const std::vector<RunBehaviour>& runs, const std::vector<RunData>& data,
                            std::vector<LogRecord> RunData::*rows) {
   std::vector<Plot> plots;
@@ -113,38 +114,38 @@ std::vector<std::string> comparison_sentences(const std::vector<RunBehaviour>& r
     if (const std::string ending = ending_text(runs[k]); !ending.empty()) clear.push_back(name + ending);
     if (!runs[k].behaviour) clear.push_back(name + runs[k].problem);
     if (k == 0) continue;
-    // What a fall does to the last third is no behaviour to compare.
+    // A fall dominates the last third, so there is no behaviour to compare.
     if (runs[k].fell || runs.front().fell) continue;
     std::string alike;
     for (const Difference& difference : differences_between(runs.front(), runs[k])) {
       if (difference.is_clear.value_or(false))
         clear.push_back(name + difference_text(difference));
       else if (!difference.is_clear)
-        others.push_back(name + difference_text(difference) + " (too short to tell from chance)");
+        others.push_back(name + difference_text(difference) + " (run too short for a confidence interval)");
       else
         alike += (alike.empty() ? "" : ", ") + std::string(quantities[difference.quantity].name);
     }
     if (!alike.empty()) others.push_back(name + "no clear difference in " + alike);
     if (runs[k].sample_rate_hz != runs.front().sample_rate_hz)
       others.push_back(name + "sampled at " + number_text(runs[k].sample_rate_hz, 5) + " Hz, run A at " +
-                       number_text(runs.front().sample_rate_hz, 5) + " Hz: steps are from period to period");
+                       number_text(runs.front().sample_rate_hz, 5) +
+                       " Hz, so their voltage changes per sample are not comparable");
   }
   clear.insert(clear.end(), others.begin(), others.end());
   return clear;
 }
 
 void write_compare_report(const std::vector<RunBehaviour>& runs, const std::filesystem::path& file) {
-  HtmlPage page(
-      "Comparison of " + std::to_string(runs.size()) + " runs",
-      "A is " + (runs.empty() ? std::string("-") : runs.front().name) + "; the others are held against it");
+  HtmlPage page("Comparison of " + std::to_string(runs.size()) + " runs",
+                "Reference: run A, " + (runs.empty() ? std::string("-") : runs.front().name));
   const std::vector<std::string> sentences = comparison_sentences(runs);
   const bool fell = std::any_of(runs.begin(), runs.end(), [](const RunBehaviour& r) { return r.fell; });
   page.answer(fell ? Tone::bad : Tone::neutral, sentences.empty() ? "Nothing to compare" : sentences.front(),
               fell ? "A run fell." : "No run fell.");
   for (std::size_t i = 1; i < sentences.size(); ++i) page.paragraph(sentences[i]);
-  page.section("In numbers");
+  page.section("Key figures");
   add_table(page, runs);
-  add_overlays(page, runs, "Over each other");
+  add_overlays(page, runs, "Runs overlaid");
   page.write(file);
 }
 
@@ -153,11 +154,12 @@ void add_overlays(HtmlPage& page, const std::vector<RunBehaviour>& runs, const s
   for (std::size_t k = 0; k < std::min(runs.size(), most_drawn); ++k)
     data.push_back(load_run_data(runs[k].run));
   page.section(heading);
-  page.stack(overlays(runs, data, &RunData::drawn), runs.size() > most_drawn
-                                                        ? "The first " + std::to_string(most_drawn) + " runs."
-                                                        : "The whole runs.");
+  page.stack(overlays(runs, data, &RunData::drawn),
+             runs.size() > most_drawn ? "The first " + std::to_string(most_drawn) + " runs are drawn."
+                                      : "Complete runs.");
   page.section("The last " + number_text(closing_s) + " seconds");
-  page.stack(overlays(runs, data, &RunData::closing), "Each from its own beginning.");
+  page.stack(overlays(runs, data, &RunData::closing),
+             "Time is counted from the start of this section of each run.");
 }
 
 }  // namespace upright

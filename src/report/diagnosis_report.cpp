@@ -1,11 +1,13 @@
 #include "diagnosis_report.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdlib>
 #include <limits>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <set>
 #include <sstream>
 #include <string>
 #include <tuple>
@@ -43,38 +45,39 @@ std::string joined(const json& names) {
 void add_answer(HtmlPage& page, const json& d, const std::filesystem::path& file) {
   const std::string verdict = d.at("verdict");
   const std::map<std::string, std::pair<Tone, std::string>> headlines = {
-      {"explained", {Tone::good, "Explained: the model lacked what is listed here"}},
-      {"no_discrepancy", {Tone::good, "No discrepancy: the model says what the data say"}},
+      {"explained", {Tone::good, "Explained: the model lacked the effects listed below"}},
+      {"no_discrepancy", {Tone::good, "No discrepancy: the model agrees with the data"}},
       {"unexplained", {Tone::warning, "Unexplained: something is missing that no known effect accounts for"}},
-      {"not_excited", {Tone::neutral, "Not excited: too little moves in these data to show anything"}}};
+      {"not_excited",
+       {Tone::neutral, "Not excited: these data contain too little motion to show an effect"}}};
   const auto known = headlines.find(verdict);
   if (known == headlines.end())
-    throw ConfigError(file.string() + " has an unknown verdict: make the diagnosis anew");
+    throw ConfigError(file.string() + " has an unknown verdict: repeat the diagnosis");
   const auto& [tone, headline] = known->second;
-  page.answer(
-      tone, headline,
-      "Gap on held-out data, in units of the noise: " + number_text(number(d.at("gap").at("before"))) +
-          " before, " + number_text(number(d.at("gap").at("after"))) +
-          " after. Remaining: " + d.at("residual").get<std::string>() + ".");
+  page.answer(tone, headline,
+              "Gap on held-out data: " + number_text(number(d.at("gap").at("before"))) + " before, " +
+                  number_text(number(d.at("gap").at("after"))) +
+                  " after (1 is the noise floor). Residual: " + d.at("residual").get<std::string>() + ".");
 }
 
 void add_gap(HtmlPage& page, const json& d) {
-  page.section("How the gap shrinks");
-  std::vector<HtmlBar> bars = {{"the model as given", number(d.at("gap").at("before")), color::before}};
+  page.section("Gap after each added effect");
+  std::vector<HtmlBar> bars = {{"model as given", number(d.at("gap").at("before")), color::before}};
   for (const json& effect : d.at("effects"))
     bars.push_back(
         {"with " + effect.at("kind").get<std::string>(), number(effect.at("gap_after")), color::after});
   page.bars(
       bars, 1.0,
-      "What a plain simulation of held-out data is off, over what the noise makes of it; each effect is "
-      "added to those above it. Lengths are logarithmic, and 1, the noise, has none.");
+      "Gap: open-loop RMS error on held-out data divided by the noise floor. Each effect is added to those "
+      "above it. The bars are logarithmic and begin at 1, the noise floor.");
 }
 
 void add_effects(HtmlPage& page, const json& d) {
   if (d.at("effects").empty()) return;
-  page.section("What was found");
-  HtmlTable table{
-      {"effect", "parameter", "value", "from", "to", "unit"}, {}, "Intervals hold with 95 percent."};
+  page.section("Effects found");
+  HtmlTable table{{"effect", "parameter", "value", "95 % from", "to", "unit"},
+                  {},
+                  "Values in model.yaml with 95 % confidence intervals."};
   for (const json& effect : d.at("effects"))
     for (const auto& [name, p] : effect.at("parameters").items()) {
       const double low = number(p.at("ci95").at(0)), high = number(p.at("ci95").at(1));
@@ -84,19 +87,18 @@ void add_effects(HtmlPage& page, const json& d) {
   page.table(table);
   for (const json& effect : d.at("effects")) {
     const std::string kind = effect.at("kind"), where = effect.at("where");
-    if (!where.empty()) page.paragraph(kind + ": before it was added, " + where + ".");
+    if (!where.empty()) page.paragraph("Residual before " + kind + " was added: " + where + ".");
     if (!effect.at("confusable_with").empty())
-      page.note(Tone::warning,
-                "These data cannot tell " + kind + " from " + joined(effect.at("confusable_with")) + ".");
+      page.note(Tone::warning, "These data do not distinguish " + kind + " from " +
+                                   joined(effect.at("confusable_with")) + ".");
   }
   const json& next = d.at("next_experiment");
   if (!next.is_null())
-    page.note(Tone::neutral,
-              "The next run that would tell them apart: " + next.at("name").get<std::string>() + " (" +
-                  next.at("description").get<std::string>() + ").");
+    page.note(Tone::neutral, "Next run, to distinguish them: " + next.at("name").get<std::string>() + " (" +
+                                 next.at("description").get<std::string>() + ").");
 }
 
-/// Cells of a CSV without its header, every row `width` long; none where there is no file.
+/// The cells of a CSV file without its header, `width` in each row. Empty if there is no file.
 std::vector<std::vector<std::string>> read_rows(const std::filesystem::path& file, std::size_t width) {
   std::vector<std::vector<std::string>> rows;
   const std::unique_ptr<InputFile> in = InputFile::if_there(file);
@@ -110,7 +112,7 @@ std::vector<std::vector<std::string>> read_rows(const std::filesystem::path& fil
       row.push_back(line.substr(begin, end - begin));
     row.push_back(line.substr(begin));
     if (row.size() != width)
-      throw ConfigError(file.string() + " has a row that is cut off: make the diagnosis anew");
+      throw ConfigError(file.string() + " has an incomplete row: repeat the diagnosis");
     rows.push_back(std::move(row));
   }
   return rows;
@@ -120,8 +122,8 @@ double number(const std::string& cell) {
   return cell.empty() ? nan_value : std::strtod(cell.c_str(), nullptr);
 }
 
-/// What one quantity of a held-out run was, and what the two models make of it. Between segments, each of
-/// which starts from a state of its own, the lines are broken.
+/// One quantity of a held-out run: measured, and simulated with both models. The simulated lines have a gap
+/// between segments, since each segment starts from its own initial state.
 struct Trace {
   std::vector<double> time_s, measured, before, after;
   double before_rms = 0.0, after_rms = 0.0;
@@ -157,12 +159,12 @@ void add_traces(HtmlPage& page, const std::filesystem::path& file) {
   for (const auto& row : rows)
     if (std::find(runs.begin(), runs.end(), row[1]) == runs.end()) runs.push_back(row[1]);
   if (runs.empty()) return;
-  page.section("Measured and simulated, on held-out data");
+  page.section("Measurement and simulation of held-out data");
   HtmlTable table{
-      {"run", "quantity", "off before", "off after", "unit"},
+      {"run", "quantity", "RMS error before", "RMS error after", "unit"},
       {},
-      "Root mean square of measured minus simulated: plain simulation with the recorded voltages, segment by "
-      "segment, each from the initial state that suits the model best."};
+      "RMS of measured minus simulated. Open-loop simulation with the recorded voltages, in segments. Each "
+      "segment starts from the initial state that fits the model best."};
   constexpr std::size_t most_shown = 3;
   for (std::size_t r = 0; r < runs.size(); ++r) {
     std::vector<Plot> plots;
@@ -201,8 +203,7 @@ void add_traces(HtmlPage& page, const std::filesystem::path& file) {
   page.table(table);
 }
 
-/// What the model has that the plant file had not, line by line: the longest common lines stay, the others go
-/// or come.
+/// The line difference of two plant files, by their longest common subsequence: "-" is removed, "+" is added.
 std::string difference(const std::string& from, const std::string& to) {
   const auto lines_of = [](const std::string& text) {
     std::vector<std::string> lines;
@@ -213,7 +214,7 @@ std::string difference(const std::string& from, const std::string& to) {
   };
   const std::vector<std::string> a = lines_of(from), b = lines_of(to);
   constexpr std::size_t most_pairs = 4'000'000;  // far more than plant files have
-  if (b.size() > 0 && a.size() > most_pairs / b.size()) return "too long to be compared\n";
+  if (b.size() > 0 && a.size() > most_pairs / b.size()) return "too long to compare\n";
   std::vector<std::vector<std::size_t>> common(a.size() + 1, std::vector<std::size_t>(b.size() + 1, 0));
   for (std::size_t i = a.size(); i-- > 0;)
     for (std::size_t j = b.size(); j-- > 0;)
@@ -233,10 +234,10 @@ std::string difference(const std::string& from, const std::string& to) {
 }
 
 void add_model(HtmlPage& page, const std::filesystem::path& folder) {
-  page.section("The model");
+  page.section("Changes to the plant file");
   const std::string given = file_text(folder / "given.yaml"), model = file_text(folder / "model.yaml");
   if (!given.empty()) page.preformatted(difference(given, model));
-  page.folded("model.yaml", model);
+  page.folded("model.yaml, complete", model);
 }
 
 void add_residuals(HtmlPage& page, const std::filesystem::path& file) {
@@ -261,41 +262,76 @@ void add_residuals(HtmlPage& page, const std::filesystem::path& file) {
   };
   if (is_there(6)) {
     const std::string force = "residual force [N]";
-    page.section("The residual force on held-out data");
+    page.section("Residual force on held-out data");
     page.figures({against(4, "cart velocity [m/s]", 6, force), against(3, "cart position [m]", 6, force)},
-                 "The force on the cart that the model would need beside its own, by a Kalman smoother.");
+                 "Force on the cart that the model would need in addition to its own, estimated by a Kalman "
+                 "smoother.");
     page.figures({against(5, "voltage [V]", 6, force), against(2, "time [s]", 6, force)},
-                 "The same against voltage and time.");
+                 "The same force against voltage and time.");
   }
   if (is_there(8)) {
     const std::string torque = "residual torque [N m]";
-    page.section("The residual torque on held-out data");
+    page.section("Residual torque on held-out data");
     page.figures({against(4, "cart velocity [m/s]", 8, torque), against(2, "time [s]", 8, torque)},
-                 "The torque on the pendulum that the model would need beside its own.");
+                 "Torque on the pendulum that the model would need in addition to its own.");
   }
 }
 
+/// The rules that decide about adding an effect (diagnosis/decision.hpp), and their reasons.
+constexpr std::array<std::array<const char*, 2>, 15> rules = {
+    {{"shown_throughout", "accepted: evidence and t value are above their limits"},
+     {"borne_out", "accepted: training runs and held-out runs both support it"},
+     {"overwhelming", "accepted: the evidence is above 1000"},
+     {"plant_numbers", "accepted: with it, numbers of the plant file move less"},
+     {"sensors_noise_left", "accepted: with it, only sensor noise remains"},
+     {"held_out_in_doubt", "accepted only if no other effect is: the held-out runs speak against it"},
+     {"simulation_in_doubt", "accepted only if no other effect is: held-out segments simulate worse with it"},
+     {"cannot_be", "rejected: its size is zero or physically impossible"},
+     {"bends_another", "rejected: another effect would become physically impossible"},
+     {"too_little_evidence", "rejected: the evidence is too small"},
+     {"held_out_against", "rejected: the held-out runs speak against it"},
+     {"chance", "rejected: the t value is too small, so the gain can be chance"},
+     {"uncertain_size", "rejected: its size is too uncertain"},
+     {"simulates_worse", "rejected: held-out segments simulate worse with it"},
+     {"undecided", "the search ended before the decision"}}};
+
+void add_trials(HtmlPage& page, const json& trials) {
+  HtmlTable fits{
+      {"round", "effect", "evidence", "held-out evidence", "t", "size [standard errors]", "rule", "added"},
+      {},
+      "All complete fits of the search. t is the mean saving per quarter of a second divided by its standard "
+      "error. The size is the distance from zero. The rule decided about the effect; of the accepted effects "
+      "of a round, the best is added."};
+  std::set<std::string> applied;
+  for (const json& trial : trials) {
+    const std::string rule = trial.value("rule", "");
+    applied.insert(rule);
+    fits.rows.push_back({std::to_string(trial.at("round").get<int>()), trial.at("kind"),
+                         number_text(number(trial.at("evidence"))), number_text(number(trial.at("held_out"))),
+                         number_text(number(trial.at("t"))), number_text(number(trial.at("standard_errors"))),
+                         rule, trial.at("taken").get<bool>() ? "yes" : "no"});
+  }
+  if (fits.rows.empty()) return;
+  page.section("Decisions");
+  page.table(fits);
+  HtmlTable reasons{
+      {"rule", "meaning"}, {}, "The rules that decided. docs/reference/diagnosis-rules.md lists all."};
+  for (const auto& [rule, reason] : rules)
+    if (applied.contains(rule)) reasons.rows.push_back({rule, reason});
+  if (!reasons.rows.empty()) page.table(reasons);
+}
+
 void add_candidates(HtmlPage& page, const json& d) {
-  page.section("The ranking of candidates");
-  HtmlTable table{{"effect", "evidence", "gap with it"},
-                  {},
-                  "Each alone in the model as given. Evidence: twice the natural logarithm of how many times "
-                  "more likely the effect makes the data."};
+  page.section("Ranking of candidates");
+  HtmlTable table{
+      {"effect", "evidence", "gap with this effect"},
+      {},
+      "Each effect is added alone to the model as given. Evidence: 2 ln of the likelihood ratio on the "
+      "training runs."};
   for (const json& candidate : d.at("candidates"))
     table.rows.push_back({candidate.at("kind"), number_text(number(candidate.at("evidence"))),
                           number_text(number(candidate.at("gap_after")))});
   page.table(table);
-  HtmlTable fits{
-      {"round", "effect", "evidence", "held out", "t", "standard errors", "taken"},
-      {},
-      "Every whole fit of the search: evidence on training and on held-out runs, t of its mean per "
-      "quarter of a second, and how many standard errors the effect is from nothing."};
-  for (const json& trial : d.value("trials", json::array()))
-    fits.rows.push_back({std::to_string(trial.at("round").get<int>()), trial.at("kind"),
-                         number_text(number(trial.at("evidence"))), number_text(number(trial.at("held_out"))),
-                         number_text(number(trial.at("t"))), number_text(number(trial.at("standard_errors"))),
-                         trial.at("taken").get<bool>() ? "taken" : ""});
-  if (!fits.rows.empty()) page.table(fits);
 }
 
 }  // namespace
@@ -317,12 +353,13 @@ std::filesystem::path write_diagnosis_report(const std::filesystem::path& folder
     add_traces(page, folder / "traces.csv");
     add_residuals(page, folder / "residuals.csv");
     add_candidates(page, d);
+    add_trials(page, d.value("trials", json::array()));
     add_model(page, folder);
     for (const json& note : d.at("notes")) page.note(Tone::neutral, note.get<std::string>() + ".");
     page.write(file);
   } catch (const json::exception& problem) {
     throw ConfigError((folder / "diagnosis.json").string() + " cannot be read (" + problem.what() +
-                      "): make the diagnosis anew");
+                      "): repeat the diagnosis");
   }
   return file;
 }

@@ -31,13 +31,13 @@ namespace {
 constexpr double per_degree = 180.0 / std::numbers::pi;
 const char* const outcomes[] = {"stable", "oscillating", "fell"};
 
-/// A folder read back: its pieces and trials.
+/// The pieces and trials of an experiment folder.
 struct Record {
   std::string name;
   std::vector<Piece> pieces;
   std::vector<TrialResult> trials;
-  std::vector<std::string> links;     ///< to each trial's own report; empty: it cannot be read
-  std::vector<std::string> problems;  ///< why not
+  std::vector<std::string> links;     ///< to the report of each trial; empty if the run cannot be read
+  std::vector<std::string> problems;  ///< why runs cannot be read
 };
 
 Record read_record(const std::filesystem::path& folder) {
@@ -53,7 +53,7 @@ std::string milliseconds(double seconds) {
   return std::isfinite(seconds) ? number_text(1e3 * seconds, 4) : "-";
 }
 
-/// The rig's loop in simulation, over the same delays and a little finer.
+/// The rig's loop in simulation, for the delays of the experiment and some between them.
 std::vector<SweepRun> simulate(const Plant& plant, const RunRecord& run,
                                const std::vector<TrialResult>& trials, double duration_s) {
   SweepConfig config;
@@ -90,7 +90,7 @@ std::vector<SweepRun> simulate(const Plant& plant, const RunRecord& run,
   return runs;
 }
 
-/// From where on and until where: over the repeats.
+/// The range of a transition over the repeats.
 std::string spread(std::vector<double> values) {
   std::erase_if(values, [](double v) { return !std::isfinite(v); });
   if (values.empty()) return "-";
@@ -98,7 +98,7 @@ std::string spread(std::vector<double> values) {
   return *low == *high ? milliseconds(*low) : milliseconds(*low) + " to " + milliseconds(*high);
 }
 
-/// What the linear analysis and a simulated sweep say of the plant that the plan was made with.
+/// A simulated sweep and the linear analysis of the plant of the plan.
 struct SweepModel {
   std::vector<SweepRun> simulated;
   LoopMargin margin, sliding_margin;
@@ -111,7 +111,7 @@ SweepModel sweep_model(const Plant& plant, const RunRecord& run, const std::vect
           continuous_margin(sliding_plant(plant), run.control.gains, smoothing)};
 }
 
-/// The same of files: a plant or gains that cannot be analysed are named.
+/// The same with plant and gains from files. An error names the files that cannot be analysed.
 SweepModel sweep_model(const std::filesystem::path& folder, const std::vector<TrialResult>& trials,
                        double duration_s) {
   const std::filesystem::path plant_file = folder / "plan_plant.yaml";
@@ -163,9 +163,10 @@ void add_sweep(HtmlPage& page, const std::filesystem::path& folder, const std::s
   mark(margin, "linear, near rest");
   mark(sliding_margin, "linear, sliding");
   page.section(label == pieces::DelaySweep::kind ? "Delay sweep" : "Delay sweep " + label);
-  page.figure(plot,
-              "The rig's runs (points) over a simulated sweep of the same loop (line). Vertical: the "
-              "critical delay of the linear analysis.");
+  page.figure(
+      plot,
+      "Points: runs on the rig. Line: simulation of the same loop. Vertical lines: critical delay of the "
+      "linear analysis.");
   std::vector<double> oscillates, falls;
   for (int repeat = 0; repeat < sweep.repeats; ++repeat) {
     const std::vector<TrialResult> results = pieces::of_repeat(trials, trials.front().trial.piece, repeat);
@@ -173,7 +174,7 @@ void add_sweep(HtmlPage& page, const std::filesystem::path& folder, const std::s
     falls.push_back(pieces::falls_from_s(results));
   }
   page.table({{"", "oscillates from [ms]", "falls from [ms]"},
-              {{"rig, over its repeats", spread(oscillates), spread(falls)},
+              {{"rig, range over repeats", spread(oscillates), spread(falls)},
                {"simulated", milliseconds(simulated_oscillates), milliseconds(simulated_falls)},
                {"linear, near rest", "-", milliseconds(margin.critical_delay_s)},
                {"linear, while the cart slides", "-", milliseconds(sliding_margin.critical_delay_s)}},
@@ -181,7 +182,7 @@ void add_sweep(HtmlPage& page, const std::filesystem::path& folder, const std::s
                   " degree counts as stable."});
 }
 
-/// Writes the report of each run and notes where it is.
+/// Writes the report of each run and stores the link to it.
 void write_run_reports(const std::filesystem::path& folder, Record& record) {
   record.links.assign(record.trials.size(), "");
   std::vector<std::string> problems(record.trials.size());
@@ -191,14 +192,14 @@ void write_run_reports(const std::filesystem::path& folder, Record& record) {
       write_run_report(folder / run);
       record.links[i] = link_to(std::filesystem::path(run) / "report.html");
     } catch (const Error& error) {
-      problems[i] = run + " has no report: " + error.what();
+      problems[i] = run + " has no report because it cannot be read: " + error.what();
     }
   });
   for (const std::string& problem : problems)
     if (!problem.empty()) record.problems.push_back(problem);
 }
 
-/// A run in small: what it was made to show.
+/// Small plots of a run: the quantities that its piece is about.
 std::vector<Plot> small_plots(const RunData& run, const Piece& piece, const TrialResult& trial,
                               const std::string& link) {
   Plot first, second;
@@ -226,13 +227,13 @@ std::vector<Plot> small_plots(const RunData& run, const Piece& piece, const Tria
   second.y.label = balances(piece) ? "x [mm]" : "V";
   second.series = {balances(piece) ? cart : voltage};
   if (is_sweep || hangs) return {first};
-  second.title = balances(piece) ? "its cart" : "its voltage";
+  second.title = balances(piece) ? "cart of the same run" : "voltage of the same run";
   std::vector<Plot> plots = {first, second};
   align(plots);
   return plots;
 }
 
-/// Each run of a piece, drawn small, with a link to its own report.
+/// Small plots of each run of a piece, with links to the reports of the runs.
 void add_runs(HtmlPage& page, const std::filesystem::path& folder, const Record& record, std::size_t piece) {
   std::vector<Plot> plots;
   for (std::size_t i = 0; i < record.trials.size(); ++i) {
@@ -245,14 +246,14 @@ void add_runs(HtmlPage& page, const std::filesystem::path& folder, const Record&
   if (plots.empty()) return;
   const Piece& shown = record.pieces[piece];
   if (!shown.as<pieces::DelaySweep>()) page.section(shown.label);
-  page.figures(plots, "The runs over time; each title leads to the run's own report.");
+  page.figures(plots, "All runs. Each title links to the report of the run.");
 }
 
-/// Controllers that took turns, round against round.
+/// Comparisons of alternating controllers.
 void add_comparisons(HtmlPage& page, const std::filesystem::path& folder, const Record& record) {
   if (std::none_of(record.pieces.begin(), record.pieces.end(), compares)) return;
   for (const PieceComparison& piece : paired_comparisons(folder)) {
-    page.section(piece.label + ": controllers in turns");
+    page.section(piece.label + ": alternating controllers");
     for (const std::string& sentence : paired_sentences(piece)) page.paragraph(sentence);
     add_paired_tables(page, piece);
   }
@@ -267,12 +268,13 @@ bool is_experiment_folder(const std::filesystem::path& folder) {
 std::filesystem::path write_experiment_report(const std::filesystem::path& folder) {
   Record record = read_record(folder);
   if (record.trials.empty())
-    throw ConfigError(folder.string() + " holds no finished run: give the experiment command again");
+    throw ConfigError(folder.string() + " contains no finished run: repeat the experiment command");
   write_run_reports(folder, record);
   HtmlPage page("Experiment " + record.name, folder.string());
   const bool all_made = !next_trial(record.pieces, record.trials);
-  const std::string missing = all_made ? missing_transitions(record.pieces, record.trials)
-                                       : "the experiment ended before its last run: give its command again";
+  const std::string missing =
+      all_made ? missing_transitions(record.pieces, record.trials)
+               : "the experiment ended before its last run: repeat its command to continue";
   page.answer(missing.empty() ? Tone::good : Tone::warning, missing.empty() ? "Complete" : "Not complete",
               std::to_string(record.trials.size()) + " runs" + (missing.empty() ? "" : "; " + missing) + ".");
   for (std::size_t i = 0; i < record.pieces.size(); ++i) {
@@ -288,7 +290,7 @@ std::filesystem::path write_experiment_report(const std::filesystem::path& folde
   HtmlTable table{{"run directory", "delay [ms]", "outcome", "start [degree]", "angle [degree]", "cart [mm]",
                    "frequency [Hz]"},
                   {},
-                  "Each leads to a report of its own."};
+                  "Each name links to the report of the run."};
   for (const TrialResult& r : record.trials)
     table.rows.push_back(
         {r.run_directory, milliseconds(r.trial.delay_s), r.outcome, number_text(r.theta0_rad * per_degree, 3),

@@ -1,5 +1,5 @@
-// The page of an experiment: its runs, and for a delay sweep the paper's Section 3 on one page, the rig's
-// outcomes over a simulated sweep of the same loop, with the linear critical delay.
+// The page of an experiment: its runs. For a delay sweep also the comparison of the paper's Section 3: the
+// outcomes on the rig, a simulated sweep of the same loop and the critical delay of the linear analysis.
 #pragma once
 
 #include <filesystem>

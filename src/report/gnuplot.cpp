@@ -21,7 +21,7 @@ namespace {
   throw Error(ExitCode::usage, sentence);
 }
 
-/// A file in memory: no pipe to fill up, no disk to run full.
+/// A file in memory, since a pipe can block and a disk can be full.
 class MemoryFile {
  public:
   explicit MemoryFile(const char* name) : descriptor_(memfd_create(name, MFD_CLOEXEC)) {
@@ -86,7 +86,7 @@ pid_t start(const MemoryFile& in, const MemoryFile& out, const MemoryFile& err) 
   return child;
 }
 
-/// The last line that says something; gnuplot shows the offending script before it.
+/// The last line that is not empty. Before it, gnuplot repeats the part of the script that failed.
 std::string complaint_of(const std::string& text) {
   const std::size_t end = text.find_last_not_of(" \n");
   if (end == std::string::npos) return "no message";

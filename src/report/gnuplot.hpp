@@ -5,8 +5,8 @@
 
 namespace upright {
 
-/// What gnuplot writes to its standard output for `script`. Nothing touches the disk. Throws Error with the
-/// remedy when gnuplot is missing, or with its first complaint when it fails.
+/// The standard output of gnuplot for `script`. Uses no files on disk. Throws Error if gnuplot is missing
+/// (with the remedy) or fails (with its message).
 std::string gnuplot_output(const std::string& script);
 
 }  // namespace upright

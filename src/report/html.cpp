@@ -96,7 +96,7 @@ bool reads_as_number(const std::string& text) {
          (has_digit && text.find_first_not_of("0123456789+-.eE ,%×⁻⁰¹²³⁴⁵⁶⁷⁸⁹") == std::string::npos);
 }
 
-/// Whether a table with these words goes beside each other into a narrow window.
+/// Whether the columns of this table fit into a narrow window.
 bool fits_narrow(const HtmlTable& table) {
   constexpr double character_px = 8.4, padding_px = 15.0, room_px = 360.0;
   std::vector<std::size_t> longest(table.header.size(), 0);
@@ -140,7 +140,7 @@ std::string linked(const std::string& markup, const std::string& link) {
   return link.empty() ? markup : "<a href=\"" + html_escaped(link) + "\">" + markup + "</a>";
 }
 
-/// A cell that says its column's name where rows stand as lists.
+/// A cell that carries its column's name, for narrow windows, which show each row as a list.
 std::string body_cell(const std::string& text, const std::string& heading, const std::string& link,
                       bool number) {
   std::string result = number ? "<td class=\"n\"" : "<td";
@@ -186,7 +186,7 @@ std::string link_to(const std::filesystem::path& relative) {
     else
       link += {'%', "0123456789ABCDEF"[byte / 16], "0123456789ABCDEF"[byte % 16]};
   }
-  // Without this, "//host" would lead to another machine.
+  // Without this, "//host" would link to another machine.
   return link.starts_with("/") ? link : "./" + link;
 }
 
@@ -327,7 +327,7 @@ void HtmlPage::write(const std::filesystem::path& file) const {
   std::filesystem::path part = file;
   part += ".part";
   std::error_code problem;
-  // What stands there may be a link that came with somebody else's folder: a new file, never through it.
+  // The existing file may be a symbolic link in a folder from someone else, so a new file replaces it.
   std::filesystem::remove(part, problem);
   if (std::FILE* out = std::fopen(part.c_str(), "wbx"); out != nullptr) {
     const std::string page = text();
@@ -340,8 +340,8 @@ void HtmlPage::write(const std::filesystem::path& file) const {
     std::error_code ignored;
     std::filesystem::remove(part, ignored);
   }
-  throw Error(ExitCode::usage,
-              "cannot write " + file.string() + ": check the folder, its permissions and its free space");
+  throw Error(ExitCode::usage, "cannot write " + file.string() +
+                                   ": check that the folder exists, its permissions and the free disk space");
 }
 
 }  // namespace upright

@@ -1,5 +1,5 @@
-// A report page: one HTML file that stands alone (no script, no font, no picture from elsewhere), light, and
-// printable. Everything given as text is escaped.
+// A report page: one self-contained HTML file (no scripts, no external fonts or pictures), light and
+// printable. All text is escaped.
 #pragma once
 
 #include <filesystem>
@@ -15,7 +15,7 @@ namespace upright {
 /// `text` for use inside HTML: markup is escaped, control characters and broken UTF-8 are replaced.
 std::string html_escaped(const std::string& text);
 
-/// How good the news is.
+/// Whether the answer of a page is good, neutral or bad; decides its colour.
 enum class Tone { good, warning, bad, neutral };
 
 struct HtmlTable {
@@ -37,34 +37,33 @@ std::string link_to(const std::filesystem::path& relative);
 
 class HtmlPage {
  public:
-  /// `subtitle` stands small under the title: what, when, where.
+  /// `subtitle` is shown in small type under the title: what, when, where.
   HtmlPage(std::string title, std::string subtitle);
 
-  /// The answer, first thing on the page.
+  /// The answer, at the top of the page.
   void answer(Tone tone, const std::string& headline, const std::string& sentence);
   void section(const std::string& heading);
   void paragraph(const std::string& text);
-  /// A remark set off from the text.
+  /// A highlighted remark.
   void note(Tone tone, const std::string& text);
-  /// Cells that read as numbers are aligned to the right.
-  /// Where the window is too narrow for a table's words, each row becomes a small list of its own.
+  /// Numbers are aligned to the right. In a window that is too narrow for the table, each row becomes a list.
   void table(const HtmlTable& table);
-  /// A bar for each name, with its value; the smallest length is `floor`'s.
+  /// A bar for each name, with its value. A value of `floor` has length zero.
   void bars(const std::vector<HtmlBar>& bars, double floor, const std::string& caption);
-  /// Names and their values, in two columns where there is room.
+  /// Names and their values, in two columns if the window is wide enough.
   void facts(const std::vector<std::pair<std::string, std::string>>& facts);
   void figure(const Plot& plot, const std::string& caption);
-  /// Two figures beside each other where the window is wide enough.
+  /// Two figures side by side if the window is wide enough.
   void figures(const std::vector<Plot>& plots, const std::string& caption);
-  /// Plots above each other whose horizontal axes align: same range, same place.
+  /// Plots in one column with a common horizontal axis.
   void stack(std::vector<Plot> plots, const std::string& caption);
-  /// Text as it is, in a fixed pitch.
+  /// Unchanged text in a monospaced font.
   void preformatted(const std::string& text);
-  /// Text as it is (a configuration file, say), folded away under its heading.
+  /// Unchanged text, such as a configuration file, folded under its heading.
   void folded(const std::string& heading, const std::string& text);
 
   std::string text() const;
-  /// Writes the page whole or not at all. Throws Error when it cannot.
+  /// Writes the complete page or nothing. Throws Error if it cannot.
   void write(const std::filesystem::path& file) const;
 
  private:

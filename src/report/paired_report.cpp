@@ -8,10 +8,10 @@
 namespace upright {
 
 const char* const paired_interval_words =
-    "The difference of a round is taken between its two runs; its mean over the rounds has the interval of "
-    "the "
-    "paired t-test, which holds with 95 percent. Rounds in which one of the two fell are left out and "
-    "counted as "
+    "Differences are taken within each round. Their mean has the 95 % confidence interval of the paired "
+    "t-test "
+    "and is clear if the interval excludes zero. Rounds in which a controller fell are excluded and counted "
+    "as "
     "falls.";
 
 namespace {
@@ -33,9 +33,9 @@ std::string counted(std::size_t count, const std::string& what) {
   return std::to_string(count) + " " + what + (count == 1 ? "" : "s");
 }
 
-/// Every run of the piece, a row each.
+/// One row for each run of the piece.
 HtmlTable runs_table(const PieceComparison& piece) {
-  HtmlTable table{{"run", "controller", "round", "end"}, {}, "Every run, over its last third."};
+  HtmlTable table{{"run", "controller", "round", "outcome"}, {}, "Values over the last third of each run."};
   for (const Quantity& quantity : quantities)
     table.header.push_back(std::string(quantity.name) + " [" + std::string(quantity.unit) + "]");
   for (const ComparedRun& run : piece.runs) {
@@ -62,7 +62,7 @@ std::vector<std::string> paired_sentences(const PieceComparison& piece) {
                             counted(other.rounds, "round") + ": ";
     if (other.falls > 0)
       clear.push_back(other.controller + " fell in " + counted(static_cast<std::size_t>(other.falls), "run"));
-    if (other.rounds == 0) others.push_back(who + "there is none in which both stayed up");
+    if (other.rounds == 0) others.push_back(who + "no round in which both stayed up");
     for (const PairedDifference& d : other.differences) {
       const Quantity& quantity = quantities[d.quantity];
       const std::string words = who + std::string(quantity.name) + " " + in_units(d.from, quantity) + " -> " +
@@ -71,7 +71,7 @@ std::vector<std::string> paired_sentences(const PieceComparison& piece) {
       if (d.is_clear())
         clear.push_back(words);
       else
-        others.push_back(words + (d.difference.ci95 ? ", not clear" : ", one round tells no interval"));
+        others.push_back(words + (d.difference.ci95 ? ", not clear" : ", one round gives no interval"));
     }
   }
   clear.insert(clear.end(), others.begin(), others.end());
@@ -80,7 +80,7 @@ std::vector<std::string> paired_sentences(const PieceComparison& piece) {
 
 void add_paired_tables(HtmlPage& page, const PieceComparison& piece) {
   HtmlTable table{
-      {"quantity", "controller", "rounds", piece.first_controller, "this one", "difference", "clear"},
+      {"quantity", "controller", "rounds", piece.first_controller, "this controller", "difference", "clear"},
       {},
       paired_interval_words};
   for (const ControllerComparison& other : piece.others)
@@ -96,7 +96,7 @@ void add_paired_tables(HtmlPage& page, const PieceComparison& piece) {
 
 void write_paired_report(const std::filesystem::path& experiment, const std::vector<PieceComparison>& pieces,
                          const std::filesystem::path& file) {
-  HtmlPage page("Controllers in turns", experiment.string());
+  HtmlPage page("Alternating controllers", experiment.string());
   bool fell = false;
   for (const PieceComparison& piece : pieces)
     fell = fell || std::any_of(piece.runs.begin(), piece.runs.end(),
@@ -111,7 +111,7 @@ void write_paired_report(const std::filesystem::path& experiment, const std::vec
     std::vector<RunBehaviour> round;
     for (const ComparedRun& run : piece.runs)
       if (run.round == piece.runs.front().round) round.push_back(run.behaviour);
-    add_overlays(page, round, "The first round, over each other");
+    add_overlays(page, round, "First round, runs overlaid");
   }
   page.write(file);
 }

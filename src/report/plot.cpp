@@ -25,8 +25,8 @@ int heights(const Plot& plot, double count) {
   return static_cast<int>(count * plot.text_px);
 }
 
-/// Text in gnuplot's single quotes. gnuplot passes numeric character references through, so every character
-/// that means something to gnuplot, to SVG or to `as_element` below goes in as one.
+/// Text in gnuplot's single quotes. Characters with a meaning in gnuplot, in SVG or in `as_element` below are
+/// written as numeric character references, which gnuplot passes through.
 std::string quoted(const std::string& text) {
   std::string result = "'";
   for (const char c : text) {
@@ -44,10 +44,10 @@ std::string quoted_color(std::string_view color) {
 }
 
 void require(bool good, const std::string& what) {
-  if (!good) throw Error(ExitCode::usage, "a plot's " + what + ": report this as a bug");
+  if (!good) throw Error(ExitCode::usage, "internal error: a plot's " + what + ": report this as a bug");
 }
 
-/// gnuplot's own arithmetic overflows near the ends of a double's range; no quantity of ours lives there.
+/// gnuplot's arithmetic overflows near the ends of a double's range. No plotted quantity is so large.
 constexpr double largest_drawn = 1e100;
 
 bool drawable(double value, const Axis& axis) {
@@ -76,7 +76,7 @@ struct Extent {
 
 constexpr std::size_t few_points = 2000;
 
-/// Of the points that fall into one pixel, the first: more cannot be seen.
+/// The first of the points in each pixel, since the others are not visible.
 std::vector<std::size_t> seen_points(const Series& series, const Plot& plot) {
   Extent x, y;
   x.include(series.x, plot.x);
@@ -116,7 +116,7 @@ std::string line_data(const Series& series, const Plot& plot) {
   return text;
 }
 
-/// A curve that is drawn: its data block and the part of the plot command that shows it.
+/// The curves of a plot: their data blocks, and the plot command.
 struct Curves {
   std::string blocks;
   std::string commands;
@@ -146,7 +146,7 @@ void add_bands(const Plot& plot, Curves& curves) {
   }
 }
 
-/// The colours of the series; on a map's colours only ink is seen everywhere.
+/// The colours of the series. On a heat map only dark ink is visible everywhere.
 std::vector<std::string_view> colors_of(const Plot& plot) {
   std::vector<std::string_view> colors;
   std::size_t next = 0;
@@ -171,7 +171,7 @@ void add_series(const Plot& plot, Curves& curves) {
         how = "with steps" + line;
         break;
       case Series::Style::points:
-        // Few points are seen one by one; many are a cloud.
+        // Few points are drawn large, many as a cloud.
         how = std::string("with points pt 7 ps ") + (series.x.size() < 200 ? "0.8" : "0.35") + color;
         break;
       case Series::Style::bars:
@@ -247,7 +247,7 @@ struct AxisRange {
   double low = 0.0, high = 1.0;
 };
 
-/// A range for an axis. gnuplot complains of an empty one and rounds a given one; this leaves a small margin.
+/// A range for an axis with a small margin. gnuplot rejects an empty range and rounds automatic ones.
 AxisRange range_of(const Axis& axis, const Extent& extent, double margin) {
   double low = axis.low.value_or(extent.low);
   double high = axis.high.value_or(extent.high);
@@ -351,7 +351,7 @@ std::string axis_settings(const std::string& name, const Axis& axis, const AxisS
   return text + "set " + name + "range [" + exact_text(span.low) + ":" + exact_text(span.high) + "]\n";
 }
 
-/// The words of the axes, each at its place: gnuplot would move them with the widths of the ticks' texts.
+/// The labels of the axes at fixed places. gnuplot would move them with the widths of the tick texts.
 std::string axis_labels(const Plot& plot, const Margins& margins) {
   constexpr double from_edge_heights = 0.9;
   const double edge = from_edge_heights * plot.text_px;
@@ -375,7 +375,7 @@ std::string axes(const Plot& plot, const AxisRanges& ranges, const Margins& marg
                        span_of(plot.y, ranges.y, height_inside(plot, margins), false, plot.text_px));
 }
 
-/// Bars as wide as the closest two are apart: left to itself, gnuplot fills empty places with wide ones.
+/// Bars as wide as the smallest distance between two. By default gnuplot fills gaps with wide bars.
 std::string bar_width(const Plot& plot) {
   double width = std::numeric_limits<double>::infinity();
   for (const Series& series : plot.series)
@@ -384,13 +384,13 @@ std::string bar_width(const Plot& plot) {
   return std::isfinite(width) && width > 0.0 ? "set boxwidth " + exact_text(width) + " absolute\n" : "";
 }
 
-/// Where along an axis a value lies: 0 to 1.
+/// The position of a value along an axis, from 0 to 1.
 double part_of(const AxisRange& range, const Axis& axis, double value) {
   const auto on = [&](double v) { return axis.logarithmic ? std::log(v) : v; };
   return (on(value) - on(range.low)) / (on(range.high) - on(range.low));
 }
 
-/// Marks across, their words above the frame, each on a line of its own; then those along.
+/// Vertical marks with their labels above the frame, each on its own line; then horizontal marks.
 std::string marks(const Plot& plot, const AxisRanges& ranges) {
   std::string text;
   const std::string style = " nohead lc rgb " + quoted_color(plot.heat_map ? color::ink : color::soft) +
@@ -466,8 +466,8 @@ void replace_all(std::string& text, std::string_view from, const std::string& to
     text.replace(at, from.size(), to);
 }
 
-/// gnuplot writes a document of its own; a page wants the element, with identifiers that are its own and
-/// without references to anything elsewhere.
+/// Turns the SVG document that gnuplot writes into an element of a page: with unique identifiers, and without
+/// references to anything outside.
 std::string as_element(std::string svg, const std::string& id) {
   const std::size_t begin = svg.find("<svg");
   const std::size_t end = svg.rfind("</svg>");
@@ -481,7 +481,7 @@ std::string as_element(std::string svg, const std::string& id) {
     replace_all(svg, std::string("href=") + quote + "#", std::string("href=") + quote + "#" + id);
   }
   replace_all(svg, "url(#", "url(#" + id);
-  // gnuplot names the drawing and each curve for the pointer to show: that tells nobody anything.
+  // gnuplot adds titles that browsers show as tooltips. They carry no information.
   for (const std::string_view name : {"<title>Gnuplot", "<title>gnuplot_plot"})
     for (std::size_t at = svg.find(name); at != std::string::npos; at = svg.find(name, at))
       svg.erase(at, svg.find("</title>", at) + 8 - at);

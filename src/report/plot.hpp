@@ -49,7 +49,7 @@ struct HeatMap {
   std::vector<std::string> classes;
 };
 
-/// A straight line across the plot at one place, with a word beside it.
+/// A straight line across the plot at one place, with a label.
 struct Mark {
   double at = 0.0;
   std::string label;
@@ -64,7 +64,7 @@ struct Plot {
   std::optional<HeatMap> heat_map;
   std::vector<Mark> vertical_marks;
   std::vector<Mark> horizontal_marks;
-  std::string link;  ///< where the title leads to, on a page: a file beside it
+  std::string link;  ///< the file that the title links to, relative to the page
   int width_px = 900;
   int height_px = 260;
   int text_px = 12;
@@ -72,7 +72,7 @@ struct Plot {
   std::optional<int> left_px;
 };
 
-/// What a plot's curves and colours mean, for a key beside the drawing.
+/// The entries of the key beside the drawing: what the curves and colours mean.
 struct KeyEntry {
   enum class Swatch { line, dashed, point, area };
   std::string name;

@@ -33,7 +33,7 @@ void RowThinner::add(const LogRecord& row) {
   thin(0);
 }
 
-/// The places in kept_, from `begin` to before `end`, of what stays of a block.
+/// The indices in kept_, from `begin` to before `end`, of the rows of a block that are kept.
 std::vector<std::size_t> RowThinner::chosen(std::size_t begin, std::size_t end) const {
   std::vector<std::size_t> places{begin, end - 1};
   for (const Quantity quantity : drawn) {
@@ -55,7 +55,7 @@ std::vector<std::size_t> RowThinner::chosen(std::size_t begin, std::size_t end) 
   return places;
 }
 
-/// Thins the blocks from a place in kept_ on; the last one may not be complete yet.
+/// Thins the blocks from an index in kept_ on. The last block may be incomplete.
 void RowThinner::thin(std::size_t from) {
   std::vector<Kept> thinned;
   for (std::size_t begin = from, end = from; begin < kept_.size(); begin = end) {

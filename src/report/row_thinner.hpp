@@ -1,4 +1,4 @@
-// Thins a run's rows to what a plot can show, in the same memory however long the run was.
+// Thins the rows of a run to what a plot can show, in constant memory.
 #pragma once
 
 #include <cstddef>
@@ -9,9 +9,9 @@
 
 namespace upright {
 
-/// Keeps every row of a run of up to `most_rows`. Of a longer one it keeps of each block of rows the first
-/// and the last, and for each quantity that is drawn the smallest, the largest and one that is no number: no
-/// peak and no gap is lost. Blocks grow with the run.
+/// Keeps all rows of a run of up to `most_rows`. In longer runs it keeps some rows of each block: the first,
+/// the last, and for each drawn quantity the minimum, the maximum and one that is not a number, so no peak
+/// and no gap is lost. Blocks grow with the run.
 class RowThinner {
  public:
   static constexpr std::size_t most_rows = 200'000;

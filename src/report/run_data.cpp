@@ -23,12 +23,12 @@ std::string yes(bool value) {
   return value ? "yes" : "no";
 }
 
-/// A plain value of a map as text; empty when it is not there.
+/// A scalar of a map as text; empty if the key is missing.
 std::string plain(const std::optional<YamlMap>& map, const std::string& key) {
   return map && map->is_scalar(key) ? map->text_or(key, "") : "";
 }
 
-/// With a capital at the beginning and a full stop at the end.
+/// Text as a sentence: with a capital letter at the beginning and a full stop at the end.
 std::string sentence(std::string text) {
   if (text.empty()) return text;
   if (text.front() >= 'a' && text.front() <= 'z') text.front() = static_cast<char>(text.front() - 'a' + 'A');
@@ -42,9 +42,9 @@ void tell_outcome(const RunRecord& record, RunData& data) {
     data.tone = Tone::warning;
     data.headline = "Cut short after " + seconds(end_s);
     data.reason =
-        "The run is still going on, or it was killed or lost its power: no outcome was written. Every row "
-        "that "
-        "was written is shown.";
+        "The run wrote no outcome: it is still in progress, was killed, or the power failed. All rows that "
+        "it "
+        "wrote are shown.";
     return;
   }
   const std::string result = plain(record.outcome, "result");
@@ -62,13 +62,13 @@ void tell_outcome(const RunRecord& record, RunData& data) {
   const std::string zero = plain(record.outcome, "zero_volts_sentence");
   const bool unconfirmed = plain(record.outcome, "zero_volts") == "not_confirmed" ||
                            plain(record.outcome, "amplifier_disabled") == "false";
-  if (!zero.empty()) data.outcome_facts.emplace_back("at the end", zero);
+  if (!zero.empty()) data.outcome_facts.emplace_back("output at the end", zero);
   if (!unconfirmed) return;
   data.tone = Tone::bad;
   data.reason = sentence(zero) + " " + data.reason;
 }
 
-/// Something that a row's flags tell, and how often they did.
+/// An event in the flags of rows, and how often it occurred.
 struct Event {
   const char* name;
   std::uint32_t flags;
@@ -79,12 +79,12 @@ using Events = std::array<Event, 8>;
 
 Events events() {
   return {{{"periods at the voltage limit", row_flag::saturated},
-           {"overruns by waking late", row_flag::overrun_wake},
-           {"overruns by reading", row_flag::overrun_read},
-           {"overruns by computing", row_flag::overrun_compute},
-           {"overruns by writing", row_flag::overrun_write},
+           {"overruns due to late wake-up", row_flag::overrun_wake},
+           {"overruns due to reading", row_flag::overrun_read},
+           {"overruns due to computing", row_flag::overrun_compute},
+           {"overruns due to writing", row_flag::overrun_write},
            {"rows after missed periods", row_flag::missed},
-           {"rows without fresh counts", row_flag::held},
+           {"rows without new counts", row_flag::held},
            {"failed writes", row_flag::write_failed}}};
 }
 
@@ -100,7 +100,7 @@ void add_to_statistics(const LogRecord& row, RunData& data) {
   data.write_ns.add(row.write_ns);
 }
 
-/// Reads all rows once. Returns whether the last line was cut.
+/// Reads all rows once. Returns whether the last line was incomplete.
 bool gather_rows(const std::filesystem::path& samples, const ProgressCallback& progress, RunData& data) {
   SampleReader reader(samples);
   RowThinner thinner;
@@ -129,17 +129,18 @@ bool gather_rows(const std::filesystem::path& samples, const ProgressCallback& p
 }
 
 void gather_warnings(const RunRecord& record, bool truncated, RunData& data) {
-  if (data.rows == 0) data.warnings.emplace_back("The log holds no row.");
-  if (truncated) data.warnings.emplace_back("The last line of samples.csv was cut; it is left out.");
+  if (data.rows == 0) data.warnings.emplace_back("The log contains no rows.");
+  if (truncated) data.warnings.emplace_back("The last line of samples.csv is incomplete and is not shown.");
   const std::string dropped = plain(record.outcome, "rows_dropped");
   if (!dropped.empty() && dropped != "0")
-    data.warnings.push_back(dropped + " rows never reached the disk: it was too slow.");
+    data.warnings.push_back(dropped + " rows were not logged, because the disk was too slow.");
   const std::string failure = plain(record.outcome, "log_failure");
   if (!failure.empty()) data.warnings.push_back("The log ended early: " + failure + ".");
   const auto loop = record.document.optional_map("loop");
   if (plain(loop, "delay_is_exact") == "false")
-    data.warnings.push_back("The delay of " + plain(loop, "delay_periods") +
-                            " periods is not whole: the state was interpolated linearly between samples.");
+    data.warnings.push_back(
+        "The delay of " + plain(loop, "delay_periods") +
+        " periods is not a whole number, so the state was interpolated linearly between samples.");
 }
 
 void gather_provenance(const RunRecord& record, RunData& data) {
@@ -157,7 +158,7 @@ void gather_provenance(const RunRecord& record, RunData& data) {
   add("seed", plain(run, "seed"));
   add("scheduling", plain(scheduling, "note"));
   add("version", plain(provenance, "version"));
-  // As much as names it; 40 digits are wider than a telephone. run.yaml has them all.
+  // Enough to identify it. 40 digits do not fit on a telephone; run.yaml has all of them.
   constexpr std::size_t commit_digits = 12;
   add("git commit", plain(provenance, "git_commit").substr(0, commit_digits));
   if (!plain(provenance, "git_dirty").empty())

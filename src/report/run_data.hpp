@@ -1,4 +1,4 @@
-// A run as its report needs it: rows to draw, statistics of all of them, and the words for its outcome.
+// The data of a run report: rows to draw, statistics of all rows, and sentences about the outcome.
 #pragma once
 
 #include <cstdint>
@@ -38,7 +38,7 @@ struct RunData {
 
 inline constexpr double closing_s = 3.0;
 
-/// Needs the same memory however long the run was. Throws Error when the directory is not a run.
+/// Uses constant memory for any length of run. Throws Error if the directory is not a run.
 RunData load_run_data(const std::filesystem::path& run_directory, const ProgressCallback& progress = {});
 
 }  // namespace upright

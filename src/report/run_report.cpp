@@ -23,7 +23,7 @@ std::vector<double> times_of(const std::vector<LogRecord>& rows) {
   return values;
 }
 
-/// A column of rows, in another unit.
+/// A column of the rows, converted to another unit.
 template <class Value>
 std::vector<double> column_of(const std::vector<LogRecord>& rows, Value LogRecord::*member,
                               double factor = 1.0) {
@@ -33,7 +33,7 @@ std::vector<double> column_of(const std::vector<LogRecord>& rows, Value LogRecor
   return values;
 }
 
-/// The plots of one run share their time axis.
+/// A plot over time. The plots of a run share their time axis.
 Plot over_time(const RunData& run, const std::string& title, const std::string& unit) {
   Plot plot;
   plot.title = title;
@@ -42,7 +42,7 @@ Plot over_time(const RunData& run, const std::string& title, const std::string& 
   if (!run.drawn.empty()) {
     const double first_s = s_per_ns * static_cast<double>(run.drawn.front().time_ns);
     const double last_s = s_per_ns * static_cast<double>(run.drawn.back().time_ns);
-    // From zero, where that costs no room; and to the end of the last period.
+    // From zero if that needs little space, and to the end of the last period.
     plot.x.low = first_s < 0.02 * last_s ? 0.0 : first_s;
     plot.x.high = last_s + run.period_s.value_or(0.0);
   }
@@ -72,7 +72,7 @@ void add_motion(HtmlPage& page, const RunData& run) {
                            color::requested, Series::Style::steps),
                     series(run, "applied", column_of(run.drawn, &LogRecord::voltage_v), color::voltage,
                            Series::Style::steps)};
-  // A request far beyond the amplifier would flatten what was applied.
+  // The range of the amplifier, so that a much larger request does not compress the applied voltage.
   add_limits(voltage, run.amplifier_limit_v, "amplifier limit");
   if (run.amplifier_limit_v) {
     voltage.y.low = -1.3 * *run.amplifier_limit_v;
@@ -83,7 +83,7 @@ void add_motion(HtmlPage& page, const RunData& run) {
     }
   }
   page.stack({theta, cart, voltage},
-             "Long runs are drawn by the smallest and largest value of each pixel column.");
+             "Long runs are drawn with the minimum and maximum of each pixel column.");
 }
 
 void add_closing_seconds(HtmlPage& page, const RunData& run) {
@@ -102,7 +102,8 @@ void add_closing_seconds(HtmlPage& page, const RunData& run) {
   cycle.height_px = 300;
   cycle.series = {
       {"", column_of(run.closing, &LogRecord::cart_m, mm_per_m), theta, Series::Style::line, color::angle}};
-  page.figures({motion, cycle}, "What the loop settles to: a closed curve on the right is a limit cycle.");
+  page.figures({motion, cycle},
+               "The steady state of the loop. A closed curve on the right is a limit cycle.");
 }
 
 struct TimingColumn {
@@ -112,7 +113,7 @@ struct TimingColumn {
 };
 
 std::vector<TimingColumn> timing_of(const RunData& run) {
-  return {{"wake-up late", &LogRecord::wake_late_ns, run.wake_late_ns},
+  return {{"wake-up delay", &LogRecord::wake_late_ns, run.wake_late_ns},
           {"read", &LogRecord::read_ns, run.read_ns},
           {"compute", &LogRecord::compute_ns, run.compute_ns},
           {"write", &LogRecord::write_ns, run.write_ns}};
@@ -128,7 +129,7 @@ std::vector<std::pair<double, std::uint64_t>> in_us(const ValueCounts& counts_ns
 void add_timing(HtmlPage& page, const RunData& run) {
   page.section("Timing");
   HtmlTable table;
-  table.header = {"microseconds", "median", "99 %", "99.9 %", "largest"};
+  table.header = {"microseconds", "median", "99 %", "99.9 %", "maximum"};
   Plot plot = over_time(run, "time spent in each period", "microseconds");
   plot.y.logarithmic = true;
   std::vector<Plot> histograms;
@@ -155,15 +156,16 @@ void add_timing(HtmlPage& page, const RunData& run) {
     histograms.push_back(counts);
   }
   if (!anything) {
-    page.note(Tone::neutral, "The run kept virtual time (--fast): no time passed in it to be measured.");
+    page.note(Tone::neutral, "The run used virtual time (--fast), so there is no timing to report.");
     return;
   }
   page.table(table);
   if (run.period_s) plot.horizontal_marks.push_back({*run.period_s * 1e6, "period"});
-  page.figure(plot,
-              "An overrun is a cycle that ended after the next one was due; it is counted for the part that "
-              "took most.");
-  page.figures(histograms, "How often each took how long; counts on a logarithmic scale.");
+  page.figure(
+      plot,
+      "An overrun is a cycle that ended after the start of the next period. It is attributed to the part "
+      "that took longest.");
+  page.figures(histograms, "Histograms of these times. The counts are on a logarithmic scale.");
 }
 
 std::string with_unit(double value, const std::string& unit) {
@@ -171,13 +173,13 @@ std::string with_unit(double value, const std::string& unit) {
 }
 
 void add_numbers(HtmlPage& page, const RunData& run) {
-  page.section("In numbers");
+  page.section("Key figures");
   std::vector<std::pair<std::string, std::string>> facts = {
       {"duration", with_unit(run.duration_s, "s")},
       {"samples", std::to_string(run.rows)},
       {"largest angle", with_unit(run.theta_rad.largest() * degrees_per_radian, "deg")},
       {"largest cart travel", with_unit(run.cart_m.largest() * mm_per_m, "mm")},
-      {"voltage, root mean square", with_unit(run.voltage_v.root_mean_square(), "V")},
+      {"voltage, RMS", with_unit(run.voltage_v.root_mean_square(), "V")},
       {"voltage, largest", with_unit(run.voltage_v.largest(), "V")},
   };
   facts.insert(facts.end(), run.outcome_facts.begin(), run.outcome_facts.end());
@@ -198,7 +200,7 @@ std::filesystem::path write_run_report(const std::filesystem::path& run_director
   add_timing(page, run);
   page.section("Configuration and provenance");
   page.facts(run.provenance);
-  page.folded("run.yaml: everything this run was made of", run.run_yaml);
+  page.folded("run.yaml: the complete configuration of this run", run.run_yaml);
   std::filesystem::path file = run_directory / "report.html";
   page.write(file);
   return file;

@@ -1,4 +1,4 @@
-// The report of one run: did it stay up, why did it end, how did it move, and how well was time kept.
+// The report of one run: whether it stayed up, why it ended, how it moved, and its timing.
 #pragma once
 
 #include <filesystem>
@@ -7,8 +7,9 @@
 
 namespace upright {
 
-/// Writes `report.html` into the run directory and returns its path. Works on a run that was cut short (no
-/// outcome, a torn last row). Throws Error when the directory is not a run or the page cannot be written.
+/// Writes `report.html` into the run directory and returns its path. Accepts a run that was cut short (no
+/// outcome, an incomplete last row). Throws Error if the directory is not a run or the page cannot be
+/// written.
 std::filesystem::path write_run_report(const std::filesystem::path& run_directory,
                                        const ProgressCallback& progress = {});
 

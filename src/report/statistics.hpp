@@ -15,14 +15,14 @@ struct Spread {
   double largest = 0.0;
 };
 
-/// Counts values that are not negative, in memory that grows with how different they are and not with how
-/// many: whole numbers up to 65536 are told apart, larger ones to 1/32768 of themselves.
+/// Counts non-negative values. Memory grows with the number of different values, not with their count. Whole
+/// numbers up to 65536 are counted separately; larger values have a relative resolution of 1/32768.
 class ValueCounts {
  public:
   void add(std::int64_t value);
   /// All zero when nothing was counted.
   Spread spread() const;
-  /// Value and how many, in rising order. A value that stands for several is the largest of them that came.
+  /// Values and their counts in ascending order. A group of values is represented by its largest.
   std::vector<std::pair<std::int64_t, std::uint64_t>> sorted() const;
 
  private:

@@ -29,16 +29,16 @@ std::vector<Row> read_rows(const std::filesystem::path& file, const std::string&
   InputFile in(file);
   std::string line;
   if (!std::getline(in, line) || line != header)
-    throw ConfigError(file.string() + " has no header " + header +
-                      ": name a folder that `upright sweep` finished");
+    throw ConfigError(file.string() + " does not begin with the header " + header +
+                      ": give a folder that `upright sweep` finished");
   std::vector<Row> rows;
   while (std::getline(in, line)) {
     Row row;
     std::istringstream cells(line);
     for (std::string cell; std::getline(cells, cell, ',');) row.push_back(cell);
     if (row.size() != columns)
-      throw ConfigError(file.string() + ":" + std::to_string(rows.size() + 2) + ": has not " +
-                        std::to_string(columns) + " columns: make the sweep anew");
+      throw ConfigError(file.string() + ":" + std::to_string(rows.size() + 2) + ": the row does not have " +
+                        std::to_string(columns) + " columns: repeat the sweep");
     rows.push_back(row);
   }
   return rows;
@@ -74,8 +74,8 @@ Map read_map(const std::filesystem::path& folder) {
     std::size_t k = 0;
     while (k < outcomes.size() && outcomes[k] != row[2]) ++k;
     if (k == outcomes.size())
-      throw ConfigError((folder / "sweep.csv").string() + " has the outcome " + row[2] +
-                        ": make the sweep anew");
+      throw ConfigError((folder / "sweep.csv").string() + " has the unknown outcome " + row[2] +
+                        ": repeat the sweep");
     ++map.counts[k];
     map.outcome[{angle, delay}] = static_cast<int>(k);
     delays.insert(delay);
@@ -86,8 +86,8 @@ Map read_map(const std::filesystem::path& folder) {
   return map;
 }
 
-/// The map over logarithmic axes where all values are positive; a delay of zero has no place on one and is
-/// left to the table and the file.
+/// The map with logarithmic axes if all values are positive. A logarithmic axis cannot show a delay of zero,
+/// which is only in the table and the file.
 Plot map_plot(const Map& map, const std::vector<Row>& transitions, const std::vector<Row>& margins,
               bool log_delay) {
   Plot plot;
@@ -121,22 +121,22 @@ Plot map_plot(const Map& map, const std::vector<Row>& transitions, const std::ve
     const double delay = number(row[1]);
     if (!(delay > 0.0) || std::isinf(delay)) continue;
     plot.vertical_marks.push_back({delay, "linear, " + row[0]});
-    // The axis reaches as far as the line, so that it is seen how far short of it the falls come.
+    // The axis includes the line, so that its distance from the falls is visible.
     if (delay > map.delays_s.back()) plot.x.high = std::max(plot.x.high.value_or(0.0), 1.1 * delay);
   }
   return plot;
 }
 
-/// What the linear analysis says of the loop, in words.
+/// The result of the linear analysis in a sentence.
 std::string margin_sentence(const Row& row) {
   const double delay = number(row[1]);
   const std::string which = row[0] == "near rest"
-                                ? "Linearised near rest, its dry friction smoothed, the loop "
-                                : "While the cart slides (no dry friction) the linear loop ";
-  if (delay <= 0.0) return which + "is unstable without any delay.";
-  if (std::isinf(delay)) return which + "is stable under any delay.";
-  return which + "loses stability at " + milliseconds(delay) + " ms, with " + number_text(number(row[2]), 4) +
-         " rad/s.";
+                                ? "Linearised near rest with smoothed dry friction, the loop "
+                                : "Linearised while the cart slides (without dry friction), the loop ";
+  if (delay <= 0.0) return which + "is unstable without delay.";
+  if (std::isinf(delay)) return which + "is stable for any delay.";
+  return which + "loses stability at " + milliseconds(delay) + " ms and oscillates at " +
+         number_text(number(row[2]), 4) + " rad/s.";
 }
 
 }  // namespace
@@ -151,13 +151,13 @@ std::filesystem::path write_sweep_report(const std::filesystem::path& folder) {
   std::error_code ignored;
   if (!std::filesystem::exists(folder / "sweep.csv", ignored))
     throw ConfigError(folder.string() +
-                      " holds an unfinished sweep: give the sweep command again, it goes on from there");
+                      " contains an unfinished sweep: repeat the sweep command to continue it");
   const Map map = read_map(folder);
   const std::vector<Row> transitions =
       read_rows(folder / "transitions.csv", "theta0_rad,oscillates_from_s,falls_from_s", 3);
-  if (map.outcome.empty()) throw ConfigError(folder.string() + " holds no runs: make the sweep anew");
+  if (map.outcome.empty()) throw ConfigError(folder.string() + " contains no runs: repeat the sweep");
 
-  // Folders of before margins were written have none.
+  // Folders from older versions have no margins.
   std::vector<Row> margins;
   if (std::filesystem::exists(folder / "margins.csv", ignored))
     margins = read_rows(folder / "margins.csv", "model,critical_delay_s,crossing_radps", 3);
@@ -168,26 +168,26 @@ std::filesystem::path write_sweep_report(const std::filesystem::path& folder) {
     if (number(row[2]) < first_fall) first_fall = number(row[2]);
   const std::string counts = std::to_string(map.counts[0]) + " runs are stable, " +
                              std::to_string(map.counts[1]) + " oscillate, " + std::to_string(map.counts[2]) +
-                             " fell.";
+                             " fall.";
   if (std::isfinite(first_fall))
-    page.answer(Tone::warning, "Falls from " + milliseconds(first_fall) + " ms", counts);
+    page.answer(Tone::warning, "Falls for delays from " + milliseconds(first_fall) + " ms", counts);
   else
-    page.answer(Tone::good, "No start falls within these delays", counts);
+    page.answer(Tone::good, "No run falls at these delays", counts);
   page.section("Outcome over delay and initial angle");
   for (const Row& row : margins) page.paragraph(margin_sentence(row));
-  const std::string lines = margins.empty() ? "" : " Dotted: the critical delay of the linear analysis.";
+  const std::string lines = margins.empty() ? "" : " Dotted lines: critical delay of the linear analysis.";
   if (map.delays_s.size() > 3)
-    page.figure(map_plot(map, transitions, margins, true), "The map, both axes logarithmic." + lines);
-  page.figure(map_plot(map, transitions, margins, false), "The same, delay linear.");
-  page.section("Where the outcome changes");
+    page.figure(map_plot(map, transitions, margins, true), "Outcome map with logarithmic axes." + lines);
+  page.figure(map_plot(map, transitions, margins, false), "Outcome map with a linear delay axis.");
+  page.section("Delays at which the outcome changes");
   HtmlTable table;
   table.header = {"initial angle [degree]", "oscillates from [ms]", "falls from [ms]"};
   for (const Row& row : transitions)
     table.rows.push_back({number_text(number(row[0]) * per_degree, 4), milliseconds(number(row[1])),
                           milliseconds(number(row[2]))});
-  table.caption = "Found by bisection to 0.1 ms; a dash: not within the delays of the sweep.";
+  table.caption = "Found by bisection to 0.1 ms. A dash means: not within the delays of the sweep.";
   page.table(table);
-  page.folded("The sweep with its plant and gains", file_text(folder / "sweep.yaml"));
+  page.folded("sweep.yaml: the sweep with its plant and gains", file_text(folder / "sweep.yaml"));
   const std::filesystem::path file = folder / "report.html";
   page.write(file);
   return file;

@@ -1,4 +1,4 @@
-// Where an axis has its ticks, and what they say.
+// The positions and texts of the ticks of an axis.
 #pragma once
 
 #include <string>
@@ -11,7 +11,7 @@ struct Tick {
   std::string text;
 };
 
-/// What an axis shows and the room it has on the page.
+/// The range of an axis and its space on the page.
 struct AxisSpan {
   double low = 0.0, high = 1.0;
   bool logarithmic = false;

@@ -99,7 +99,7 @@ bool ControlLoop::accept(const RigReading& reading, const Wake& wake, LoopOutcom
     row_.cart_counts = reading.cart_counts;
     row_.pendulum_counts = reading.pendulum_counts;
     row_.sequence = reading.sequence;
-    row_.time_ns = reading.time_ns - phase_.start_ns;
+    row_.time_ns = reading.time_ns - start_ns_;
     last_fresh_ns_ = reading.time_ns;
     held_ = after_gap_ = false;
     return true;
@@ -270,7 +270,7 @@ ControlLoop::Stamps ControlLoop::act(const Wake& wake, LoopOutcome& outcome) noe
 
 void ControlLoop::run_cycle(const Wake& wake, std::int64_t woke_ns, LoopOutcome& outcome) noexcept {
   row_.tick = wake.tick;
-  row_.time_ns = woke_ns - phase_.start_ns;
+  row_.time_ns = woke_ns - start_ns_;
   row_.flags = 0;
   row_.wake_late_ns = wake.late_ns;
   Stamps done{woke_ns, woke_ns, woke_ns};
@@ -331,36 +331,72 @@ void ControlLoop::log_stop(std::int64_t woke_ns, LoopOutcome& outcome) noexcept 
   run_cycle(wake, woke_ns, outcome);
 }
 
+/// Time zero of the rows.
+void ControlLoop::begin_time(std::int64_t start_ns, LoopOutcome& outcome) noexcept {
+  start_ns_ = outcome.start_ns = start_ns;
+  last_fresh_ns_ = last_write_ns_ = start_ns;
+}
+
+/// Until the next cycle is due, or somebody sent a signal. A device that is the clock is waited for with a
+/// bound: without a sample the cycle begins late, and its reading is one that did not come.
+std::int64_t ControlLoop::wait_for_cycle() noexcept {
+  if (!follows_device_)
+    return wait_until_due(clock_, phase_.due_ns(phase_.next_tick), clock_.is_virtual() ? 0 : limits_.spin_ns,
+                          [&] { return signal_.load(std::memory_order_relaxed) != 0; });
+  const std::int64_t until_ns = DeviceClock::patience_ends_ns(phase_);
+  sample_ = rig_.wait_next(until_ns);
+  // A device that has ended sampling is not asked again and again.
+  if (sample_.number == sample_taken_) clock_.sleep_until(until_ns);
+  return clock_.now_ns();
+}
+
+/// False: woken by a signal meant for someone else, or by the sample of a cycle that has run without it.
+bool ControlLoop::is_due(std::int64_t woke_ns, LoopOutcome& outcome) noexcept {
+  if (!follows_device_) return woke_ns >= phase_.due_ns(phase_.next_tick);
+  sample_came_ = sample_.number != sample_taken_;
+  if (!sample_came_) return woke_ns >= DeviceClock::patience_ends_ns(phase_);
+  sample_taken_ = sample_.number;
+  const bool is_of_next = device_clock_.take(sample_, phase_);
+  if (outcome.counts.periods == 0) begin_time(sample_.time_ns, outcome);
+  return is_of_next;
+}
+
+Wake ControlLoop::begin_cycle(std::int64_t woke_ns) noexcept {
+  return sample_came_ ? device_clock_.wake(phase_, woke_ns) : wake_at(phase_, woke_ns);
+}
+
 void ControlLoop::run(LoopOutcome& outcome) noexcept {
   outcome = {};
-  // The first cycle is due a little ahead, so that it is not late before it began.
+  follows_device_ = rig_.is_clock();
+  // The first cycle is due a little ahead, so that it is not late before it began, and a device's first
+  // sample has time to come.
   constexpr std::int64_t lead_periods = 4;
+  const bool needs_lead = !clock_.is_virtual() || follows_device_;
   const auto period_ns = static_cast<std::int64_t>(std::llround(1e9 * controller_.config().period_s()));
-  phase_ = {clock_.now_ns() + (clock_.is_virtual() ? 0 : lead_periods * period_ns), period_ns, 0};
-  outcome.start_ns = phase_.start_ns;
+  phase_ = {clock_.now_ns() + (needs_lead ? lead_periods * period_ns : 0), period_ns, 0};
+  begin_time(phase_.start_ns, outcome);
   watchdog_ns_ = static_cast<std::int64_t>(std::llround(limits_.watchdog_s * 1e9));
-  last_fresh_ns_ = last_write_ns_ = phase_.start_ns;
   live_.running.store(true, std::memory_order_relaxed);
   scripted_ = controller_.is_scripted();
+  // A sample from before the run begins no cycle.
+  if (follows_device_) sample_taken_ = rig_.wait_next(clock_.now_ns()).number;
   while (!stopped_ && !over_) {
-    const std::int64_t woke_ns =
-        wait_until_due(clock_, phase_.due_ns(phase_.next_tick), clock_.is_virtual() ? 0 : limits_.spin_ns,
-                       [&] { return signal_.load(std::memory_order_relaxed) != 0; });
+    const std::int64_t woke_ns = wait_for_cycle();
     if (asked_to_end(outcome)) {
       log_stop(woke_ns, outcome);
       break;
     }
-    // Woken by a signal meant for someone else.
-    if (woke_ns < phase_.due_ns(phase_.next_tick)) continue;
+    if (!is_due(woke_ns, outcome)) continue;
     if (phase_.next_tick >= limits_.periods) break;
-    const Wake wake = wake_at(phase_, woke_ns);
-    outcome.time_s = static_cast<double>(woke_ns - phase_.start_ns) / 1e9;
+    const Wake wake = begin_cycle(woke_ns);
+    outcome.time_s = static_cast<double>(woke_ns - start_ns_) / 1e9;
     run_cycle(wake, woke_ns, outcome);
     show(outcome);
   }
   outcome.stop = rig_.stop();
   row_.voltage_v = 0.0;
-  outcome.time_s = static_cast<double>(clock_.now_ns() - phase_.start_ns) / 1e9;
+  outcome.time_s = static_cast<double>(clock_.now_ns() - start_ns_) / 1e9;
+  if (follows_device_) outcome.device_clock = device_clock_.timing(phase_.period_ns);
   show(outcome);
   live_.running.store(false, std::memory_order_relaxed);
 }

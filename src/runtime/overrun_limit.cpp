@@ -39,13 +39,17 @@ std::string milliseconds(double seconds, const char* format) {
 std::string warning_for(const OverrunTolerance& tolerance, const Plant& plant, const ControlConfig& control) {
   if (!tolerance.exceeded()) return "";
   const std::string loud = "THE LOOP WILL OSCILLATE OR FALL: ";
-  if (!tolerance.stabilized) return loud + "the gains do not stabilize this plant, even without delay";
-  std::string text = loud + "its delay is " + milliseconds(control.delay_s, "%.4g");
+  if (!tolerance.stabilized)
+    return loud + "the gains do not stabilize this plant, even without delay; check their signs and design";
+  std::string text = loud + "its delay of " + milliseconds(control.delay_s, "%.4g");
   if (const PlantEffect* own = plant.find("input_delay"))
-    text += " on top of the plant's own " + milliseconds(own->values[0], "%.4g");
-  if (tolerance.critical_delay_s <= 0.0) return text + ", more than the gains bear while the cart slides";
-  return text + ", and the gains bear " + milliseconds(tolerance.critical_delay_s, "%.3g") +
-         " while the cart slides";
+    text += " in addition to the plant's own " + milliseconds(own->values[0], "%.4g");
+  if (tolerance.critical_delay_s > 0.0)
+    text += " exceeds the " + milliseconds(tolerance.critical_delay_s, "%.3g") +
+            " that the gains tolerate while the cart slides";
+  else
+    text += " is more than the gains tolerate while the cart slides";
+  return text + "; reduce the delay or design gains for it (see upright margin and upright design)";
 }
 
 }  // namespace
@@ -59,11 +63,11 @@ OverrunLimit overrun_limit(const std::optional<Plant>& model, const ControlConfi
     limit.warning = warning_for(*limit.tolerance, *model, control);
   } else {
     limit.most_periods_late = unknown_limit(control.period_s());
-    limit.sentence =
-        "unknown without a model of the rig (--plant), taken as " + milliseconds(unknown_tolerance_s, "%.4g");
+    limit.sentence = "unknown without a model of the rig (--plant), assumed to be " +
+                     milliseconds(unknown_tolerance_s, "%.4g");
   }
   limit.sentence += "; the run stops when more than " + std::to_string(limit.most_periods_late) +
-                    " periods in a row are late";
+                    " periods in a row overrun";
   return limit;
 }
 
@@ -74,9 +78,10 @@ void apply(const OverrunLimit& overrun, LoopLimits& limits) {
 
 void require_stabilized(const OverrunLimit& limit, const std::string& gains) {
   if (!limit.tolerance || limit.tolerance->stabilized) return;
-  throw ConfigError(gains +
-                    " do not stabilize the plant, even without delay: check their signs and which plant they "
-                    "were designed for, design others with upright design, or give --force");
+  throw ConfigError(
+      gains +
+      " do not stabilize the plant, even without delay: check their signs and that they were designed for "
+      "this plant, design others with upright design, or give --force");
 }
 
 }  // namespace upright

@@ -83,8 +83,8 @@ RealtimeGrant enter_realtime(const RealtimeRequest& request) {
     grant.note = "SCHED_FIFO priority " + std::to_string(grant.priority) + " granted";
   else
     grant.note = "SCHED_FIFO was not granted (" + std::string(std::strerror(refused)) +
-                 "; give the program CAP_SYS_NICE or an rtprio limit), and " + grant.policy +
-                 " wakes up to milliseconds late";
+                 "; give the program CAP_SYS_NICE or an rtprio limit); with " + grant.policy +
+                 " the loop may wake milliseconds late";
   grant.note += locked ? ", memory locked"
                        : ", memory not locked (" + std::string(std::strerror(lock_error)) +
                              "; give it CAP_IPC_LOCK or a memlock limit)";

@@ -43,12 +43,13 @@ void complete(RunDirectory& directory, const LoopLimits& limits, SessionResult& 
   if (result.outcome_written && !result.directory.empty()) return;
   if (reason == StopReason::duration) reason = StopReason::log_failed;
   if (result.log.failure.empty())
-    result.log.failure = result.directory.empty()
-                             ? "the run directory " + directory.path().string() +
-                                   " was removed while the run went on, so its rows are lost: leave it alone "
-                                   "until the run has ended"
-                             : (result.directory / "run.yaml").string() +
-                                   " could not be completed: free space where the run directory goes";
+    result.log.failure =
+        result.directory.empty()
+            ? "the run directory " + directory.path().string() +
+                  " was removed during the run, so its rows are lost: do not change it before "
+                  "the run has ended"
+            : (result.directory / "run.yaml").string() +
+                  " could not be completed: free space on the disk of the run directory";
   if (result.directory.empty()) result.directory = directory.path();
 }
 
@@ -64,9 +65,9 @@ void require_spin_fits(double spin_us, double period_s) {
   // A loop of real-time priority leaves the other half of its processor to the kernel and to everybody else.
   constexpr double largest_share = 0.5;
   if (1e-6 * spin_us <= largest_share * period_s) return;
-  throw ConfigError("the loop would spend " + exact_text(spin_us) + " us of each period of " +
+  throw ConfigError("the loop would busy-wait for " + exact_text(spin_us) + " us of each period of " +
                     exact_text(period_s) +
-                    " s awake: give spin_us in the rig file, or --spin, at most half a period, or lower "
+                    " s, which is more than half of it: reduce spin_us in the rig file (or --spin), or lower "
                     "sample_rate_hz in the gain file");
 }
 
@@ -109,25 +110,34 @@ void find_zero(Rig& rig, Clock& clock, RigFile& file, double patience_s) {
     clock.sleep_until(now_ns + pause_ns);
   }
   if (is_emergency_stop(last_fault))
-    throw DeviceError("the emergency stop is pressed, or its wire is cut: release it when it is safe");
+    throw DeviceError("the emergency stop is pressed or its wire is broken: release it when it is safe");
   if (is_limit_switch(last_fault))
-    throw DeviceError("a limit switch is active, or its wire is cut: bring the cart to the middle");
-  throw DeviceError("no fresh counts came to take the zero from: check the encoders' link");
+    throw DeviceError("a limit switch is active or its wire is broken: move the cart to the middle");
+  throw DeviceError(
+      "the zero cannot be set because no new encoder counts arrived: check the link to the encoders");
 }
 
 namespace {
 
-/// The spin asked for, or the rig file's, into the rig and the limits that the run is logged with.
-void set_spin(RunSetup& setup, const RealtimeRequest& request) {
+/// The spin asked for, or the rig file's, into the rig and the limits that the run is logged with. A loop
+/// that follows a device does not know when the wait ends.
+void set_spin(RunSetup& setup, const Rig& rig, const RealtimeRequest& request) {
   setup.rig.spin_us = request.spin_us.value_or(setup.rig.spin_us);
   require_spin_fits(setup.rig.spin_us, setup.control.period_s());
-  setup.limits.spin_ns = std::llround(1e3 * setup.rig.spin_us);
+  setup.limits.spin_ns = rig.is_clock() ? 0 : std::llround(1e3 * setup.rig.spin_us);
+}
+
+/// Where the loop waits, and how.
+std::string waiting_note(const Rig& rig, const RunSetup& setup) {
+  if (rig.is_clock()) return ", on the clock of the rig's device";
+  if (setup.limits.spin_ns == 0) return "";
+  return ", awake for the last " + exact_text(setup.rig.spin_us) + " us of each wait";
 }
 
 /// Everything but the rig's stop where it throws.
 SessionResult run_to_its_stop(RunSetup setup, Rig& rig, Clock& clock, const SignalFlag& signal,
                               SessionOptions options) {
-  set_spin(setup, options.realtime);
+  set_spin(setup, rig, options.realtime);
   std::optional<CpuLatencyHold> awake;
   if (!clock.is_virtual()) awake.emplace();
   Controller controller(setup.control, setup.rig.amplifier.limit_v, std::move(options.parts));
@@ -155,8 +165,7 @@ SessionResult run_to_its_stop(RunSetup setup, Rig& rig, Clock& clock, const Sign
     try {
       if (!clock.is_virtual()) setup.scheduling = enter_realtime(options.realtime);
       if (awake && awake->held()) setup.scheduling.note += ", processors kept out of deep sleep";
-      if (!clock.is_virtual() && setup.limits.spin_ns > 0)
-        setup.scheduling.note += ", awake for the last " + exact_text(setup.rig.spin_us) + " us of each wait";
+      if (!clock.is_virtual()) setup.scheduling.note += waiting_note(rig, setup);
       directory.write_start(setup);
       const std::uint64_t faults_before = page_faults();
       loop.run(result.outcome);

@@ -66,14 +66,14 @@ void append(std::vector<double>& message, std::size_t number, const std::vector<
                                    run.theta_amplitude_rad, run.cart_amplitude_m});
 }
 
-class RankTeam final : public SweepExecutor {
+class RankExecutor final : public SweepExecutor {
  public:
-  RankTeam(const SweepConfig& config, int ranks, unsigned threads)
+  RankExecutor(const SweepConfig& config, int ranks, unsigned threads)
       : config_(config), threads_(threads), idle_(static_cast<std::size_t>(ranks), true) {
     idle_[0] = false;
   }
 
-  ~RankTeam() override {
+  ~RankExecutor() override {
     std::vector<double> message;
     MPI_Status status;
     while (std::count(idle_.begin(), idle_.end(), true) + 1 < static_cast<std::ptrdiff_t>(idle_.size())) {
@@ -89,7 +89,7 @@ class RankTeam final : public SweepExecutor {
     WorkQueue queue(groups.size(), [stop] { return stop && *stop; });
     std::mutex one_at_a_time;
     std::size_t away = 0;
-    const auto compute_here = [&] {
+    const auto compute_locally = [&] {
       while (const std::optional<std::size_t> mine = queue.next())
         queue.guard(*mine, [&] {
           const std::vector<SweepRun> runs = run_sweep_group(config_, groups[*mine]);
@@ -99,11 +99,11 @@ class RankTeam final : public SweepExecutor {
     };
     {
       std::vector<std::jthread> here;
-      for (unsigned i = 0; i < threads_; ++i) here.emplace_back(compute_here);
+      for (unsigned i = 0; i < threads_; ++i) here.emplace_back(compute_locally);
       // MPI is called from this thread only.
       while (away > 0 || !queue.is_over()) {
         for (std::size_t rank = 1; rank < idle_.size(); ++rank)
-          if (idle_[rank] && hand_out(rank, groups, queue)) ++away;
+          if (idle_[rank] && send_groups(rank, groups, queue)) ++away;
         std::vector<double> message;
         MPI_Status status;
         if (!receive(MPI_ANY_SOURCE, message, status)) {
@@ -120,7 +120,7 @@ class RankTeam final : public SweepExecutor {
 
  private:
   /// Gives a rank as many groups as it has threads. False: none are left.
-  bool hand_out(std::size_t rank, const std::vector<Group>& groups, WorkQueue& queue) {
+  bool send_groups(std::size_t rank, const std::vector<Group>& groups, WorkQueue& queue) {
     std::vector<double> message;
     for (unsigned i = 0; i < threads_; ++i) {
       const std::optional<std::size_t> number = queue.next();
@@ -170,7 +170,7 @@ MpiExecutor::~MpiExecutor() {
 
 std::unique_ptr<SweepExecutor> MpiExecutor::make_executor(const SweepConfig& config, unsigned threads) const {
   if (count_ == 1) return make_thread_executor(config, threads);
-  return std::make_unique<RankTeam>(config, count_, std::max(1u, threads));
+  return std::make_unique<RankExecutor>(config, count_, std::max(1u, threads));
 }
 
 void MpiExecutor::serve(const SweepConfig& config, unsigned threads) const {
@@ -208,7 +208,8 @@ void MpiExecutor::serve(const SweepConfig& config, unsigned threads) const {
 MpiExecutor::MpiExecutor() {
   if (started_by_mpirun())
     throw ConfigError(
-        "this program was built without MPI: install libopenmpi-dev and build again, or go without mpirun");
+        "this program was built without MPI: install libopenmpi-dev and build again, or start it without "
+        "mpirun");
 }
 MpiExecutor::~MpiExecutor() = default;
 

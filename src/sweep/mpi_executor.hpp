@@ -1,5 +1,5 @@
-// A sweep over the ranks of mpirun: the first rank hands out groups as ranks become free and writes the
-// results, which are the same bytes as in one process. Without MPI at configure time there is one rank.
+// Sweeps with MPI: the first rank distributes groups to idle ranks and writes the results, which are
+// byte-identical to those of one process. Without MPI at configure time there is one rank.
 #pragma once
 
 #include <memory>
@@ -8,8 +8,8 @@
 
 namespace upright {
 
-/// MPI from construction to destruction, when mpirun started this process; one rank otherwise. One per
-/// process.
+/// Initialises MPI if mpirun started this process, and finalises it at destruction; otherwise one rank.
+/// One object per process.
 class MpiExecutor {
  public:
   MpiExecutor();
@@ -20,10 +20,10 @@ class MpiExecutor {
   bool first() const { return rank_ == 0; }
   int count() const { return count_; }
 
-  /// For the first rank: a executor of all ranks with `threads` threads each (0: one each, or every processor
-  /// where there is one rank). Destroy it before this object: that lets the others go.
+  /// For the first rank: an executor for all ranks with `threads` threads each (0: one each, or every
+  /// processor with a single rank). It must be destroyed before this object: this ends the other ranks.
   std::unique_ptr<SweepExecutor> make_executor(const SweepConfig& config, unsigned threads) const;
-  /// For the other ranks: computes what the first one hands out until that lets go.
+  /// For the other ranks: computes groups from the first rank until that ends them.
   void serve(const SweepConfig& config, unsigned threads) const;
 
  private:

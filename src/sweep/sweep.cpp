@@ -299,7 +299,7 @@ void prepare_folder(const std::filesystem::path& folder, bool overwrite) {
   std::filesystem::create_directories(folder, error);
   if (error)
     throw Error(ExitCode::usage,
-                "cannot make the folder " + folder.string() + ": check the path and its permissions");
+                "cannot create the folder " + folder.string() + ": check the path and its permissions");
   if (overwrite) std::filesystem::remove(folder / journal_name, error);
   // Beside a journal they are of a call that ended while it wrote them: it was not the last word.
   const bool unfinished = std::filesystem::exists(folder / journal_name, error);
@@ -308,7 +308,8 @@ void prepare_folder(const std::filesystem::path& folder, bool overwrite) {
     if (overwrite)
       std::filesystem::remove(file, error);
     else if (!unfinished && std::filesystem::exists(file, error))
-      throw ConfigError(file.string() + " exists: give another --out, or --overwrite to replace it");
+      throw ConfigError(file.string() +
+                        " already exists: choose another folder with --out, or replace it with --overwrite");
   }
 }
 

@@ -45,9 +45,9 @@ std::vector<SweepRun> run_sweep_group(const SweepConfig& config, const SweepExec
 
 namespace {
 
-class ThreadTeam final : public SweepExecutor {
+class ThreadExecutor final : public SweepExecutor {
  public:
-  ThreadTeam(const SweepConfig& config, unsigned threads)
+  ThreadExecutor(const SweepConfig& config, unsigned threads)
       : config_(config),
         threads_(threads != 0 ? threads : std::max(1u, std::thread::hardware_concurrency())) {}
 
@@ -73,7 +73,7 @@ class ThreadTeam final : public SweepExecutor {
 }  // namespace
 
 std::unique_ptr<SweepExecutor> make_thread_executor(const SweepConfig& config, unsigned threads) {
-  return std::make_unique<ThreadTeam>(config, threads);
+  return std::make_unique<ThreadExecutor>(config, threads);
 }
 
 }  // namespace upright

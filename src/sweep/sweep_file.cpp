@@ -22,7 +22,7 @@ constexpr std::int64_t most_values = 1'000'000;
 constexpr double most_runs = 1e8;
 
 /// The decimal number that is meant: 0.12 * 7 / 120 is 0.007 and not the sum of its roundings.
-double tidied(double value) {
+double rounded(double value) {
   char text[40];
   std::snprintf(text, sizeof text, "%.15g", value);
   return std::strtod(text, nullptr);
@@ -33,15 +33,16 @@ std::vector<double> spaced(const YamlMap& map, const Range& range) {
   const auto count = map.integer("count", 1, most_values);
   const bool logarithmic = map.has("spacing") && map.choice("spacing", {"linear", "log"}) == "log";
   map.finish();
-  if (count > 1 && !(to > from)) map.fail("to", "is not above from", "give it more than " + exact_text(from));
-  if (count == 1 && to != from) map.fail("count", "is 1 with two ends", "give it at least 2");
+  if (count > 1 && !(to > from))
+    map.fail("to", "is not above from", "set it to more than " + exact_text(from));
+  if (count == 1 && to != from) map.fail("count", "is 1, but from and to differ", "set it to at least 2");
   if (logarithmic && !(from > 0.0))
-    map.fail("from", "has no logarithm", "give it more than 0, or use spacing: linear");
+    map.fail("from", "must be above 0 for spacing: log", "set it to more than 0, or use spacing: linear");
   std::vector<double> values;
   for (std::int64_t i = 0; i < count; ++i) {
     const double part = count > 1 ? static_cast<double>(i) / static_cast<double>(count - 1) : 0.0;
     values.push_back(
-        tidied(logarithmic ? from * elementary::power(to / from, part) : from + (to - from) * part));
+        rounded(logarithmic ? from * elementary::power(to / from, part) : from + (to - from) * part));
   }
   return values;
 }
@@ -49,7 +50,7 @@ std::vector<double> spaced(const YamlMap& map, const Range& range) {
 std::vector<double> read_grid(const YamlMap& map, const std::string& key, const Range& range) {
   if (map.is_map(key)) return spaced(map.map(key), range);
   std::vector<double> values = map.numbers(key, range);
-  if (values.empty()) map.fail(key, "is empty", "give it at least one value, or {from, to, count}");
+  if (values.empty()) map.fail(key, "is empty", "write at least one value, or {from, to, count}");
   return values;
 }
 
@@ -59,7 +60,7 @@ std::vector<double> read_delays(const YamlMap& map) {
     if (!(delays[i] > delays[i - 1]))
       map.fail("delay_s",
                "is not increasing: " + exact_text(delays[i]) + " follows " + exact_text(delays[i - 1]),
-               "sort the delays and keep each once");
+               "sort the delays and list each once");
   return delays;
 }
 
@@ -69,12 +70,12 @@ std::vector<double> read_angles(const YamlMap& map, double fell_above_rad) {
     const double degrees = angle;
     angle *= std::numbers::pi / 180.0;
     if (std::abs(angle) >= fell_above_rad)
-      map.fail("theta0_deg", "starts fallen: " + exact_text(degrees) + " degrees",
-               "keep the angles below outcome.fell_above_rad = " + exact_text(fell_above_rad));
+      map.fail("theta0_deg", "contains " + exact_text(degrees) + " degrees, which counts as fallen",
+               "keep every angle below outcome.fell_above_rad = " + exact_text(fell_above_rad));
   }
   for (std::size_t i = 1; i < angles.size(); ++i)
     if (!(angles[i] > angles[i - 1]))
-      map.fail("theta0_deg", "is not increasing", "sort the angles and keep each once");
+      map.fail("theta0_deg", "is not increasing", "sort the angles and list each once");
   return angles;
 }
 
@@ -105,7 +106,7 @@ void read_outcome(const YamlMap& map, SweepConfig& config) {
   outcome.finish();
   if (!(config.setup.fell_above_rad > config.stable_below_rad))
     outcome.fail("fell_above_rad", "is not above stable_below_rad",
-                 "give it more than " + exact_text(config.stable_below_rad));
+                 "set it to more than " + exact_text(config.stable_below_rad));
 }
 
 /// Gives sampled loops the estimator and the predictor that the gain file asks for; returns their plant
@@ -117,9 +118,8 @@ std::string take_model_parts(const YamlMap& map, LoopSetup& setup) {
   if (!predicts && !estimates) return "";
   if (!setup.sampled)
     map.fail("loop",
-             std::string("is continuous, and the gain file's ") +
-                 (predicts ? "delay_compensation predicts" : "state_estimator works") +
-                 " from period to period",
+             std::string("is continuous, but ") + (predicts ? "delay_compensation" : "state_estimator") +
+                 " of the gain file needs a sampled loop",
              "use loop: sampled");
   const Plant predicted = predicts ? read_plant_file(control.compensation.plant) : Plant{};
   const Plant estimated = estimates ? read_plant_file(control.state_estimator.plant) : Plant{};
@@ -143,7 +143,7 @@ SweepConfig read_sweep_file(const std::filesystem::path& file) {
   setup.control = read_gain_file(map.path("gains"));
   setup.sampled = map.choice("loop", {"continuous", "sampled"}) == "sampled";
   if (!setup.sampled && map.has("rig"))
-    map.fail("rig", "is only for sampled loops", "remove it, or use loop: sampled");
+    map.fail("rig", "is valid for sampled loops only", "remove it, or use loop: sampled");
   const std::string rig = setup.sampled ? take_rig(map, setup) : std::string();
   const std::string compensation = take_model_parts(map, setup);
   read_outcome(map, config);
@@ -151,7 +151,9 @@ SweepConfig read_sweep_file(const std::filesystem::path& file) {
   config.delay_s = read_delays(map);
   const double runs =
       static_cast<double>(config.theta0_rad.size()) * static_cast<double>(config.delay_s.size());
-  if (runs > most_runs) map.fail("theta0_deg", "makes too many runs with delay_s", "keep them below 1e8");
+  if (runs > most_runs)
+    map.fail("theta0_deg", "and delay_s together make too many runs",
+             "use fewer values, for at most 1e8 runs");
   setup.duration_s = map.number("duration_s", Range{0.0, 1e5, true});
   const std::string engine = map.choice("engine", {"fast", "reproducible", "reference"});
   config.engine = engine == "fast"           ? SweepEngine::fast

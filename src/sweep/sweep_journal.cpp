@@ -49,7 +49,8 @@ SweepJournal::SweepJournal(const std::filesystem::path& file, const std::string&
     if (!line.empty() && !in->eof() && line != header)
       throw ConfigError(
           file.string() +
-          " keeps an unfinished sweep of another configuration: give another --out, or --overwrite");
+          " belongs to an unfinished sweep with another configuration: choose another folder with --out, or "
+          "discard it with --overwrite");
     if (line == header && !in->eof()) {
       whole_bytes = line.size() + 1;
       // A line that was being written when the machine went down has no end; it is cut off below.
@@ -106,11 +107,11 @@ void SweepJournal::check() const {
       std::filesystem::read_symlink("/proc/self/fd/" + std::to_string(::fileno(out_)), problem);
   if (held.st_nlink == 0 || problem)
     throw Error(ExitCode::usage, folder +
-                                     " was removed, or its sweep.partial was, while the sweep went on, so "
-                                     "its runs are lost: start it again and leave the folder alone");
+                                     " or its sweep.partial was removed during the sweep, so its runs are "
+                                     "lost: start the sweep again, and do not change the folder");
   throw Error(ExitCode::usage,
               folder + " was moved to " + now.parent_path().string() +
-                  " while the sweep went on: give that folder as --out, it goes on from there");
+                  " during the sweep: start the same command with that folder as --out to continue");
 }
 
 void SweepJournal::keep(std::size_t stage, std::size_t group, const std::vector<SweepRun>& runs) {
@@ -118,7 +119,7 @@ void SweepJournal::keep(std::size_t stage, std::size_t group, const std::vector<
   const std::string line = line_of(stage, group, runs) + "\n";
   if (std::fputs(line.c_str(), out_) < 0 || std::fflush(out_) != 0)
     throw Error(ExitCode::usage, "cannot write " + file_.string() +
-                                     ": free space on the disk and start again, it goes on from there");
+                                     ": free some space, and start the same command again to continue");
 }
 
 void SweepJournal::remove() {

@@ -1,4 +1,4 @@
-// What an unfinished sweep has done, on disk: one line per group of runs, each readable once it is whole.
+// The journal of an unfinished sweep: one line per group of runs, valid once it is complete.
 #pragma once
 
 #include <cstdio>
@@ -14,20 +14,20 @@ namespace upright {
 
 class SweepJournal {
  public:
-  /// Opens the journal of a sweep with this text, with whatever an earlier call left in it. Throws
+  /// Opens the journal of a sweep with this text, including the results of an earlier call. Throws
   /// ConfigError when it belongs to another sweep, Error when it cannot be written.
   SweepJournal(const std::filesystem::path& file, const std::string& sweep_text);
   ~SweepJournal();
   SweepJournal(const SweepJournal&) = delete;
   SweepJournal& operator=(const SweepJournal&) = delete;
 
-  /// The runs of a group when they are there already.
+  /// The runs of a group if the journal has them.
   const std::vector<SweepRun>* find(std::size_t stage, std::size_t group) const;
-  /// Throws Error when the runs could not be kept.
+  /// Throws Error when the runs could not be stored.
   void keep(std::size_t stage, std::size_t group, const std::vector<SweepRun>& runs);
-  /// Throws Error when another program has removed or moved the journal, with its folder or alone.
+  /// Throws Error when another program has removed or moved the journal, alone or with its folder.
   void check() const;
-  /// Once the results are written.
+  /// Called once the results are written.
   void remove();
 
  private:

@@ -6,7 +6,7 @@
 #include "base/parallel.hpp"
 #include "control/predictor.hpp"
 #include "design/gain_design.hpp"
-#include "design/mistaken_plant.hpp"
+#include "design/perturbed_plant.hpp"
 #include "paper_page.hpp"
 #include "paper_quiet.hpp"
 #include "report/html.hpp"
@@ -422,7 +422,7 @@ class Paper : private PaperPage {
     std::vector<LoopResult> results(seeds);
     parallel_for(seeds, [&](std::size_t seed) {
       LoopSetup setup = exact;
-      const Plant off = mistaken_plant(viscous, static_cast<unsigned>(seed), 0.05);
+      const Plant off = perturbed_plant(viscous, static_cast<unsigned>(seed), 0.05);
       setup.make_parts = [off](const ControlConfig& control) {
         return std::make_unique<Predictor>(control, off);
       };

@@ -24,7 +24,7 @@ TEST(CommandLine, UnknownWordsAreAnsweredWithTheNearestKnownOne) {
   expect_one_sentence(run_upright("effects --jsn=3"), "did you mean --json?");
   expect_one_sentence(run_upright("zzzzzzzz"), "no command zzzzzzzz");
   expect_one_sentence(run_upright("effects more"), "'more'");
-  expect_one_sentence(run_upright(""), "no command was given: name one");
+  expect_one_sentence(run_upright(""), "no command was given: choose one");
   expect_one_sentence(run_upright("check"), "files is required");
 }
 
@@ -34,19 +34,19 @@ TEST(CommandLine, NumbersMustBeFiniteAndFit) {
   const std::string run =
       "run --rig " + config + "rigs/simulated.yaml --gains " + config + "gains/viscous.yaml --fast ";
   expect_one_sentence(run_upright(rig + "--theta0-deg nan"),
-                      "--theta0-deg: it needs a finite number, and is nan");
-  expect_one_sentence(run_upright(rig + "--hang nan"), "--hang: it needs a finite number, and is nan");
-  expect_one_sentence(run_upright(rig + "--duration inf"),
-                      "--duration: it needs a finite number, and is inf");
+                      "--theta0-deg: must be a finite number, but is nan");
+  expect_one_sentence(run_upright(rig + "--hang nan"), "--hang: must be a finite number, but is nan");
+  expect_one_sentence(run_upright(rig + "--duration inf"), "--duration: must be a finite number, but is inf");
   expect_one_sentence(run_upright(rig + "--inject-late-ms nan"),
-                      "--inject-late-ms: it needs a finite number, and is nan");
+                      "--inject-late-ms: must be a finite number, but is nan");
   expect_one_sentence(run_upright(rig + "--inject-seed 18446744073709551616"),
-                      "--inject-seed: it needs a whole number from 0 to");
-  expect_one_sentence(run_upright(run + "--cpu 1023"), "--cpu: this process may not run on processor 1023");
+                      "--inject-seed: must be a whole number from 0 to");
+  expect_one_sentence(run_upright(run + "--cpu 1023"),
+                      "--cpu: this process is not allowed to run on processor 1023");
   expect_one_sentence(run_upright(run + "--seed 18446744073709551616"),
-                      "--seed: it needs a whole number from 0 to");
+                      "--seed: must be a whole number from 0 to");
   expect_one_sentence(run_upright("design " + config + "plants/viscous.yaml --q 5000,nan,20,20 --r 1"),
-                      "a finite number, and is nan");
+                      "must be a finite number, but is nan");
 }
 
 TEST(CommandLine, HelpShowsAnExampleForEveryCommand) {
@@ -141,7 +141,8 @@ TEST(CommandLine, TheVirtualRigServesModbusOnly) {
                     shell_quoted(UPRIGHT_SOURCE_DIR "/config/rigs/") + rig + " --plant " +
                     shell_quoted(UPRIGHT_SOURCE_DIR "/config/plants/viscous.yaml"));
     EXPECT_EQ(result.exit_code, 2);
-    EXPECT_NE(result.err.find("give a rig file of backend modbus-tcp or modbus-rtu alone"), std::string::npos)
+    EXPECT_NE(result.err.find("use a rig file whose only backend is modbus-tcp or modbus-rtu"),
+              std::string::npos)
         << result.err;
   }
 }
@@ -149,7 +150,7 @@ TEST(CommandLine, TheVirtualRigServesModbusOnly) {
 TEST(CommandLine, AFullDiskUnderTheOutputIsAnError) {
   const CommandResult result = run_upright("effects >/dev/full");
   EXPECT_EQ(result.exit_code, 4);
-  EXPECT_NE(result.err.find("stdout"), std::string::npos);
+  EXPECT_NE(result.err.find("standard output"), std::string::npos);
 }
 
 }  // namespace

@@ -163,7 +163,7 @@ TEST_F(ControllersInTurns, AreRefusedBeforeAnythingMoves) {
       {seven, "repeats: 2", "2 to 8"},
       {seven + ", b: " + gains("exponential-200hz"), "repeats: 2", "sample_rate_hz"},
       {seven + ", b: " + folder_.write("u.yaml", unstable).string(), "repeats: 2", "u.yaml do not stabilize"},
-      {seven + ", B/: " + gains("viscous"), "repeats: 2", "no name for a controller"},
+      {seven + ", B/: " + gains("viscous"), "repeats: 2", "is not a valid name for a controller"},
       {seven + ", b: " + (folder_.path() / "none.yaml").string(), "repeats: 2", "none.yaml"},
       {seven + b, "repeats: 0", "repeats"},
       {seven + b, "theta0_deg: [1, 9]", "theta0_deg"},

@@ -131,14 +131,14 @@ TEST(ExperimentCommand, ASweepInWhichNothingFallsIsNotComplete) {
   const std::string command = "experiment " + file.string() + rig + " --fast --json --out " + out.string();
   const CommandResult result = run_upright(command);
   EXPECT_EQ(result.exit_code, 3) << result.err;
-  EXPECT_NE(result.err.find("nothing fell up to 2"), std::string::npos) << result.err;
+  EXPECT_NE(result.err.find("the pendulum did not fall up to 2"), std::string::npos) << result.err;
   EXPECT_FALSE(Json::parse(result.out).at("complete"));
   EXPECT_EQ(run_upright("report " + out.string()).exit_code, 0);
   EXPECT_NE(read_text(out / "report.html").find("Not complete"), std::string::npos);
   // There is nothing to go on with.
   const CommandResult again = run_upright(command);
   EXPECT_EQ(again.exit_code, 2);
-  EXPECT_NE(again.err.find("nothing fell"), std::string::npos) << again.err;
+  EXPECT_NE(again.err.find("did not fall"), std::string::npos) << again.err;
 }
 
 TEST(ExperimentCommand, ARunOfASweepWithoutAnOutcomeIsMadeAgain) {
@@ -190,8 +190,8 @@ TEST(ExperimentCommand, RefusesBeforeAnythingMoves) {
        simulated, "delay_s"},
       {"falls by the plan", "    - {kind: closed_loop, set_points_m: [0], hold_s: 5, delay_s: 0.08}\n", "0.3",
        simulated, "shorter delays"},
-      {"no sign check", "    - {kind: ramp, rate_v_per_s: 0.5}\n", "0.3", "rigs/modbus-tcp.yaml",
-       "sign-check.yaml"},
+      {"signs of this rig have not been checked", "    - {kind: ramp, rate_v_per_s: 0.5}\n", "0.3",
+       "rigs/modbus-tcp.yaml", "sign-check.yaml"},
       {"travel beyond the track", "    - {kind: ramp, rate_v_per_s: 0.5}\n", "0.39", simulated,
        "lower travel_m"},
   };

@@ -208,7 +208,7 @@ TEST(VirtualRig, ListensOnThisMachineOnlyUnlessTold) {
   }
   const CommandResult everybody = run_upright(command + "0.0.0.0:0");
   EXPECT_EQ(everybody.exit_code, 0);
-  EXPECT_NE(everybody.err.find("whoever reaches 0.0.0.0:"), std::string::npos) << everybody.err;
+  EXPECT_NE(everybody.err.find("every machine that reaches 0.0.0.0:"), std::string::npos) << everybody.err;
 }
 
 }  // namespace

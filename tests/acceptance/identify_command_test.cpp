@@ -139,14 +139,16 @@ TEST(IdentifyCommand, SaysWhenItsNumbersDoNotExplainTheData) {
               std::string::npos);
     EXPECT_FALSE(fs::exists(folder.path() / "identified" / "plant.yaml"));
     const std::string page = read_text(folder.path() / "identified" / "report.html");
-    EXPECT_EQ(page.find("numbers identified"), std::string::npos);
+    EXPECT_EQ(page.find("parameters identified"), std::string::npos);
     EXPECT_NE(page.find("Unexplained"), std::string::npos);
   }
 }
 
 TEST(IdentifyCommand, ComesWithinThreePercentOfThePublishedValuesOfEmps) {
   const char* data = std::getenv("UPRIGHT_DATA");
-  if (data == nullptr) GTEST_SKIP() << "measured data are not part of the repository: set UPRIGHT_DATA";
+  if (data == nullptr)
+    GTEST_SKIP()
+        << "NOT TESTED: the measured data are not part of the repository. Set UPRIGHT_DATA to their folder";
   const TemporaryFolder folder;
   const fs::path plant =
       folder.write("plant.yaml",

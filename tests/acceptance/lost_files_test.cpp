@@ -47,7 +47,7 @@ TEST_F(LostFiles, ARunWhoseFolderIsRemovedStops) {
   for (const std::string& flags : {without_end, three_seconds}) {
     const CommandResult result = run_while(flags, [](const fs::path& run) { fs::remove_all(run); });
     EXPECT_EQ(result.exit_code, 3) << result.out << result.err;
-    EXPECT_NE(result.err.find("was removed while the run went on"), std::string::npos) << result.err;
+    EXPECT_NE(result.err.find("was removed during the run"), std::string::npos) << result.err;
     EXPECT_EQ(result.out.find("Stayed up"), std::string::npos) << result.out;
   }
 }
@@ -55,9 +55,9 @@ TEST_F(LostFiles, ARunWhoseFolderIsRemovedStops) {
 TEST_F(LostFiles, ARunWhoseSamplesAreRemovedOrCutStopsAndSaysSoInItsRecord) {
   const std::pair<const char*, std::function<void(const fs::path&)>> cases[] = {
       {"was removed", [](const fs::path& run) { fs::remove(run / "samples.csv"); }},
-      {"was moved away or replaced",
+      {"was moved or replaced",
        [](const fs::path& run) { fs::rename(run / "samples.csv", run / "mine.csv"); }},
-      {"was cut short", [](const fs::path& run) { fs::resize_file(run / "samples.csv", 0); }}};
+      {"was truncated", [](const fs::path& run) { fs::resize_file(run / "samples.csv", 0); }}};
   for (const auto& [words, meddle] : cases) {
     const CommandResult result = run_while(without_end, meddle);
     EXPECT_EQ(result.exit_code, 3) << words << result.err;
@@ -121,7 +121,7 @@ TEST_F(LostFiles, ASweepEndedWhileItWroteItsResultsGoesOn) {
   fs::remove_all(out / "sweep.csv.new");
   const CommandResult again = run_upright(command);
   EXPECT_EQ(again.exit_code, 0) << again.err;
-  EXPECT_EQ(again.out.find("0 runs made") == std::string::npos, false) << again.out;
+  EXPECT_EQ(again.out.find("0 runs simulated") == std::string::npos, false) << again.out;
   EXPECT_TRUE(fs::exists(out / "sweep.csv"));
   EXPECT_FALSE(fs::exists(out / "sweep.partial"));
   EXPECT_EQ(run_upright(command).exit_code, 2) << "a finished sweep is not replaced";

@@ -96,7 +96,7 @@ TEST(ExperimentOverrunLimit, AFallBeyondTheMarginNamesTheDelayAsARunDoes) {
   const fs::path run =
       Json::parse(run_upright(run_at("0.1", folder) + " --json").out).at("run_directory").get<std::string>();
   for (const std::string& sentence : {of_trial, sentence_in(run)})
-    EXPECT_NE(sentence.find("beyond what the plant bears"), std::string::npos) << sentence;
+    EXPECT_NE(sentence.find("do not stabilize this plant with this delay"), std::string::npos) << sentence;
 }
 
 }  // namespace

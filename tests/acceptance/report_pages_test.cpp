@@ -151,7 +151,7 @@ TEST_F(ReportPages, OfADiagnosisAreReadableOnATelephone) {
   const Json trial = {{"round", 1},          {"kind", "position_dependent_friction"},
                       {"evidence", 11061.4}, {"held_out", -7512.1},
                       {"t", 12345.678},      {"standard_errors", 1e9},
-                      {"taken", true}};
+                      {"taken", true},       {"rule", "shown_throughout"}};
   const Json document = {
       {"verdict", "explained"},
       {"gap", {{"before", 1492.3}, {"after", 1.0}}},
@@ -180,9 +180,11 @@ TEST_F(ReportPages, OfADiagnosisAreReadableOnATelephone) {
   const fs::path page = report_of(folder);
   expect_readable(page, "diagnosis");
   const std::string html = read_text(page);
-  for (const char* bar : {"the model as given", "with pivot_quadratic_drag", "with coulomb_friction"})
+  for (const char* bar : {">model as given<", ">with pivot_quadratic_drag<", ">with coulomb_friction<"})
     EXPECT_NE(html.find(bar), std::string::npos) << "no bar for " << bar;
   EXPECT_FALSE(std::regex_search(html, std::regex("[0-9]e[+-][0-9]+</"))) << "a number is not for people";
+  for (const char* rule : {">shown_throughout<", "accepted: evidence and t value are above their limits"})
+    EXPECT_NE(html.find(rule), std::string::npos) << "the page does not explain the decision: " << rule;
 }
 
 TEST_F(ReportPages, OfAnIdentificationAreReadableOnATelephone) {

@@ -73,7 +73,7 @@ TEST(Run, StaysUpForAMinuteOnEachFrictionAndReplays) {
 TEST(Run, SumsUpHowLateItWokeAndHowLongItTookAsHistograms) {
   const TemporaryFolder folder;
   const CommandResult text = run_upright(run_arguments(folder, "--duration 0.5 --theta0-deg 1"));
-  for (const char* part : {"woke late by", "took", " us to ", "#"})
+  for (const char* part : {"wake-up late by", "cycle took", " us to ", "#"})
     EXPECT_NE(text.out.find(part), std::string::npos) << part << "\n" << text.out;
   const CommandResult result = run_upright(run_arguments(folder, "--duration 0.5 --theta0-deg 1 --json"));
   const auto json = nlohmann::json::parse(result.out);
@@ -91,7 +91,7 @@ TEST(Run, SumsUpHowLateItWokeAndHowLongItTookAsHistograms) {
 TEST(Run, HasNoHistogramsInVirtualTime) {
   const TemporaryFolder folder;
   const CommandResult result = run_upright(run_arguments(folder, "--fast --duration 1"));
-  EXPECT_EQ(result.out.find("woke late"), std::string::npos) << result.out;
+  EXPECT_EQ(result.out.find("wake-up"), std::string::npos) << result.out;
 }
 
 TEST(Run, PrintsTheRunDirectoryOnItsLastLine) {
@@ -108,7 +108,7 @@ TEST(Run, WaitsForNoPageOfMemoryWhileItRuns) {
   const CommandResult result = run_upright(run_arguments(folder, "--duration 3 --theta0-deg 1 --json"));
   const auto json = nlohmann::json::parse(result.out);
   if (json.at("scheduling").get<std::string>().find("memory not locked") != std::string::npos)
-    GTEST_SKIP() << "NOT TESTED: page faults, for memory could not be locked";
+    GTEST_SKIP() << "NOT TESTED: page faults, because memory could not be locked. Raise the limit memlock";
   EXPECT_EQ(json.at("counts").at("page_faults"), 0) << result.out;
 }
 

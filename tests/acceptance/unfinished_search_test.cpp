@@ -113,7 +113,7 @@ TEST(UnfinishedSearch, TakesWholePiecesOfAnExperimentAndNamesTheOthers) {
   folder.write("experiment/trials.csv", trials.substr(0, trials.find('\n') + 1));
   const CommandResult none = run_upright("diagnose --model " + model + " --data " + data.string());
   EXPECT_EQ(none.exit_code, 2);
-  EXPECT_NE(none.err.find("no piece that is whole"), std::string::npos) << none.err;
+  EXPECT_NE(none.err.find("no completed piece"), std::string::npos) << none.err;
 }
 
 }  // namespace

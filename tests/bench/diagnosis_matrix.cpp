@@ -15,13 +15,12 @@
 //
 // The diagnosis works as the command does: the runs are written as CSV and read again, and it sees nothing
 // else. What the data can show at all is measured here, apart from it, with fits that begin at the truth:
-// - shown: the true structure saves at least 25 of minus twice the log likelihood on all runs, over the plant
-// file with
-//   its own numbers refitted. Of what the registry lacks: the runs are at least 20 percent further off (plain
-//   simulation) than the same runs without it.
-// - told apart: the effect is not the same force as the one named (docs/reference/effects.md), and the
-// structure that was
-//   named instead fits worse than the true one by 16 or more.
+// - visible: the true structure saves at least 25 of minus twice the log likelihood on all runs, compared
+// with
+//   the plant file with its own numbers refitted. Of effects that the registry lacks: the runs are at least
+//   20 percent further off (plain simulation) than the same runs without it.
+// - distinguishable: the effect is not the same force as the one named (docs/reference/effects.md), and the
+//   structure that was named instead fits worse than the true one by 16 or more.
 #include <fcntl.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
@@ -186,21 +185,21 @@ FitResult fit_structure(const std::vector<Measurement>& runs, const Plant& belie
   for (const PlantEffect& effect : believed.effects) {
     if (added(effect.number)) continue;
     if (const PlantEffect* from = start.find(effect.number)) point.plant.set(effect.number, from->values);
-    include(believed_parameters(believed, effect.number, range, policy.prior));
+    include(correction_parameters(believed, effect.number, range, policy.prior));
   }
   for (const std::size_t effect : base_corrections(believed, range)) {
     point.plant.set(effect, std::vector<double>{base_scale(believed, start, kind_of(effect))});
-    if (!added(effect)) include(believed_parameters(believed, effect, range, policy.prior));
+    if (!added(effect)) include(correction_parameters(believed, effect, range, policy.prior));
   }
   for (const std::size_t effect : effects) {
     if (const PlantEffect* from = start.find(effect)) point.plant.set(effect, from->values);
     include(free_parameters(effect, range, policy.prior));
   }
-  point.starts = guess_starts(runs, data.segments, point.plant);
+  point.starts = estimate_initial_states(runs, data.segments, point.plant);
   for (PlantState<double>& state : point.starts) unscale(point.plant, state);
   // To convergence: a fit that stops early would pass for a structure that fits worse.
   FitOptions options;
-  options.most_iterations = 40;
+  options.max_iterations = 40;
   options.noise_rounds = 8;
   options.tolerance = 1e-6;
   FitResult best = fit(data, point, free, options);
@@ -219,7 +218,8 @@ double plain_rms(const std::vector<Measurement>& runs, const Plant& plant,
   for (const Segment& segment : cut_segments(runs))
     if (std::find(which.begin(), which.end(), segment.run) != which.end()) data.segments.push_back(segment);
   if (data.segments.empty()) return 0.0;
-  return whitened_rms(fit_initial_states(data, {plant, guess_starts(runs, data.segments, plant), {}}));
+  return whitened_rms(
+      fit_initial_states(data, {plant, estimate_initial_states(runs, data.segments, plant), {}}));
 }
 
 std::vector<std::size_t> all_runs(const std::vector<Measurement>& runs) {

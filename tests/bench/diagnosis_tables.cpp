@@ -184,8 +184,8 @@ Figure level_figure(const std::string& name, double value, double goal, const st
 }
 
 Figure coverage_figure(const Share& share, double low, double high) {
-  Figure figure{"95 % intervals that hold", number(100.0 * low) + "-" + number(100.0 * high) + " %",
-                share.text()};
+  Figure figure{"95 % intervals that contain the true value",
+                number(100.0 * low) + "-" + number(100.0 * high) + " %", share.text()};
   figure.known = share.count > 0.0;
   figure.holds = share.value() >= low && share.value() <= high;
   return figure;
@@ -212,15 +212,15 @@ std::vector<Figure> figures_of(const Records& records, bool disturbed) {
   }
   const auto all_of = [](const json&) { return true; };
   return {
-      share_figure("right name first, where the data show it and tell it apart",
+      share_figure("right effect named first (visible and distinguishable effects)",
                    share_of(records, clear, is_right_first), disturbed ? 0.90 : 0.98),
-      share_figure("right set, confusable ones declared", share_of(records, single, is_right_set),
-                   disturbed ? 0.98 : 1.0),
-      share_figure("false effect where none is hidden",
+      share_figure("right set, including effects declared as confusable",
+                   share_of(records, single, is_right_set), disturbed ? 0.98 : 1.0),
+      share_figure("false effect in cases without a hidden effect",
                    share_of(
                        records, [](const json& r) { return first_hidden(r) == "none"; }, names_a_structure),
                    disturbed ? 0.03 : 0.01, false),
-      share_figure("unknown recognised as unexplained",
+      share_figure("unknown effect reported as unexplained",
                    share_of(
                        records, [](const json& r) { return is_unknown(r) && is_shown(r); },
                        [](const json& r) { return r.at("verdict") == "unexplained"; }),
@@ -229,14 +229,14 @@ std::vector<Figure> figures_of(const Records& records, bool disturbed) {
       level_figure("parameter error, 90th percentile", quantile(errors, 0.9), disturbed ? 0.15 : 0.05, " %",
                    100.0),
       coverage_figure(covered, disturbed ? 0.90 : 0.92, 0.98),
-      level_figure("held-out error over the true model's floor, median", quantile(over_floor, 0.5),
+      level_figure("held-out error relative to the true model's floor, median", quantile(over_floor, 0.5),
                    disturbed ? 1.10 : 1.05, "", 1.0),
-      share_figure("held-out error within that of the floor", floor_kept, 0.95),
-      share_figure("both of two hidden effects",
+      share_figure("held-out error within the limit above", floor_kept, 0.95),
+      share_figure("both of two hidden effects found",
                    share_of(
                        records, [](const json& r) { return is_pair(r) && is_shown(r); }, names_both),
                    disturbed ? 0.80 : 0.90),
-      share_figure("ended without a failure",
+      share_figure("completed without a failure",
                    share_of(records, all_of, [](const json& r) { return !is_failed(r); }), 1.0),
   };
 }
@@ -259,7 +259,7 @@ void write_figures(std::ostringstream& out, const Records& records) {
       ended.count += 1.0;
       ended.hits += is_failed(r) ? 0.0 : 1.0;
     }
-    columns.back().back() = share_figure("ended without a failure", ended, 1.0);
+    columns.back().back() = share_figure("completed without a failure", ended, 1.0);
     std::vector<double> wall;
     for (const json& r : records)
       if (r.at("disturbed").get<bool>() == disturbed && is_timing(r) && !is_failed(r))
@@ -281,7 +281,7 @@ void write_figures(std::ostringstream& out, const Records& records) {
 }
 
 void write_counts(std::ostringstream& out, const Records& records) {
-  out << "\n| counted apart | quantization only | disturbed |\n|---|---|---|\n";
+  out << "\n| other counts | quantization only | disturbed |\n|---|---|---|\n";
   const auto row = [&](const std::string& name, const std::function<bool(const json&)>& counts,
                        const std::function<bool(const json&)>& hits) {
     out << "| " << name;
@@ -290,19 +290,19 @@ void write_counts(std::ostringstream& out, const Records& records) {
     out << " |\n";
   };
   const auto shown_single = [](const json& r) { return is_single(r) && is_shown(r); };
-  row("hidden effects that the data show", is_single, is_shown);
-  row("of these, exactly the same force as another", shown_single, is_same_force);
-  row("of these, not told by the data from what was named", shown_single,
+  row("hidden effects that are visible in the data", is_single, is_shown);
+  row("of these, with the same force as another effect", shown_single, is_same_force);
+  row("of these, not distinguishable from the named effect", shown_single,
       [](const json& r) { return !is_same_force(r) && !is_distinguishable(r); });
   row(
-      "of those with the same force as another: in the first's declared set",
+      "effects with the same force as another: declared as confusable",
       [&](const json& r) { return shown_single(r) && is_same_force(r); },
       [](const json& r) { return is_right_set(r); });
   row(
-      "effects that the data do not show: something structural named",
+      "invisible effects: a structural effect named",
       [](const json& r) { return is_single(r) && !is_shown(r); }, names_a_structure);
   row(
-      "a structural effect beside the right one",
+      "a structural effect in addition to the right one",
       [&](const json& r) { return shown_single(r) && is_right_first(r); },
       [](const json& r) {
         std::size_t structural = 0;
@@ -310,19 +310,20 @@ void write_counts(std::ostringstream& out, const Records& records) {
         return structural > 1;
       });
   row(
-      "explained or no discrepancy, of known effects and none", [](const json& r) { return !is_unknown(r); },
+      "verdict explained or no_discrepancy (known or no hidden effect)",
+      [](const json& r) { return !is_unknown(r); },
       [](const json& r) { return r.at("verdict") != "unexplained"; });
-  row("pairs that the data show", is_pair, is_shown);
+  row("pairs that are visible in the data", is_pair, is_shown);
   for (const char* size : {"weak", "typical", "strong"})
     row(
-        std::string("right name first, ") + size,
+        std::string("right effect named first, ") + size,
         [=](const json& r) {
           return is_single(r) && is_shown(r) && is_distinguishable(r) && r.at("size") == size;
         },
         is_right_first);
   for (const char* campaign : {"mixed", "hanging", "upright", "cart_alone", "locked"})
     row(
-        std::string("right name first, ") + campaign,
+        std::string("right effect named first, ") + campaign,
         [=](const json& r) {
           return is_single(r) && is_shown(r) && is_distinguishable(r) && r.at("campaign") == campaign;
         },
@@ -353,9 +354,9 @@ void write_confusion(std::ostringstream& out, const Records& records, bool distu
     counts[first_hidden(r)][named] += 1;
   }
   if (counts.empty()) return;
-  out << "\n## Hidden and named first, " << (disturbed ? "disturbed" : "quantization only")
-      << "\n\nOf single effects that the data show. Beside each hidden effect what was named first, and how "
-         "often.\n\n"
+  out << "\n## Hidden and first-named effects, " << (disturbed ? "disturbed" : "quantization only")
+      << "\n\nSingle visible effects: for each hidden effect, how often which effect was named "
+         "first.\n\n"
          "| hidden | right | named instead |\n|---|---|---|\n";
   for (const auto& [hidden, named] : counts) {
     int total = 0, right = 0;
@@ -375,7 +376,7 @@ void write_confusion(std::ostringstream& out, const Records& records, bool distu
 /// One line for each case that a figure counts as missed.
 void write_misses(std::ostringstream& out, const Records& records) {
   out << "\n## Cases that were missed\n\n"
-         "`diagnosis_matrix --seed S --case K` (with `--disturbed`, `--only`) makes each again.\n\n"
+         "`diagnosis_matrix --seed S --case K` (with `--disturbed`, `--only`) reproduces each case.\n\n"
          "| seed/case | hidden | size | runs | named (confusable) | verdict | over floor | evidence | worse "
          "if named |\n"
          "|---|---|---|---|---|---|---|---|---|\n";
@@ -431,9 +432,9 @@ std::vector<json> read_records(const std::string& file) {
 std::string tables_of(const std::vector<json>& records) {
   std::ostringstream out;
   out << "# The diagnosis on hidden effects, as measured\n\n"
-         "Written by `build/release/tests/bench/diagnosis_matrix` (its top says how cases are made and what "
-         "\"shown\" and\n"
-         "\"told apart\" mean; `tests/blind/blind_case.hpp` says how sizes are set). "
+         "Written by `build/release/tests/bench/diagnosis_matrix` (the comment at its top says how cases are "
+         "made and what\n"
+         "\"visible\" and \"distinguishable\" mean; `tests/blind/blind_case.hpp` says how sizes are set). "
       << records.size() << " cases, seeds";
   std::set<std::string> seeds;
   for (const json& r : records) seeds.insert(r.at("seed").dump());

@@ -18,7 +18,7 @@ constexpr double track_end_m = 0.407;
 
 bool is_right(const std::string& reason, const Expectation& expectation) {
   const std::vector<std::string>& stops = expectation.reasons;
-  return (expectation.may_go_on && reason == "duration") ||
+  return (expectation.is_within_bound && reason == "duration") ||
          std::find(stops.begin(), stops.end(), reason) != stops.end();
 }
 

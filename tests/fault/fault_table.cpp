@@ -43,7 +43,7 @@ virtual rig recorded, the input of the simulated plant, the output of the card, 
 - **modbus-tcp, modbus-rtu.** `upright run` against `upright virtual-rig`, as separate processes, at 200 Hz with `watchdog_s: 0.1`.
 - **At the stop.** In the rows that begin with "at the stop", the device is driven, then it misbehaves, and then the rig is stopped. The
   verdict comes from the device's own record of the voltages that it accepted (`tests/integration/fake_device.cpp`, a device that
-  shares no code with the link of the program). The device has no watchdog unless the row says so. If it misbehaves for good,
+  shares no code with the link of the program). The device has no watchdog unless the row says so. If it misbehaves permanently,
   Ctrl-C is pressed once more; otherwise the program gives up after 10 s.
 - **gpio, comedi.** `upright run` at 200 Hz in a virtual machine with Debian's kernel, whose simulated chip and cards are moved by a plant
   (`tests/kernel`). comedi uses cards only: two potentiometers (counters where they wrap) and the output. gpio has the pendulum encoder,
@@ -71,7 +71,7 @@ cart: a stuck cart encoder took 1.8 s in the median, and 8 of 360 were not found
 - Lines and cards answer a call or refuse it. So no reply is late, lost, corrupt or out of order, and no device restarts.
 - Edges are counted by the program, which does not wrap, or by the board in 32 bits. The lines of a board cannot jump.
 - Only an analog input is a potentiometer.
-- Only a card with its own library must be opened, and only such a card has a watchdog that locks it.
+- Only a card with its own library must be opened, and only such a card has a watchdog that locks it or can be the clock.
 - Requests are disturbed, and the program of a device hangs, on the board only. A reply that arrives twice or out of order and the
   behaviour at the stop are not tested again on the board: its link is that of modbus-rtu.
 
@@ -137,10 +137,10 @@ Expectation stops(std::vector<std::string> reasons, double within_s) {
 
 const std::vector<Fault>& faults() {
   static const std::vector<Fault> list = {
-      {"missed_cycles", "the controller stands still for 12 ms"},
-      {"overrun", "the controller stands still for 250 ms"},
-      {"stuck_cart", "the cart's encoder stops counting"},
-      {"stuck_pendulum", "the pendulum's encoder stops counting"},
+      {"missed_cycles", "the controller stalls for 12 ms"},
+      {"overrun", "the controller stalls for 250 ms"},
+      {"stuck_cart", "the cart encoder stops counting"},
+      {"stuck_pendulum", "the pendulum encoder stops counting"},
       {"jump", "the cart's counts jump by 5000 and stay there"},
       {"no_contact", "a potentiometer has no contact"},
       {"wrap", "16-bit counters wrap during the motion"},
@@ -152,45 +152,44 @@ const std::vector<Fault>& faults() {
       {"drop", "one reply in 20 is lost"},
       {"corrupt", "one reply in 20 has a wrong bit"},
       {"corrupt_request", "one request in 20 has a wrong bit"},
-      {"noise", "noise comes before one request in 20 and after one reply in 20"},
-      {"stale", "one reply in 20 is the one before, once more"},
-      {"reorder", "one reply in 20 leaves after the next one"},
-      {"silent", "no reply comes any more"},
+      {"noise", "noise precedes one request in 20 and follows one reply in 20"},
+      {"stale", "one reply in 20 repeats the previous one"},
+      {"reorder", "one reply in 20 is sent after the next one"},
+      {"silent", "the replies stop"},
       {"always_late", "every reply comes too late"},
-      {"cut", "the link is cut, or the encoders' card goes"},
+      {"cut", "the link is cut, or the encoders' card is removed"},
       {"restart", "the device restarts"},
       {"device_hangs", "the device's program hangs"},
       {"emergency_stop", "the emergency stop is pressed"},
       {"limit_switch", "a limit switch is hit"},
-      {"line_failed", "a digital line cannot be read any more"},
-      {"edges_lost", "edges of an encoder are lost"},
-      {"edges_too_fast", "edges of an encoder come faster than `fastest_edges_per_s`"},
+      {"line_failed", "a digital line can no longer be read"},
+      {"edges_lost", "encoder edges are lost"},
+      {"edges_too_fast", "encoder edges come faster than `fastest_edges_per_s`"},
       {"disk_full", "the disk is full"},
       {"slow_disk", "each write and sync of the log takes 0.3 s"},
       {"dead_disk", "one write of the log takes 3 s"},
       {"writer_killed", "the log's writer thread is killed"},
       {"card_refuses", "the card refuses voltages"},
-      {"card_expires", "the card's watchdog expires though it was served"},
+      {"card_expires", "the card's watchdog expires although it was reset in time"},
       {"card_opens_late", "the first two attempts to open the card fail"},
-      {"card_was_locked", "an expired watchdog has locked the card before the run"},
+      {"card_was_locked", "the card was locked by an expired watchdog before the run"},
+      {"clock_drifts", "the card is the clock, and its clock is slow by 500 ppm"},
+      {"clock_samples_lost", "the card is the clock, and one sample in 20 is lost"},
+      {"clock_stops", "the card is the clock, and takes no samples any more"},
       {"sigterm", "SIGTERM"},
       {"sigkill", "SIGKILL"},
       {"stop_busy", "at the stop the device is busy (exception 06) for 1 s"},
-      {"stop_refused_connections", "at the stop the device refuses connections, or is silent, for 1 s"},
+      {"stop_refused_connections", "at the stop the device refuses connections, or does not reply, for 1 s"},
       {"stop_resets",
        "at the stop the device resets connections, or answers "
        "with noise, for 1 s"},
       {"stop_wrong_replies", "at the stop the replies come from another unit for 1 s"},
       {"stop_ignored", "at the stop the device acknowledges zero volts and ignores it for 1 s"},
       {"stop_refused_function", "at the stop the device refuses function 0x17"},
-      {"stop_ignored_for_good",
-       "at the stop the device acknowledges zero "
-       "volts and ignores it for good"},
-      {"stop_silent_watchdog",
-       "at the stop the device is silent for good and "
-       "has a watchdog of its own"},
+      {"stop_ignored_for_good", "at the stop the device acknowledges zero volts and ignores it permanently"},
+      {"stop_silent_watchdog", "at the stop the device stops replying permanently and has its own watchdog"},
       {"clock_step", "the wall clock steps by an hour"},
-      {"memory", "no further memory is granted"},
+      {"memory", "no more memory can be allocated"},
       {"two_controllers", "a second controller is started on the same machine (it is refused)"},
       {"rig_file_changed", "the rig file is overwritten during the run"},
   };
@@ -198,7 +197,7 @@ const std::vector<Fault>& faults() {
 }
 
 std::string cell_of(const Expectation& expectation) {
-  std::string cell = expectation.may_go_on ? "goes on" : "";
+  std::string cell = expectation.is_within_bound ? "goes on" : "";
   for (const std::string& reason : expectation.reasons) {
     cell += cell.empty() ? "`" : " or `";
     cell += reason;

@@ -32,7 +32,7 @@ const std::vector<Fault>& faults();
 
 /// What has to come of a fault.
 struct Expectation {
-  bool may_go_on = false;
+  bool is_within_bound = false;
   std::vector<std::string> reasons;  ///< the stops that are right; empty: none
   double zero_within_s = 0.0;        ///< zero volts at the plant, from the fault on
 };

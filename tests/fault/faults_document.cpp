@@ -42,10 +42,8 @@ int main(int argc, char** argv) {
     return out.flush() ? 0 : 2;
   }
   if (committed == page) return 0;
-  std::cerr << "run `" << argv[0];
+  std::cerr << "the page differs from the results of the suite: run `" << argv[0];
   for (const std::string& word : words) std::cerr << " " << word;
-  std::cerr << " --write` and look at the difference: the page does not say "
-               "what the suite has seen:\n"
-            << page;
+  std::cerr << " --write` and check the difference; the page would be:\n" << page;
   return 1;
 }

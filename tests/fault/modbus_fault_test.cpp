@@ -181,7 +181,7 @@ class ModbusKilled : public testing::TestWithParam<bool> {};
 
 TEST_P(ModbusKilled, IsAtZeroVoltsByTheDevicesWatchdog) {
   const bool serial = GetParam();
-  fault_case("sigkill", bench_of(serial), "the device's watchdog: 0 V within 100 ms", [&] {
+  fault_case("sigkill", bench_of(serial), "device watchdog: 0 V within 100 ms", [&] {
     Setting setting(serial, {});
     const auto run = came_about(setting.runs(), [&] { return killed(setting); });
     if (!run) return;

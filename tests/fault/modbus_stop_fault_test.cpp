@@ -55,11 +55,11 @@ std::vector<On> all() {
 
 /// As the table says it.
 std::string cell_of(const StopFault& fault) {
-  const std::string code = "not confirmed: said aloud, exit code 4";
+  const std::string code = "reported as not confirmed, exit code 4";
   if (fault.trouble == Trouble::refuses_read_write) return "0 V at once by function 0x10, confirmed";
-  if (!fault.for_good) return "0 V once it obeys, confirmed then";
-  if (fault.has_watchdog) return "the device's watchdog: 0 V within 100 ms, " + code;
-  return "the voltage stays, " + code;
+  if (!fault.for_good) return "0 V as soon as it responds, then confirmed";
+  if (fault.has_watchdog) return "device watchdog: 0 V within 100 ms, " + code;
+  return "the voltage remains, " + code;
 }
 
 /// What the device's record and the report come to.

@@ -67,8 +67,8 @@ std::vector<Case> device_cases() {
   const Expectation at_once = stops({"rig_fault"}, period_s);
   const Expectation at_the_track_end = stops({"track_limit"}, period_s);
   return {
-      mishap("stuck_cart", Mishap::cart_sticks, "the cart's encoder did not count", stuck),
-      mishap("stuck_pendulum", Mishap::pendulum_sticks, "the pendulum's encoder did not count", stuck),
+      mishap("stuck_cart", Mishap::cart_sticks, "the cart encoder did not count", stuck),
+      mishap("stuck_pendulum", Mishap::pendulum_sticks, "the pendulum encoder did not count", stuck),
       mishap("restart", Mishap::device_restarts, "restarted", at_once),
       mishap("device_hangs", Mishap::program_hangs, "restarted", stops({"rig_fault"}, processor_watchdog_s)),
       mishap("emergency_stop", Mishap::emergency_stop, "the emergency stop was pressed",
@@ -77,7 +77,7 @@ std::vector<Case> device_cases() {
              "_plus"),
       mishap("limit_switch", Mishap::minus_switch, "the limit switch at the -x end was hit", at_the_track_end,
              "_minus"),
-      mishap("edges_lost", Mishap::edges_too_fast, "edges of an encoder were lost", at_once),
+      mishap("edges_lost", Mishap::edges_too_fast, "encoder edges were lost", at_once),
   };
 }
 
@@ -176,7 +176,7 @@ std::optional<Killed> killed(BoardSetting& setting) {
 }
 
 TEST(BoardKilled, ItsWatchdogTakesTheVoltageAway) {
-  fault_case("sigkill", Bench::board, "the device's watchdog: 0 V within 100 ms", [] {
+  fault_case("sigkill", Bench::board, "device watchdog: 0 V within 100 ms", [] {
     BoardSetting setting;
     const auto run = came_about(setting.runs(), [&] { return killed(setting); });
     if (!run) return;

@@ -97,7 +97,7 @@ void check_wrong_sign(const Link& link) {
                   "pendulum: {counts_per_revolution: 4096, sign: -1");
   const Said check = bench.experiment(config + "experiments/sign-check.yaml", "wrong.yaml", "signs");
   EXPECT_EQ(check.exit_code, 3) << check.out;
-  EXPECT_NE(check.out.find("turn calibration.pendulum.sign"), std::string::npos) << check.out;
+  EXPECT_NE(check.out.find("reverse calibration.pendulum.sign"), std::string::npos) << check.out;
   EXPECT_FALSE(std::filesystem::exists(bench.folder / "wrong.yaml.signs"));
 }
 

@@ -107,7 +107,8 @@ class Pymodbus : public testing::TestWithParam<Exchange> {};
 
 TEST_P(Pymodbus, GivesTheSameCountsBack) {
   if (std::system(UPRIGHT_PYTHON " -c 'import pymodbus, serial' 2>/dev/null") != 0)
-    GTEST_SKIP() << "there is no virtual environment with pymodbus: see the test pymodbus_environment";
+    GTEST_SKIP()
+        << "NOT TESTED: there is no virtual environment with pymodbus. See the test pymodbus_environment";
   const Exchange& exchange = GetParam();
   const SerialCable cable;
   const int port = free_port();

@@ -14,6 +14,7 @@
 #include "hal/quanser_proof.hpp"
 #include "tests/support/run_end.hpp"
 #include "upright/base/error.hpp"
+#include "upright/hal/clock.hpp"
 #include "upright/hal/rig_factory.hpp"
 #include "upright/record/run_reader.hpp"
 
@@ -89,6 +90,7 @@ TEST(QuanserCard, AnExpiredWatchdogConfirmsZeroVoltsAndLocksTheCard) {
   EXPECT_EQ(bench.rig->write(2.0), RigFault::watchdog_expired);
   EXPECT_EQ(bench.last().analog_v, 0.0);
   EXPECT_TRUE(bench.rig->stop().done());
+  EXPECT_TRUE(bench.rig->stop().done()) << "the loop stops it once more at its end";
   bench.rig->open();
   EXPECT_FALSE(bench.last().locked);
   EXPECT_EQ(bench.rig->write(2.0), RigFault::none);
@@ -105,7 +107,7 @@ TEST(QuanserCard, ASecondControllerIsRefused) {
 TEST(QuanserCard, OpeningIsTriedThreeTimesAndThenRefusedWithTheRemedy) {
   Bench bench(fake_card_rig(), {"--failed-openings", "3"});
   const std::string sentence = refusal_of(*bench.rig);
-  EXPECT_NE(sentence.find("error 108: no such board"), std::string::npos) << sentence;
+  EXPECT_NE(sentence.find("error 108: board not found"), std::string::npos) << sentence;
   EXPECT_NE(sentence.find("plug the card in"), std::string::npos) << sentence;
   EXPECT_EQ(refusal_of(*bench.rig), "") << "the fourth attempt succeeds";
 }
@@ -114,7 +116,7 @@ TEST(QuanserCard, ALibraryThatIsAnotherIsRefused) {
   RigFile file = read_rig(YamlMap::from_text(fake_card_rig(), "rig.yaml"));
   file.quanser->library = "libm.so.6";
   const std::string sentence = refusal_of(*make_rig(file, {period_s}));
-  EXPECT_NE(sentence.find("is no HIL library"), std::string::npos) << sentence;
+  EXPECT_NE(sentence.find("is not a HIL library"), std::string::npos) << sentence;
 }
 
 TEST(QuanserCard, AWatchdogShorterThanTwoPeriodsIsRefused) {
@@ -141,6 +143,74 @@ TEST(QuanserCard, IsProvedStepByStep) {
                                               "Quanser card's encoders", "Quanser card's watchdog"}));
   EXPECT_FALSE(bench.last().locked);
   for (const CardRow& row : bench.card.record()) EXPECT_EQ(row.analog_v, 0.0);
+}
+
+TEST(QuanserCard, SamplesOnItsOwnClockAreReadOnceEach) {
+  Bench bench(on_the_cards_clock(fake_card_rig()));
+  EXPECT_FALSE(bench.rig->is_clock()) << "not open yet";
+  bench.rig->open();
+  EXPECT_TRUE(bench.rig->is_clock());
+  constexpr std::int64_t long_ns = 2'000'000'000;
+  const DeviceSample first = bench.rig->wait_next(MonotonicClock().now_ns() + long_ns);
+  EXPECT_GT(first.number, 0u);
+  const RigReading reading = bench.rig->read();
+  EXPECT_EQ(reading.status, RigStatus::fresh);
+  EXPECT_EQ(reading.pendulum_counts, 34) << "3 degrees of 4096 counts per turn";
+  EXPECT_GE(reading.time_ns, first.time_ns);
+  const DeviceSample second = bench.rig->wait_next(MonotonicClock().now_ns() + long_ns);
+  EXPECT_GT(second.number, first.number);
+  EXPECT_EQ(bench.rig->wait_next(0).number, second.number) << "it does not wait longer than it may";
+}
+
+TEST(QuanserCard, IsOpenedAgainOnItsOwnClock) {
+  Bench bench(on_the_cards_clock(fake_card_rig()));
+  bench.rig->open();
+  ASSERT_EQ(bench.rig->write(2.0), RigFault::none);
+  sleep_s(1.5 * watchdog_s);
+  EXPECT_TRUE(bench.last().locked);
+  EXPECT_EQ(bench.rig->read().fault, RigFault::watchdog_expired);
+  bench.rig->open();
+  bench.rig->wait_next(MonotonicClock().now_ns() + 2'000'000'000);
+  EXPECT_EQ(bench.rig->read().status, RigStatus::fresh);
+}
+
+TEST(QuanserCard, AClockThatMakesAnotherRateIsRefused) {
+  Bench bench(on_the_cards_clock(fake_card_rig()), {"--drift-ppm", "100000"});
+  const std::string sentence = refusal_of(*bench.rig);
+  EXPECT_NE(sentence.find("and not every 0.05 s: give sample_rate_hz"), std::string::npos) << sentence;
+}
+
+TEST(QuanserCard, AClockThatStandsStillIsRefused) {
+  Bench bench(on_the_cards_clock(fake_card_rig()), {"--never-samples", "true"});
+  const std::string sentence = refusal_of(*bench.rig);
+  EXPECT_NE(sentence.find("takes no samples on its own clock: remove quanser_hil.clock"), std::string::npos)
+      << sentence;
+}
+
+TEST(QuanserCard, ARunFollowsTheCardsClockAndReportsDriftAndLoss) {
+  in_real_time([] {
+    Folder folder;
+    const CardProcess card(folder, on_the_cards_clock(fake_card_rig()),
+                           {"--drift-ppm", "2000", "--drop-every", "20"});
+    std::ofstream(folder / "rig.yaml") << card.rig_text();
+    std::ofstream(folder / "gains.yaml")
+        << replaced(text_of(UPRIGHT_SOURCE_DIR "/config/gains/exponential.yaml"), "sample_rate_hz: 1000",
+                    "sample_rate_hz: 200");
+    Process run({UPRIGHT_BINARY, "run", "--rig", folder / "rig.yaml", "--gains", folder / "gains.yaml",
+                 "--duration", "2", "--out", folder / "runs", "--json", "--unchecked"});
+    const nlohmann::json document = nlohmann::json::parse(run.rest());
+    const int exit_code = run.wait();
+    const RunEnd end = run_end(text_of(only_entry(folder / "runs") / "run.yaml")).value();
+    EXPECT_END(end, exit_code == 0);
+    const nlohmann::json& clock = document.at("device_clock");
+    // A sample that comes half a millisecond late at either end is 250 ppm of 2 s.
+    EXPECT_TIMING(end.before(), std::abs(clock.at("drift_ppm").get<double>() - 2000.0) < 500.0,
+                  "drift " + clock.dump());
+    EXPECT_TIMING(end.before(), std::abs(clock.at("lost").get<double>() - 20.0) <= 3.0,
+                  "loss " + clock.dump());
+    EXPECT_NE(document.at("scheduling").get<std::string>().find("on the clock of the rig's device"),
+              std::string::npos);
+  });
 }
 
 TEST(QuanserCard, ARunRecordsWhichCardAndLibraryItWas) {

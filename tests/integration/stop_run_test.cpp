@@ -135,7 +135,7 @@ TEST(StopRun, SaysSoInJsonTooAndNamesTheDevicesWatchdog) {
     run.signal(SIGINT);
     EXPECT_EQ(run.ended_by({"link_lost", "stale_encoder"}), 4) << run.err;
     EXPECT_TRUE(says(run.out, "\"zero_volts\": \"not_confirmed\"")) << run.out;
-    EXPECT_TRUE(says(run.err, "takes the voltage away 0.1 s after")) << run.err;
+    EXPECT_TRUE(says(run.err, "switches the voltage off 0.1 s after")) << run.err;
   });
 }
 

@@ -95,7 +95,7 @@ TEST(Stop, TriesForTenSecondsAndNamesTheDevicesOwnWatchdog) {
                   "zero volts in time");
     EXPECT_GT(result.took_s, 0.9 * stop_patience_s);
     EXPECT_LT(result.took_s, stop_patience_s + 1.0);
-    EXPECT_NE(sentence_of(result.report).find("takes the voltage away 0.1 s after"), std::string::npos)
+    EXPECT_NE(sentence_of(result.report).find("switches the voltage off 0.1 s after"), std::string::npos)
         << sentence_of(result.report);
   });
 }

@@ -96,7 +96,7 @@ TEST_F(ComediTest, ReadsPlainCountersOfTheWidthTheyHave) {
       "range_v: [-10, 10],\n         counts_per_v: 2000";
   const std::string text = replaced(card_rig_text(), potentiometer,
                                     "kind: plain_counter, device: /dev/comedi1, subdevice: 0, channel: 0");
-  EXPECT_TRUE(says(refusal(text), "give calibration.cart.width_bits 16")) << refusal(text);
+  EXPECT_TRUE(says(refusal(text), "set calibration.cart.width_bits to 16")) << refusal(text);
   const auto rig = opened(replaced(text, "width_bits: 32", "width_bits: 16"));
   encoders.put(0, 0x7fff);
   encoders.put(1, Card::middle);
@@ -109,12 +109,12 @@ TEST_F(ComediTest, ReadsPlainCountersOfTheWidthTheyHave) {
 
 TEST_F(ComediTest, RefusesWhatTheCardDoesNotOffer) {
   std::string sentence = refusal(card_rig_text("[-9, 9]"));
-  EXPECT_TRUE(says(sentence, "give range_v [-10.0, 10.0] or [-5.0, 5.0]")) << sentence;
+  EXPECT_TRUE(says(sentence, "set range_v to [-10.0, 10.0] or [-5.0, 5.0]")) << sentence;
   EXPECT_TRUE(says(sentence, "rig.yaml:1: comedi.output")) << sentence;
   sentence = refusal(replaced(card_rig_text(), "subdevice: 1", "subdevice: 0"));
-  EXPECT_TRUE(says(sentence, "give subdevice 1")) << sentence;
+  EXPECT_TRUE(says(sentence, "use subdevice 1")) << sentence;
   sentence = refusal(replaced(card_rig_text(), "channel: 1", "channel: 8"));
-  EXPECT_TRUE(says(sentence, "give channel 0 to 7")) << sentence;
+  EXPECT_TRUE(says(sentence, "use channel 0 to 7")) << sentence;
   sentence = refusal(replaced(card_rig_text(), "/dev/comedi0", "/dev/comedi3"));
   EXPECT_TRUE(says(sentence, "load the card's driver")) << sentence;
   const std::string potentiometer =
@@ -123,7 +123,7 @@ TEST_F(ComediTest, RefusesWhatTheCardDoesNotOffer) {
   sentence = refusal(replaced(replaced(card_rig_text(), potentiometer,
                                        "kind: counter, device: /dev/comedi1, subdevice: 0, channel: 0"),
                               "width_bits: 32", "width_bits: 16"));
-  EXPECT_TRUE(says(sentence, "multiq3, s626, ni_pcimio, ni_660x only")) << sentence;
+  EXPECT_TRUE(says(sentence, "only for the drivers multiq3, s626, ni_pcimio, ni_660x")) << sentence;
   EXPECT_TRUE(says(sentence, "driver comedi_test")) << sentence;
 }
 

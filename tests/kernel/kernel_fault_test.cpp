@@ -50,14 +50,14 @@ Case mishap(const char* fault, Mishap what, const char* cause, Expectation expec
 /// What can befall either rig. `stood_still` is what comes of a controller that stands still for 250 ms.
 std::vector<Case> common_cases(const Expectation& stood_still) {
   std::vector<Case> cases = {
-      mishap("stuck_cart", Mishap::cart_sticks, "the cart's encoder did not count",
+      mishap("stuck_cart", Mishap::cart_sticks, "the cart encoder did not count",
              stops({"stuck_encoder"}, stuck_noticed_s)),
-      mishap("stuck_pendulum", Mishap::pendulum_sticks, "the pendulum's encoder did not count",
+      mishap("stuck_pendulum", Mishap::pendulum_sticks, "the pendulum encoder did not count",
              stops({"stuck_encoder"}, stuck_noticed_s)),
-      mishap("jump", Mishap::cart_jumps, "the counts jumped", stops({"rig_fault"}, 4 * period_s)),
+      mishap("jump", Mishap::cart_jumps, "the encoder counts jumped", stops({"rig_fault"}, 4 * period_s)),
   };
   for (const ProcessCase& c : sign_cases())
-    cases.push_back({.process = c, .cause = "check the signs of encoders and amplifier"});
+    cases.push_back({.process = c, .cause = "check the signs of the encoders and the amplifier"});
   for (const ProcessCase& c : machine_cases(period_s, stood_still)) cases.push_back({.process = c});
   return cases;
 }
@@ -78,7 +78,7 @@ std::vector<Case> line_cases() {
     cases.push_back(c);
   // While the edges are made, for some 35 ms on an emulated processor, the controller stands still: that must
   // be less than the three periods after which it stops for being late.
-  cases.push_back(mishap("edges_lost", Mishap::edges_burst, "edges of an encoder were lost", at_once));
+  cases.push_back(mishap("edges_lost", Mishap::edges_burst, "encoder edges were lost", at_once));
   cases.back().sample_rate_hz = 50;
   return cases;
 }
@@ -87,8 +87,9 @@ std::vector<Case> card_cases() {
   // Nothing takes a card's voltage away while the program stands still.
   std::vector<Case> cases = common_cases(stops({"overrun"}, 0.25 + 2 * period_s));
   const Expectation lost = stops({"link_lost"}, watchdog_s + period_s);
-  cases.push_back(mishap("no_contact", Mishap::cart_has_no_contact, "counts the hardware cannot mean", lost));
-  cases.push_back(mishap("cut", Mishap::encoders_go, "check cable, address and device", lost));
+  cases.push_back(mishap("no_contact", Mishap::cart_has_no_contact,
+                         "an encoder reading was outside its valid range", lost));
+  cases.push_back(mishap("cut", Mishap::encoders_go, "check the cable, the address and the device", lost));
   cases.push_back(
       {.process = {.fault = "wrap", .expectation = goes_on()}, .encoders = CardWires::Encoders::counters});
   return cases;
@@ -235,7 +236,7 @@ TEST(KernelKilled, TheHeartStopsAndItsWatchdogTakesTheVoltageAway) {
   EXPECT_GT(on_until_s, *killed_s - period_s) << "it was still balancing";
   EXPECT_LT(on_until_s, *killed_s + heart_s + period_s);
   EXPECT_FALSE(read_run(only_entry(setting.files().runs())).samples.rows.empty()) << "the log reads";
-  if (!HasFailure()) record("sigkill", Bench::gpio, "the heartbeat's watchdog: 0 V within 100 ms");
+  if (!HasFailure()) record("sigkill", Bench::gpio, "heartbeat watchdog: 0 V within 100 ms");
 }
 
 /// What the documentation says: a card has no watchdog of its own.
@@ -248,7 +249,7 @@ TEST(KernelKilled, ACardKeepsItsVoltageUntilTheNextStart) {
   const auto rig = make_rig(read_rig_file(setting.files().rig_file()), {period_s});
   rig->open();
   EXPECT_TRUE(setting.wires().at_rest()) << "the lock went with the process, and opening puts out zero volts";
-  if (!HasFailure()) record("sigkill", Bench::comedi, "the last voltage stays until the next start");
+  if (!HasFailure()) record("sigkill", Bench::comedi, "the last voltage remains until the next start");
 }
 
 }  // namespace

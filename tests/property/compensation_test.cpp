@@ -11,7 +11,7 @@
 #include "base/parallel.hpp"
 #include "control/predictor.hpp"
 #include "design/gain_design.hpp"
-#include "design/mistaken_plant.hpp"
+#include "design/perturbed_plant.hpp"
 #include "upright/control/controller.hpp"
 #include "upright/model/plant_file.hpp"
 #include "upright/sim/simulator.hpp"
@@ -86,9 +86,9 @@ TEST_P(Compensation, StaysUpTo150MillisecondsWithEveryParameter5PercentOff) {
   const Plant plant = plant_named(GetParam()), model = plant_named("viscous");
   for (const double delay_s : {0.01, 0.05, 0.1, 0.15}) {
     const ControlConfig config = compensated(model, delay_s);
-    EXPECT_EQ(
-        falls_of(plant, [&](unsigned seed) { return predicting(config, mistaken_plant(model, seed, 0.05)); }),
-        0)
+    EXPECT_EQ(falls_of(plant,
+                       [&](unsigned seed) { return predicting(config, perturbed_plant(model, seed, 0.05)); }),
+              0)
         << delay_s;
   }
 }
@@ -97,7 +97,7 @@ TEST_P(Compensation, TheGainsMayComeFromTheMistakenModelToo) {
   const Plant plant = plant_named(GetParam()), model = plant_named("viscous");
   EXPECT_EQ(falls_of(plant,
                      [&](unsigned seed) {
-                       const Plant off = mistaken_plant(model, seed, 0.05);
+                       const Plant off = perturbed_plant(model, seed, 0.05);
                        return predicting(compensated(off, 0.15), off);
                      }),
             0);

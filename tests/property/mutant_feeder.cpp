@@ -86,8 +86,8 @@ bool has_place(const std::string& sentence, const fs::path& folder) {
   static const std::regex line(":[0-9]+: ");
   static const std::regex whole(
       "cannot read|cannot be read|is a folder|larger than|is none|has no run.yaml|another experiment|"
-      "holds no|holds constant data|has no header|has a row|rows have|has the outcome|unknown "
-      "verdict|unfinished sweep|with the gains of");
+      "holds no|contains no|holds constant data|does not begin with the header|has an incomplete row|rows "
+      "have|has the unknown outcome|unknown verdict|unfinished sweep|with the gains of");
   if (sentence.starts_with("cannot read /")) return true;
   if (sentence.find(folder.string()) == std::string::npos) return false;
   return std::regex_search(sentence, line) || std::regex_search(sentence, whole);

@@ -42,8 +42,9 @@ TEST(MutantFinds, APredictorOverTooManyPeriodsIsRefused) {
   control.delay_s = 10.0;
   const Agreement agreement = agreement_of({std::nullopt, control, good_plant()});
   ASSERT_EQ(agreement.errors.size(), 1u);
-  EXPECT_NE(agreement.errors[0].find("too many to find its roots: lower sample_rate_hz or delay_s"),
-            std::string::npos)
+  EXPECT_NE(
+      agreement.errors[0].find("too long to compute the roots of the loop: lower sample_rate_hz or delay_s"),
+      std::string::npos)
       << agreement.errors[0];
 }
 
@@ -69,7 +70,7 @@ TEST(MutantFinds, AnExperimentOnAPlantThatIsFarTooStiffIsRefused) {
   const Folder folder;
   ExperimentSetup setup = setup_of("0.3", "{kind: observe, duration_s: 60}", folder);
   setup.plant.motor.back_emf_n_per_mps = 1e9;
-  expect_refusal([&] { rehearse_all(setup); }, "test.yaml:7: ", "too long to be rehearsed");
+  expect_refusal([&] { rehearse_all(setup); }, "test.yaml:7: ", "are too long to rehearse");
 }
 
 TEST(MutantFinds, ATravelBeyondTheTrackIsRefusedAtItsLine) {

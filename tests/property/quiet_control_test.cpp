@@ -12,7 +12,7 @@
 #include "base/parallel.hpp"
 #include "control/filter_model.hpp"
 #include "design/estimator_design.hpp"
-#include "design/mistaken_plant.hpp"
+#include "design/perturbed_plant.hpp"
 #include "upright/control/model_parts.hpp"
 #include "upright/model/plant_file.hpp"
 #include "upright/sim/loop/loop_run.hpp"
@@ -132,7 +132,7 @@ TEST_P(QuietControl, NoneOf100FallsWithEveryParameter20PercentOff) {
     config.delay_s = delay_s;
     std::atomic<int> fell{0};
     parallel_for(100, [&](std::size_t seed) {
-      const Plant off = mistaken_plant(model, static_cast<unsigned>(seed), 0.2);
+      const Plant off = perturbed_plant(model, static_cast<unsigned>(seed), 0.2);
       if (run_of(plant, config, off, 3.0, 8.0).fell) ++fell;
     });
     EXPECT_EQ(fell, 0) << delay_s;
@@ -140,7 +140,7 @@ TEST_P(QuietControl, NoneOf100FallsWithEveryParameter20PercentOff) {
 }
 
 TEST_P(QuietControl, FrictionThatTheModelHasWrongHuntsNoMore) {
-  if (!extended) GTEST_SKIP() << "it has no model of friction";
+  if (!extended) GTEST_SKIP() << "not applicable: this estimator has no friction model";
   const ControlConfig with = quiet();
   ControlConfig without = with;
   without.friction.share = 0.0;

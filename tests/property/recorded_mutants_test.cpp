@@ -167,8 +167,9 @@ TEST(ExperimentFolder, RefusesTrialsOfAnImpossibleDelayOrFolderAtTheirLine) {
   for (const std::string& cells : {",0,2e6," + run, ",0,-0.001," + run, std::string(",0,0.0,"),
                                    std::string(",0,0.0,.."), ",0,0.0,../" + run}) {
     changed_to(cells);
-    EXPECT_NE(refusal_of([&] { write_experiment_report(made); }).find("trials.csv:2: not a trial"),
-              std::string::npos)
+    EXPECT_NE(
+        refusal_of([&] { write_experiment_report(made); }).find("trials.csv:2: this line is not a trial"),
+        std::string::npos)
         << cells;
   }
 }

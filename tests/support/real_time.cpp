@@ -14,7 +14,7 @@ namespace upright::test {
 
 namespace {
 
-/// What a stall has excused.
+/// A failed timing condition and the stall that excuses it.
 struct Excused {
   std::string what;
   Interval stall;
@@ -39,7 +39,7 @@ std::string words_of(const Interval& stall) {
   return words.str();
 }
 
-/// A line with tabs: retry or skip, test, what was excused, the stall's begin and end.
+/// Writes a line with tabs: retry or skip, test, the failed condition, the begin and end of the stall.
 void count(const char* kind, const Excused& excused) {
   const char* named = std::getenv("UPRIGHT_RETRY_LOG");
   std::string what = excused.what;
@@ -52,13 +52,13 @@ void count(const char* kind, const Excused& excused) {
   const std::string text = line.str();
   const int file =
       ::open(named != nullptr ? named : UPRIGHT_RETRY_LOG, O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0644);
-  // In one go, for tests write it side by side.
+  // A single write, because tests run in parallel.
   if (file < 0 || ::write(file, text.data(), text.size()) != static_cast<ssize_t>(text.size()))
-    ADD_FAILURE() << "a " << kind << " could not be counted: the file cannot be written";
+    ADD_FAILURE() << "a " << kind << " could not be recorded: make the file in UPRIGHT_RETRY_LOG writable";
   if (file >= 0) ::close(file);
 }
 
-/// Until a moment has passed without a stall: an attempt right after one is likely to meet the next.
+/// Waits until half a second has passed without a stall, because stalls come in groups.
 void await_calm() {
   constexpr auto calm = std::chrono::milliseconds(500);
   constexpr int most_waits = 20;
@@ -69,7 +69,7 @@ void await_calm() {
   }
 }
 
-/// What excuses the attempt, if anything has to.
+/// The stall that excuses the failed attempt, if there is one.
 std::optional<Excused> attempted(const std::function<void()>& attempt) {
   std::optional<Excused> excused;
   attempting = true;
@@ -92,11 +92,15 @@ bool in_real_time(const std::function<void()>& attempt) {
   for (int made = 1;; ++made) {
     const std::optional<Excused> excused = attempted(attempt);
     if (!excused || testing::Test::HasFailure()) return true;
-    std::printf("!! a stall of %s excuses attempt %d: %s\n", words_of(excused->stall).c_str(), made,
-                excused->what.c_str());
+    std::printf("!! attempt %d met a stall of the machine of %s: %s\n", made,
+                words_of(excused->stall).c_str(), excused->what.c_str());
     if (made == most_attempts) {
       count("skip", *excused);
-      [] { GTEST_SKIP() << "each attempt was hit by a stall of this machine"; }();
+      [] {
+        GTEST_SKIP() << "every attempt met a stall of this machine, so timing results are meaningless: "
+                        "repeat the test on an idle "
+                        "machine";
+      }();
       return false;
     }
     count("retry", *excused);
@@ -109,8 +113,8 @@ void expect_timing(const Interval& when, bool holds, const char* condition, cons
   if (holds) return;
   const std::optional<Interval> stall = attempting ? detector().stall_in(when) : std::nullopt;
   if (stall) throw Excused{what, *stall};
-  ADD_FAILURE_AT(file, line) << what << ": " << condition << " does not hold, and no stall overlaps its "
-                             << words_of(when);
+  ADD_FAILURE_AT(file, line) << what << ": " << condition
+                             << " is false, and no stall of the machine occurred in these " << words_of(when);
 }
 
 }  // namespace upright::test

@@ -1,7 +1,7 @@
-// Assertions on timing, for tests that need a machine that lets them run. Such an assertion that fails is
-// excused by a stall that overlaps its interval; then the attempt is made again, and when no attempt is
-// without an excuse, the test is skipped. Every other assertion means what it says: nothing excuses it, and
-// what has failed by it is not tried again. Each retry and skip is a line in a file, which
+// Assertions on timing, for tests that need an idle machine. If such an assertion fails while a stall of the
+// machine overlaps its interval, the attempt is repeated. If every attempt meets a stall, the test is
+// skipped, because timing results are meaningless on a stalled machine. No stall excuses any other assertion,
+// and a test that fails in this way is not repeated. Each retry and skip is a line in a file, which
 // scripts/count_retries.py counts.
 #pragma once
 
@@ -14,15 +14,15 @@
 
 namespace upright::test {
 
-/// How often an attempt is made at most: where a stall excuses one attempt in three, one test in 81 is
-/// skipped.
+/// The largest number of attempts. If one attempt in three meets a stall, one test in 81 is skipped.
 inline constexpr int most_attempts = 4;
 
-/// Makes an attempt, again while a stall excuses it. False: a stall excused each, and the test is skipped.
+/// Repeats an attempt as long as a stall excuses it. False: every attempt met a stall, and the test is
+/// skipped.
 bool in_real_time(const std::function<void()>& attempt);
 
-/// Asserts what depends on timing. Where it does not hold: throws out of the attempt when a stall excuses
-/// it, and is a failure otherwise. Outside of `in_real_time` nothing is excused.
+/// Asserts a condition that depends on timing. If it is false, throws out of the attempt when a stall excuses
+/// it, and fails otherwise. Outside of `in_real_time` nothing is excused.
 void expect_timing(const Interval& when, bool holds, const char* condition, const std::string& what,
                    const char* file, int line);
 
@@ -30,7 +30,7 @@ void expect_timing(const Interval& when, bool holds, const char* condition, cons
 #define EXPECT_TIMING(when, condition, what) \
   ::upright::test::expect_timing((when), (condition), #condition, (what), __FILE__, __LINE__)
 
-/// The interval from now on until it is asked for.
+/// The interval from its construction until a given call.
 class Since {
  public:
   Since() : begin_s_(now_s()) {}

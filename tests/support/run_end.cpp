@@ -26,8 +26,8 @@ bool RunEnd::of_timing() const {
 }
 
 Interval RunEnd::before() const {
-  // The watchdog's time of the rigs under test, after which a link or an encoder is lost, and the few
-  // periods after which a run is too late.
+  // The watchdog time of the rigs under test, after which a link or an encoder is lost, and the few late
+  // periods after which a run stops.
   constexpr double watchdog_s = 0.1, few_periods_s = 0.05;
   return {stopped_s - watchdog_s - few_periods_s, stopped_s};
 }
@@ -55,7 +55,8 @@ void expect_no_late_end(const std::filesystem::path& folder) {
 
 void expect_end(const RunEnd& end, bool is_right, const char* file, int line) {
   if (end.of_timing())
-    expect_timing(end.before(), is_right, "the end is right", "the run ended with " + end.reason, file, line);
+    expect_timing(end.before(), is_right, "the end is as expected", "the run ended with " + end.reason, file,
+                  line);
   else if (!is_right)
     ADD_FAILURE_AT(file, line) << "the run ended with " << end.reason;
 }

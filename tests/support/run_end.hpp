@@ -1,4 +1,4 @@
-// How a run ended, as the text of its run.yaml says, for tests that judge it.
+// How a run ended, from the text of its run.yaml.
 #pragma once
 
 #include <filesystem>
@@ -14,22 +14,21 @@ struct RunEnd {
   std::string reason;
   double stopped_s = 0.0;  ///< on the monotonic clock
 
-  /// It was late, or its link or its encoders were: a machine that does not let it, its device or its card
-  /// run in time brings that about.
+  /// It ended because of late periods, a late link or late encoders. A machine that delays the run, its
+  /// device or its card can cause this.
   bool of_timing() const;
-  /// In which a stall can have brought it about.
+  /// The interval in which a stall can have caused the end.
   Interval before() const;
 };
 
-/// None: it has not ended, or nobody has written down how.
+/// None: the run has not ended, or its end was not recorded.
 std::optional<RunEnd> run_end(const std::string& run_yaml);
 
-/// Asserts how a run ended: as a matter of timing where it is one.
+/// Asserts how a run ended, as an assertion on timing if the end depends on timing.
 void expect_end(const RunEnd& end, bool is_right, const char* file, int line);
 #define EXPECT_END(end, is_right) ::upright::test::expect_end((end), (is_right), __FILE__, __LINE__)
 
-/// Asserts, as a matter of timing, that no run whose directory is somewhere below a folder ended in a way
-/// that is of timing.
+/// Asserts, as an assertion on timing, that no run below a folder ended for a reason that depends on timing.
 void expect_no_late_end(const std::filesystem::path& folder);
 
 }  // namespace upright::test

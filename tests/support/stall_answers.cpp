@@ -1,5 +1,5 @@
-// Watches for stalls of the machine, for programs that are no C++: for each line "BEGIN END" it reads
-// (seconds on the monotonic clock) it says a stall that overlaps, as "BEGIN END", or "none".
+// Detects stalls of the machine for programs in other languages. For each line "BEGIN END" that it reads
+// (seconds on the monotonic clock) it prints a stall that overlaps, as "BEGIN END", or "none".
 #include <iostream>
 
 #include "stall_detector.hpp"

@@ -73,9 +73,9 @@ class StallDetector::SerialLine {
   SerialLine(const SerialLine&) = delete;
   SerialLine& operator=(const SerialLine&) = delete;
 
-  /// False: the machine gives no pseudo-terminal.
+  /// False: no pseudo-terminal is available.
   bool is_there() const { return far_ >= 0; }
-  /// A byte goes from one end to the other.
+  /// Sends a byte from one end to the other.
   void carry() const {
     char byte = 0;
     if (write(far_, &byte, 1) == 1) static_cast<void>(!read(near_, &byte, 1));
@@ -85,8 +85,8 @@ class StallDetector::SerialLine {
   int near_ = -1, far_ = -1;
 };
 
-/// A sleeper, on one processor or one that sends a byte on a line each time. It keeps to memory that it has
-/// from the beginning, for tests take memory away.
+/// A sleeper that is bound to one processor, or that sends a byte on a line at each wake. It allocates its
+/// memory at the start, because some tests forbid allocation later.
 class StallDetector::Watcher {
  public:
   explicit Watcher(std::unique_ptr<SerialLine> line)
@@ -104,7 +104,7 @@ class StallDetector::Watcher {
   Watcher(const Watcher&) = delete;
   Watcher& operator=(const Watcher&) = delete;
 
-  /// All stalls until then are known.
+  /// Whether all stalls until `time_s` are known.
   bool has_seen(double time_s) const { return seen_s_ >= time_s; }
 
   std::optional<Interval> stall_in(const Interval& when) const {
@@ -121,7 +121,7 @@ class StallDetector::Watcher {
     double begin_s = 0.0;
     std::atomic<double> end_s{0.0};
   };
-  /// 5 minutes of stalls that are as short and as close to each other as stalls can be.
+  /// Enough for 5 minutes of the shortest and most frequent stalls.
   static constexpr std::size_t most_stalls = 20'000;
 
   void watch() {
@@ -162,7 +162,7 @@ StallDetector::StallDetector() {
     if (CPU_ISSET(processor, &allowed)) watchers_.push_back(std::make_unique<Watcher>(processor));
   if (auto line = std::make_unique<SerialLine>(); line->is_there())
     watchers_.push_back(std::make_unique<Watcher>(std::move(line)));
-  // The first stall begins after a wake.
+  // A stall is detected only after a first wake.
   for (const auto& watcher : watchers_)
     while (!watcher->has_seen(0.0)) sleep_period();
 }

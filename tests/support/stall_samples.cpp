@@ -1,5 +1,5 @@
-// Tests that make a stall and fail, in the ways that stall_detection_test.cpp looks at: this process stops
-// itself, and who started it lets it go on. Not in ctest.
+// Tests that cause a stall and fail, for stall_detection_test.cpp: this process stops itself, and its parent
+// continues it. Not in ctest.
 #include <gtest/gtest.h>
 #include <signal.h>
 #include <unistd.h>
@@ -13,14 +13,14 @@
 namespace upright::test {
 namespace {
 
-/// Stops this process, with its detector, until somebody continues it; since before until after.
+/// Stops this process and its detector until it is continued. Returns the interval.
 Interval stalled() {
   const Since begin;
   kill(getpid(), SIGSTOP);
   return begin.until_now();
 }
 
-/// Long before this process began.
+/// Long before this process started.
 constexpr Interval another_time{0.001, 0.002};
 
 TEST(Sample, PrintsTheStallItFound) {
@@ -37,7 +37,7 @@ TEST(Sample, FailsOnTimingInEveryStall) {
   in_real_time([] {
     std::puts("attempt");
     EXPECT_TIMING(stalled(), false, "a timing");
-    ADD_FAILURE() << "the attempt goes on after what is excused";
+    ADD_FAILURE() << "the attempt continued after an excused failure";
   });
 }
 

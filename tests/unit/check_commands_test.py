@@ -32,14 +32,31 @@ class CheckCommands(unittest.TestCase):
         for printed, shown in (("1.03", "1.00"), ("exit code 2", "exit code 3"), ("fell", "Stayed up")):
             code, said, _ = check(page(f"echo {printed}", shown))
             self.assertEqual(code, 1, printed)
-            self.assertIn("page.md:3: prints something else", said)
+            self.assertIn("page.md:3: the output differs from the page", said)
 
     def test_names_a_command_that_fails(self):
-        self.assertIn("page.md:3: ends with 3", check(page("exit 3", "nothing"))[1])
+        self.assertIn("page.md:3: the command ended with exit code 3", check(page("exit 3", "nothing"))[1])
 
     def test_writes_the_files_of_a_page_and_runs_in_one_folder(self):
         text = "<!-- file a.txt -->\n```yaml\nkey: 1\n```\n\n" + page("cat a.txt", "key: 1")
         self.assertEqual(check(text)[0], 0)
+
+    def test_stops_at_the_first_command_that_fails(self):
+        code, said, _ = check(page("false\necho on", "on"))
+        self.assertEqual(code, 1)
+        self.assertIn("page.md:3: the command ended with exit code 1", said)
+
+    def test_lets_a_page_show_an_exit_code(self):
+        self.assertEqual(check(page("(exit 3)\necho code $?", "code 3"))[0], 0)
+
+    def test_runs_inline_commands_with_arguments(self):
+        self.assertIn("page.md:1: the command ended with exit code 1", check("Type `cmake -E false` in `build`, or `cmake`.\n")[1])
+
+    def test_does_not_run_the_name_of_a_program(self):
+        self.assertEqual(check("It uses `sudo` unless `make` is there.\n")[0], 0)
+
+    def test_leaves_out_what_is_run_elsewhere(self):
+        self.assertEqual(check(page("sudo groupadd --system upright   # once\nscripts/test.sh ci\necho on", "on"))[0], 0)
 
     def test_does_not_run_other_blocks(self):
         self.assertEqual(check("```console\nexit 3\n```\n")[0], 0)

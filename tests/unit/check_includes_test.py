@@ -56,7 +56,7 @@ class CheckIncludes(unittest.TestCase):
         self.expect("links itself", {"src/low/CMakeLists.txt": GOOD["src/low/CMakeLists.txt"].replace(")", " LINK upright_high)")})
 
     def test_refuses_an_offer_that_nobody_takes(self):
-        self.expect("offers hidden.hpp, which nobody", {"src/low/CMakeLists.txt": GOOD["src/low/CMakeLists.txt"].replace("OFFERS", "OFFERS hidden.hpp")})
+        self.expect("offers hidden.hpp, which no other folder includes", {"src/low/CMakeLists.txt": GOOD["src/low/CMakeLists.txt"].replace("OFFERS", "OFFERS hidden.hpp")})
 
     def test_refuses_a_folder_that_does_not_say_what_it_holds(self):
         self.expect("begin it with '# Holds:", {"src/low/CMakeLists.txt": GOOD["src/low/CMakeLists.txt"].split("\n", 1)[1]})
@@ -64,7 +64,7 @@ class CheckIncludes(unittest.TestCase):
     def test_refuses_a_page_whose_table_is_another(self):
         code, said = check({}, write_table=False)
         self.assertEqual(code, 1)
-        self.assertIn("its table of folders is not that of the targets", said)
+        self.assertIn("the table of folders differs from the targets", said)
 
 
 if __name__ == "__main__":

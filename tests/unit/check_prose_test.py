@@ -9,9 +9,11 @@ SCRIPT = pathlib.Path(__file__).resolve().parents[2] / "scripts" / "check_prose.
 LONG = " ".join(["word"] * 41)
 
 
-def check(page):
+def check(text, name="README.md"):
     with tempfile.TemporaryDirectory() as folder:
-        (pathlib.Path(folder) / "README.md").write_text(page)
+        file = pathlib.Path(folder) / name
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_text(text)
         done = subprocess.run([sys.executable, SCRIPT, "--root", folder], capture_output=True, text=True)
         return done.returncode, done.stderr
 
@@ -30,12 +32,34 @@ class CheckProse(unittest.TestCase):
     def test_names_a_long_sentence(self):
         code, said = check(f"Short. {LONG}.\n")
         self.assertEqual(code, 1)
-        self.assertIn("README.md: a sentence of 41 words", said)
+        self.assertIn("README.md: a sentence has 41 words", said)
 
     def test_names_a_word_with_its_line_and_a_plain_one(self):
         code, said = check("One.\n\nThe noise is what is left.\n")
         self.assertEqual(code, 1)
         self.assertIn("README.md:3: says 'what is left': write the residual", said)
+
+    def test_names_a_word_in_a_literal_with_its_line(self):
+        code, said = check('int x;\nfail("kind stands twice");\n', "src/cli/a.cpp")
+        self.assertEqual(code, 1)
+        self.assertIn("src/cli/a.cpp:2: says 'stands twice': write appears twice", said)
+
+    def test_joins_neighbouring_literals_and_takes_a_line_end_for_a_space(self):
+        for source in ('f("kind stands "\n  "twice");', 'f("first line\\nstands twice");', 'f(R"(stands twice)");'):
+            self.assertEqual(check(source, "src/base/a.hpp")[0], 1, source)
+
+    def test_ignores_comments_and_names_in_code(self):
+        source = '#include "very.hpp"\n// It stands twice.\n/* " very " */ char c = \'"\'; f("very_small", 1\'000); // very\n'
+        self.assertEqual(check(source, "src/cli/a.cpp"), (0, ""))
+
+    def test_accepts_what_outputs_for_programs_say(self):
+        self.assertEqual(check('f("on the rig the loop bears any delay");', "src/cli/a.cpp"), (0, ""))
+
+    def test_names_a_word_in_a_comment_of_a_configuration(self):
+        code, said = check("plant: a  # what is left\nname: what is left\n", "config/rigs/a.yaml")
+        self.assertEqual(code, 1)
+        self.assertEqual(said.count("says 'what is left'"), 1)
+        self.assertIn("config/rigs/a.yaml:1:", said)
 
 
 if __name__ == "__main__":

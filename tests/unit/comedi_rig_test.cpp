@@ -132,7 +132,7 @@ TEST_F(ComediRigTest, NamesTheRangesThereAre) {
   RigFile file = multiq3_file();
   file.comedi->output->range = {-4, 4};
   const std::string sentence = refusal(file);
-  EXPECT_TRUE(says(sentence, "give range_v [-10.0, 10.0] or [-5.0, 5.0]")) << sentence;
+  EXPECT_TRUE(says(sentence, "set range_v to [-10.0, 10.0] or [-5.0, 5.0]")) << sentence;
   EXPECT_TRUE(says(sentence, "comedi-multiq3.yaml:1: comedi.output")) << sentence;
 }
 
@@ -142,18 +142,18 @@ TEST_F(ComediRigTest, RefusesWiringTheCardDoesNotHave) {
   EXPECT_TRUE(says(refusal(file), "load the card's driver"));
   file = multiq3_file();
   file.comedi->output->subdevice = 5;
-  EXPECT_TRUE(says(refusal(file), "give subdevice 0 to 4"));
+  EXPECT_TRUE(says(refusal(file), "use subdevice 0 to 4"));
   file.comedi->output->subdevice = 4;
-  EXPECT_TRUE(says(refusal(file), "give subdevice 1")) << refusal(file);
+  EXPECT_TRUE(says(refusal(file), "use subdevice 1")) << refusal(file);
   file = multiq3_file();
   file.comedi->pendulum->channel = 4;
-  EXPECT_TRUE(says(refusal(file), "give channel 0 to 3"));
+  EXPECT_TRUE(says(refusal(file), "use channel 0 to 3"));
   file = multiq3_file();
   file.comedi->cart->subdevice = 0;
   EXPECT_FALSE(refusal(file).empty());
   file = multiq3_file();
   file.calibration.cart.width_bits = 32;
-  EXPECT_TRUE(says(refusal(file), "give calibration.cart.width_bits 24"));
+  EXPECT_TRUE(says(refusal(file), "set calibration.cart.width_bits to 24"));
   file = multiq3_file();
   file.comedi->cart->lines = ComediLines{1, 2};
   EXPECT_TRUE(says(refusal(file), "remove lines"));
@@ -163,8 +163,8 @@ TEST_F(ComediRigTest, RefusesCountersOfUnknownDriversUnlessTheyArePlain) {
   card().driver = "somebodys";
   RigFile file = multiq3_file();
   const std::string sentence = refusal(file);
-  EXPECT_TRUE(says(sentence, "multiq3, s626, ni_pcimio, ni_660x only")) << sentence;
-  EXPECT_TRUE(says(sentence, "kind plain_counter")) << sentence;
+  EXPECT_TRUE(says(sentence, "only for the drivers multiq3, s626, ni_pcimio, ni_660x")) << sentence;
+  EXPECT_TRUE(says(sentence, "kind: plain_counter")) << sentence;
   file.comedi->cart->kind = file.comedi->pendulum->kind = ComediEncoderKind::plain_counter;
   counter(0) = 7;
   counter(1) = 0xffffff;
@@ -210,20 +210,20 @@ TEST_F(ComediRigTest, SetsUpACounterOfNationalInstrumentsOnce) {
 TEST_F(ComediRigTest, RefusesACardThatCannotCountInQuadrature) {
   fake_cards()[device] = fake_ni_pcimio();
   card().refused_configurations = {INSN_CONFIG_SET_OTHER_SRC};  // as the E series does
-  EXPECT_TRUE(says(refusal(ni_file()), "must count in quadrature")) << refusal(ni_file());
+  EXPECT_TRUE(says(refusal(ni_file()), "for quadrature")) << refusal(ni_file());
 }
 
 TEST_F(ComediRigTest, RefusesCountsOfAnEarlierStartWhereCountersBeginAnew) {
   fake_cards()[device] = fake_ni_pcimio();
   RigFile file = ni_file();
   file.calibration.zero_at_start = false;
-  EXPECT_TRUE(says(refusal(file), "give calibration.zero {at: start, pose: hanging}"));
+  EXPECT_TRUE(says(refusal(file), "set calibration.zero to {at: start, pose: hanging}"));
   file = ni_file();
   file.comedi->cart->lines.reset();
   EXPECT_TRUE(says(refusal(file), "add lines"));
   file = ni_file();
   file.comedi->cart->channel = 1;
-  EXPECT_TRUE(says(refusal(file), "give channel 0"));
+  EXPECT_TRUE(says(refusal(file), "use channel 0"));
 }
 
 TEST_F(ComediRigTest, SetsUpTheS626) {

@@ -49,8 +49,8 @@ class CountRetries(unittest.TestCase):
         code, out, _ = count(lines("retry", 2) + lines("skip", 1) + "absent\tkernel_tests\tpackages\n", CTEST)
         self.assertEqual(code, 0)
         self.assertIn("2 retries", out)
-        self.assertIn("1 tests skipped, each attempt hit by a stall", out)
-        self.assertIn("4 tests skipped for what is not here", out)
+        self.assertIn("1 tests skipped because every attempt met a stall", out)
+        self.assertIn("4 tests skipped because a requirement is missing", out)
         for entry in ("page_test: Page.B", "page_test: Links/Page.C/rtu", "environment", "kernel_tests: packages"):
             self.assertIn(entry, out)
         self.assertNotIn("fault_test: Fault.A", out)
@@ -60,7 +60,7 @@ class CountRetries(unittest.TestCase):
             self.assertEqual(count(lines(kind, most))[0], 0, kind)
             code, _, err = count(lines(kind, most + 1))
             self.assertEqual(code, 1, kind)
-            self.assertIn("more retries or skips than the budget", err)
+            self.assertIn("retries or skips exceed the budget", err)
 
 
 if __name__ == "__main__":

@@ -36,7 +36,7 @@ Evidence evidence(Change change, double train, double held, double t_value) {
 /// An effect that is as well off when the noise is levelled.
 Evidence addition(double train, double held, double t_value) {
   Evidence e = evidence(Change::add, train, held, t_value);
-  e.levelled = e.improvement;
+  e.at_equal_noise = e.improvement;
   return e;
 }
 
@@ -65,9 +65,9 @@ TEST(Addition, NeedsEvidenceBeyondItsPrice) {
   EXPECT_EQ(rule_of(addition(p.least_evidence, 0.0, 5.0)), Rule::shown_throughout);
   EXPECT_EQ(rule_of(addition(below(p.least_evidence), 0.0, 5.0)), Rule::too_little_evidence);
   Evidence priced = addition(p.least_evidence + 20.0, 0.0, 5.0);
-  priced.price = 20.0;
+  priced.penalty = 20.0;
   EXPECT_EQ(rule_of(priced), Rule::shown_throughout);
-  priced.price = 21.0;
+  priced.penalty = 21.0;
   EXPECT_EQ(rule_of(priced), Rule::too_little_evidence);
 }
 
@@ -86,7 +86,7 @@ TEST(Addition, HasHeldOutRunsAsAWitnessOfItsT) {
   e.simulated_gap = 2.0;
   EXPECT_EQ(rule_of(e), Rule::chance);
   e.improvement.held = 5.01;
-  e.levelled = e.improvement;
+  e.at_equal_noise = e.improvement;
   EXPECT_EQ(rule_of(e), Rule::shown_throughout);
 }
 
@@ -112,11 +112,11 @@ TEST(Addition, NeedsNoTWithOverwhelmingEvidence) {
 
 TEST(Addition, NeedsNoTWhereNumbersOfThePlantNeedNotBeSoFarOff) {
   Evidence e = addition(500.0, 0.0, 0.5);
-  e.improvement.belief = p.least_evidence;
-  e.levelled = e.improvement;
+  e.improvement.prior = p.least_evidence;
+  e.at_equal_noise = e.improvement;
   EXPECT_EQ(rule_of(e), Rule::chance);
-  e.improvement.belief = above(p.least_evidence);
-  e.levelled = e.improvement;
+  e.improvement.prior = above(p.least_evidence);
+  e.at_equal_noise = e.improvement;
   EXPECT_EQ(rule_of(e), Rule::plant_numbers);
 }
 
@@ -206,13 +206,13 @@ TEST(Addition, IsFollowedInDoubtWithOverwhelmingEvidenceOnly) {
 
 TEST(Addition, CountsOverTheModelWithTheSameNoise) {
   Evidence e = evidence(Change::add, below(p.overwhelming_evidence), 0.0, 5.0);
-  EXPECT_EQ(missing_of(e), MissingFit::levelled_noise);
-  e.levelled = Improvement{10.0, 0.0, 0.0, 5.0};
+  EXPECT_EQ(missing_of(e), MissingFit::equal_noise);
+  e.at_equal_noise = Improvement{10.0, 0.0, 0.0, 5.0};
   EXPECT_EQ(rule_of(e), Rule::too_little_evidence);
   e = evidence(Change::add, p.overwhelming_evidence, 0.0, 5.0);
   EXPECT_EQ(rule_of(e), Rule::shown_throughout);
-  e.with_little_noise = true;
-  EXPECT_EQ(missing_of(e), MissingFit::levelled_noise);
+  e.with_low_noise = true;
+  EXPECT_EQ(missing_of(e), MissingFit::equal_noise);
 }
 
 TEST(Addition, WaitsForTheSimulationsThatARuleAsksFor) {
@@ -229,7 +229,7 @@ TEST(Exchange, IsForWhatIsBetter) {
   EXPECT_EQ(rule_of(evidence(Change::exchange, 100.0, 0.0, 0.0)), Rule::no_better);
   EXPECT_EQ(rule_of(evidence(Change::exchange, 100.0, above(0.0), 0.0)), Rule::better);
   Evidence cheaper = evidence(Change::exchange, 0.0, 1.0, 0.0);
-  cheaper.price_saved = 20.0;
+  cheaper.penalty_saved = 20.0;
   EXPECT_EQ(rule_of(cheaper), Rule::better);
 }
 
@@ -262,7 +262,7 @@ TEST(Exchange, AsksOfWhatStandsInThatItIsPossibleCertainAndSimulates) {
 
 TEST(Simplification, MustSaveWhatItsParametersCost) {
   Evidence e = evidence(Change::simplify, 10.0, 0.0, 0.0);
-  e.price = 10.0;
+  e.penalty = 10.0;
   EXPECT_EQ(rule_of(e), Rule::no_better);
   e.improvement.train = above(10.0);
   EXPECT_EQ(rule_of(e), Rule::plainer);
@@ -295,8 +295,8 @@ TEST(Keeping, IsForWhatAnotherNeeds) {
 }
 
 TEST(WhatWasAddedInDoubt, MustHaveHeldOutRunsOnItsSideInTheEnd) {
-  EXPECT_EQ(rule_of(evidence(Change::trust_grown, 5000.0, 0.0, 5.0)), Rule::held_out_against);
-  Evidence e = evidence(Change::trust_grown, 5000.0, above(0.0), 5.0);
+  EXPECT_EQ(rule_of(evidence(Change::trust_added, 5000.0, 0.0, 5.0)), Rule::held_out_against);
+  Evidence e = evidence(Change::trust_added, 5000.0, above(0.0), 5.0);
   EXPECT_EQ(rule_of(e), Rule::held_out_agree);
   e.simulated_segments = SimulationChange{4, 10.0, 0.0};
   EXPECT_EQ(rule_of(e), Rule::simulates_worse);
@@ -311,8 +311,8 @@ TEST(Rules, HaveNamesOfTheirOwn) {
 }
 
 TEST(Place, IsBetterByMoreThanIsEquallyGood) {
-  EXPECT_FALSE(is_better_place(p.equally_good_evidence, p));
-  EXPECT_TRUE(is_better_place(above(p.equally_good_evidence), p));
+  EXPECT_FALSE(is_better_optimum(p.equally_good_evidence, p));
+  EXPECT_TRUE(is_better_optimum(above(p.equally_good_evidence), p));
 }
 
 /// A spring has two parameters, a force one: it is the plainer.
@@ -340,10 +340,10 @@ TEST(Indistinguishable, IsWhatLosesLittleEvidenceOrLessThanItsScatter) {
 
 TEST(Alternative, TakesTheCertaintyOfAnEffectAway) {
   const DistinctionPolicy& d = policy.distinction;
-  EXPECT_TRUE(takes_certainty_away(below(d.least_distance), 100.0, d));
-  EXPECT_FALSE(takes_certainty_away(d.least_distance, 100.0, d));
-  EXPECT_TRUE(takes_certainty_away(below(3.0), 3.0 / d.least_loss, d));
-  EXPECT_FALSE(takes_certainty_away(3.0, 3.0 / d.least_loss, d));
+  EXPECT_TRUE(reduces_certainty(below(d.least_distance), 100.0, d));
+  EXPECT_FALSE(reduces_certainty(d.least_distance, 100.0, d));
+  EXPECT_TRUE(reduces_certainty(below(3.0), 3.0 / d.least_loss, d));
+  EXPECT_FALSE(reduces_certainty(3.0, 3.0 / d.least_loss, d));
 }
 
 }  // namespace

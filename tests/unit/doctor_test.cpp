@@ -397,6 +397,55 @@ TEST(SafetyInputs, ThatAreActiveAreNamedAndNotBlamedOnTheLink) {
   EXPECT_EQ(judge_link(all, 100.0).health, Health::not_examined);
 }
 
+/// A device that samples on its own time.
+class SamplingRig final : public Rig {
+ public:
+  SamplingRig(Clock& clock, double ppm) : clock_(clock), period_ns_(1e7 * (1.0 + 1e-6 * ppm)) {}
+  void open() override {}
+  RigReading read() noexcept override {
+    RigReading reading;
+    reading.status = RigStatus::fresh;
+    return reading;
+  }
+  RigFault write(double) noexcept override { return RigFault::none; }
+  StopReport stop() noexcept override { return at_zero_volts(); }
+  bool is_clock() const noexcept override { return true; }
+  DeviceSample wait_next(std::int64_t until_ns) noexcept override {
+    const std::int64_t next_ns = time_ns(waited_for_ + 1);
+    clock_.sleep_until(std::min(next_ns, until_ns));
+    if (next_ns <= clock_.now_ns()) ++waited_for_;
+    return {waited_for_, time_ns(waited_for_)};
+  }
+
+ private:
+  std::int64_t time_ns(std::uint64_t sample) const {
+    return static_cast<std::int64_t>(period_ns_ * static_cast<double>(sample));
+  }
+  Clock& clock_;
+  double period_ns_;
+  std::uint64_t waited_for_ = 0;
+};
+
+TEST(Link, OfADeviceThatIsTheClockIsHowItSamples) {
+  VirtualClock clock;
+  SamplingRig rig(clock, 500.0);
+  const SignalFlag signal{0};
+  LinkProbe probe = probe_link(rig, clock, 100.0, 2.0, signal);
+  ASSERT_TRUE(probe.device_clock.has_value());
+  EXPECT_NEAR(probe.device_clock->drift_ppm, 500.0, 0.1);
+  EXPECT_EQ(probe.device_clock->lost, 0u);
+  EXPECT_NEAR(static_cast<double>(probe.counts.size()), 100.0, 2.0) << "of the last second";
+  const Finding finding = judge_link(probe, 100.0);
+  EXPECT_EQ(finding.health, Health::good);
+  EXPECT_NE(finding.what.find("every 10005.00 us (+500 ppm)"), std::string::npos) << finding.what;
+  probe.device_clock->lost = 3;
+  EXPECT_EQ(judge_link(probe, 100.0).health, Health::poor);
+  probe.device_clock->lost = 20;
+  EXPECT_EQ(judge_link(probe, 100.0).health, Health::bad);
+  probe.device_clock = DeviceTiming{};
+  EXPECT_EQ(judge_link(probe, 100.0).health, Health::bad);
+}
+
 TEST(DigitalLines, AreReadOrBad) {
   VirtualClock clock;
   WiredRig rig(clock);

@@ -246,7 +246,7 @@ TEST(DelaySweep, IsNotCompleteWithoutAFallInEachRepeat) {
     done.push_back(r);
   }
   const std::string missing = missing_transitions(pieces, done);
-  EXPECT_NE(missing.find("in repeat 2 nothing fell up to 32"), std::string::npos) << missing;
+  EXPECT_NE(missing.find("in repeat 2 the pendulum did not fall up to 32"), std::string::npos) << missing;
   for (TrialResult& r : done)
     if (r.trial.delay_s > 0.03) r.outcome = "fell";
   EXPECT_EQ(missing_transitions(pieces, done), "");

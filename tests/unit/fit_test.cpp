@@ -31,7 +31,7 @@ TEST(Fit, TakesSlidingWhereTheModelRestsForAForceAndNotForSensorNoise) {
     runs.push_back(measure(rig, plan, "run"));
   }
   const FitData data{&runs, cut_segments(runs)};
-  const FitPoint start{believed, guess_starts(runs, data.segments, believed), {.force = 0.1}};
+  const FitPoint start{believed, estimate_initial_states(runs, data.segments, believed), {.force = 0.1}};
   const Noise noise = fit(data, start, {}).point.noise;
   EXPECT_LT(noise.sensors, 1.5);
   EXPECT_GT(noise.force, 0.01);
@@ -53,7 +53,7 @@ TEST(Fit, BeginsAfterAGapOnceTheMotorsLagHasForgottenIt) {
     const FitData data{&runs, cut_segments(runs)};
     ASSERT_EQ(data.segments.size(), 4u);
     const FitResult followed =
-        fit_initial_states(data, {plant, guess_starts(runs, data.segments, plant), {}});
+        fit_initial_states(data, {plant, estimate_initial_states(runs, data.segments, plant), {}});
     EXPECT_LT(whitened_rms(followed), 1.1) << gap_s;
   }
 }
@@ -68,7 +68,8 @@ TEST(Fit, FindsTheMostLikelyNoise) {
     plan.seed = seed;
     const std::vector<Measurement> runs = {measure(rig, plan, "run")};
     const FitData data{&runs, cut_segments(runs)};
-    const FitResult found = fit(data, {plant, guess_starts(runs, data.segments, plant), {.force = 0.1}}, {});
+    const FitResult found =
+        fit(data, {plant, estimate_initial_states(runs, data.segments, plant), {.force = 0.1}}, {});
     FitOptions noise_held;
     noise_held.noise_rounds = 0;
     for (double Noise::*number : {&Noise::force, &Noise::sensors, &Noise::jitter_s})

@@ -29,6 +29,7 @@ struct Script {
   double last_v = -1.0;
   std::vector<std::string>* story = nullptr;
   StopReport stop = at_zero_volts();
+  std::uint64_t samples = 0;  ///< it is the clock where there are some
 };
 
 class ScriptedRig final : public Rig {
@@ -51,6 +52,8 @@ class ScriptedRig final : public Rig {
     tell("stop");
     return script_.stop;
   }
+  bool is_clock() const noexcept override { return script_.samples > 0; }
+  DeviceSample wait_next(std::int64_t until_ns) noexcept override { return {script_.samples, until_ns}; }
 
  private:
   void tell(const char* what) const { script_.story->push_back(script_.name + " " + what); }
@@ -90,6 +93,17 @@ class JoinedRigTest : public testing::Test {
   Script pendulum{"pendulum", {}, RigFault::none, true, -1.0, nullptr};
   Script output{"output", {}, RigFault::none, true, -1.0, nullptr};
 };
+
+TEST_F(JoinedRigTest, FollowsThePartWhoseDeviceIsTheClock) {
+  const auto rig = three();
+  rig->open();
+  EXPECT_FALSE(rig->is_clock());
+  EXPECT_EQ(rig->wait_next(5).number, 0u);
+  pendulum.samples = 7;
+  EXPECT_TRUE(rig->is_clock());
+  EXPECT_EQ(rig->wait_next(5).number, 7u);
+  EXPECT_EQ(rig->wait_next(5).time_ns, 5);
+}
 
 TEST_F(JoinedRigTest, TakesEachCountFromItsPartAndTheOlderTime) {
   const auto rig = three();

@@ -59,8 +59,9 @@ TEST_F(MeasurementFile, RefusesWhatCannotBeUsedAndSaysWhere) {
             std::string::npos);
   EXPECT_NE(refusal(file("c.csv", rows("time_s,cart_m,voltage_v", "0.4,fast,1\n"))).find(":42:"),
             std::string::npos);
-  EXPECT_NE(refusal(file("d.csv", rows("time_s,cart_m,voltage_v", "0.1,0.002,1\n"))).find("does not grow"),
-            std::string::npos);
+  EXPECT_NE(
+      refusal(file("d.csv", rows("time_s,cart_m,voltage_v", "0.1,0.002,1\n"))).find("does not increase"),
+      std::string::npos);
   EXPECT_NE(refusal(file("e.csv", still())).find("constant"), std::string::npos);
   EXPECT_NE(refusal(folder_ / "missing.csv").find("cannot read"), std::string::npos);
   EXPECT_NE(refusal(file("f.csv", rows("time_s,cart_m,none"))).find("voltage_v"), std::string::npos);

@@ -34,12 +34,13 @@ TEST(Correction, IsThereFromItsLeastCertaintyOn) {
 
 TEST(Correction, FollowsWhereOneThatIsAlikeIsSetBack) {
   // Alone each is 5 standard errors off; they go together, and the first is a little less certain.
-  ParameterBeliefs beliefs{Eigen::Vector2d(3.9, 5.0), Eigen::Vector2d::Zero(), Eigen::Matrix2d::Identity()};
-  beliefs.covariance(0, 1) = beliefs.covariance(1, 0) = -0.9;
-  EXPECT_EQ(certain_parameters(beliefs, {true, true}, policy), std::vector<std::size_t>{1});
+  ParameterPosterior posterior{Eigen::Vector2d(3.9, 5.0), Eigen::Vector2d::Zero(),
+                               Eigen::Matrix2d::Identity()};
+  posterior.covariance(0, 1) = posterior.covariance(1, 0) = -0.9;
+  EXPECT_EQ(certain_parameters(posterior, {true, true}, policy), std::vector<std::size_t>{1});
   // The other way round the second gives way as the first is set back.
-  beliefs.covariance(0, 1) = beliefs.covariance(1, 0) = 0.9;
-  EXPECT_EQ(certain_parameters(beliefs, {true, true}, policy), std::vector<std::size_t>{});
+  posterior.covariance(0, 1) = posterior.covariance(1, 0) = 0.9;
+  EXPECT_EQ(certain_parameters(posterior, {true, true}, policy), std::vector<std::size_t>{});
 }
 
 TEST(Correction, MustIncludeNothingOnAllRunsNoLonger) {
@@ -48,10 +49,10 @@ TEST(Correction, MustIncludeNothingOnAllRunsNoLonger) {
 }
 
 TEST(Correction, IsAsBelievedWithinWhatCoefficientsMove) {
-  const double sigma = 0.5, far = policy.within_belief * sigma;
-  EXPECT_TRUE(is_within_belief(below(far), 0.0, sigma, policy));
-  EXPECT_FALSE(is_within_belief(far, 0.0, sigma, policy));
-  EXPECT_FALSE(is_within_belief(-far, 0.0, sigma, policy));
+  const double sigma = 0.5, far = policy.within_prior * sigma;
+  EXPECT_TRUE(is_within_prior(below(far), 0.0, sigma, policy));
+  EXPECT_FALSE(is_within_prior(far, 0.0, sigma, policy));
+  EXPECT_FALSE(is_within_prior(-far, 0.0, sigma, policy));
 }
 
 TEST(Scale, IsAtAnEndOfItsRangeJustBeforeIt) {

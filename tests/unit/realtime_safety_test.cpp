@@ -54,6 +54,8 @@ class CountingRig final : public Rig {
   }
   RigFault write(double voltage_v) noexcept override { return rig_.write(voltage_v); }
   StopReport stop() noexcept override { return rig_.stop(); }
+  bool is_clock() const noexcept override { return rig_.is_clock(); }
+  DeviceSample wait_next(std::int64_t until_ns) noexcept override { return rig_.wait_next(until_ns); }
 
  private:
   Rig& rig_;
@@ -228,10 +230,10 @@ TEST(RealtimeSafety, TheComediRigAndARigOfPartsNeitherAllocateNorLock) {
   });
 }
 
-TEST(RealtimeSafety, TheQuanserRigNeitherAllocatesNorLocks) {
-  test::in_real_time([] {
+void expect_safe_on_card(const std::string& rig_text) {
+  test::in_real_time([&] {
     const test::Folder folder;
-    const test::CardProcess card(folder, test::fake_card_rig());
+    const test::CardProcess card(folder, rig_text);
     const RigFile file = read_rig(YamlMap::from_text(card.rig_text(), "rig.yaml"));
     const ControlConfig control = slow_gains();
     MonotonicClock clock;
@@ -240,6 +242,14 @@ TEST(RealtimeSafety, TheQuanserRigNeitherAllocatesNorLocks) {
     EXPECT_EQ(counted.allocations, 0);
     EXPECT_EQ(counted.locks, 0);
   });
+}
+
+TEST(RealtimeSafety, TheQuanserRigNeitherAllocatesNorLocks) {
+  expect_safe_on_card(test::fake_card_rig());
+}
+
+TEST(RealtimeSafety, TheQuanserRigOnTheCardsClockNeitherAllocatesNorLocks) {
+  expect_safe_on_card(test::on_the_cards_clock(test::fake_card_rig()));
 }
 
 // The guard itself must be able to fail.

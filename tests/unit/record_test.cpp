@@ -180,8 +180,8 @@ TEST(LinkCounts, CountByCauseWhatALinkDidWrong) {
       << "an emergency stop is no fault of the link";
   EXPECT_EQ(counts.longest, 3u);
   EXPECT_EQ(sentence_of(counts),
-            "3 late replies, 1 period without a connection, 1 wrong reply, at most 3 in a row; the link was "
-            "brought back 2 times");
+            "3 late replies, 1 period without a connection, 1 invalid reply, at most 3 in a row; the link "
+            "was re-established 2 times");
 }
 
 TEST(RunDirectory, NeverReusesAName) {

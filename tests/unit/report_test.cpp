@@ -10,6 +10,7 @@
 #include "../../src/report/row_thinner.hpp"
 #include "../../src/report/ticks.hpp"
 #include "report/html.hpp"
+#include "report/identification_report.hpp"
 #include "report/plot.hpp"
 #include "report/statistics.hpp"
 #include "upright/base/error.hpp"
@@ -305,6 +306,18 @@ TEST(Magnitude, IsOfTheFiniteValues) {
   for (const double value : {3.0, -4.0, std::numeric_limits<double>::quiet_NaN()}) magnitude.add(value);
   EXPECT_EQ(magnitude.largest(), 4.0);
   EXPECT_NEAR(magnitude.root_mean_square(), std::sqrt(12.5), 1e-12);
+}
+
+TEST(SteadyFriction, IsThatOfThePlantsEffects) {
+  Plant plant;
+  plant.set("coulomb_friction", {0.5});
+  plant.set("stribeck_friction", {0.2, 0.1, 2.0});
+  plant.set("viscous_friction", {3.0});
+  plant.set("quadratic_drag", {4.0});
+  plant.set("constant_force", {0.05});
+  const double level_n = 0.5 + 0.2 * std::exp(-4.0);
+  EXPECT_NEAR(steady_friction_n(plant, 0.2), level_n + 3.0 * 0.2 + 4.0 * 0.04 - 0.05, 1e-12);
+  EXPECT_NEAR(steady_friction_n(plant, -0.2), -level_n - 3.0 * 0.2 - 4.0 * 0.04 - 0.05, 1e-12);
 }
 
 TEST(Histogram, CountsEveryValueAsOftenAsItCame) {

@@ -25,8 +25,8 @@ std::string what_is_left_of(const blind::Rig& rig) {
     runs.push_back(measure(rig, plan, "run"));
   }
   const FitData data{&runs, cut_segments(runs)};
-  const FitPoint start{cart(), guess_starts(runs, data.segments, cart()), {.force = 0.1}};
-  return examine_residuals(data, fit(data, start, {}).point, {}).goes_with;
+  const FitPoint start{cart(), estimate_initial_states(runs, data.segments, cart()), {.force = 0.1}};
+  return examine_residuals(data, fit(data, start, {}).point, {}).depends_on;
 }
 
 std::string with_compliance(double compliance_m_per_n) {

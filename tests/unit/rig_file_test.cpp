@@ -118,6 +118,15 @@ TEST(RigFile, AQuanserPutsOutNoMoreThanItsRange) {
             0.05);
 }
 
+TEST(RigFile, AQuansersCardMayBeTheClock) {
+  EXPECT_FALSE(quanser_with("q2_usb", "q2_usb").quanser->is_clock);
+  EXPECT_FALSE(quanser_with("q2_usb", "q2_usb\n  clock: computer").quanser->is_clock);
+  const RigFile rig = quanser_with("q2_usb", "q2_usb\n  clock: card");
+  EXPECT_TRUE(rig.quanser->is_clock);
+  EXPECT_TRUE(read_rig(YamlMap::from_text(rig_text(rig), "again.yaml")).quanser->is_clock);
+  EXPECT_THROW(quanser_with("q2_usb", "q2_usb\n  clock: device"), ConfigError);
+}
+
 TEST(RigFile, AQuansersLibraryIsANameOrAPathBesideTheRigFile) {
   EXPECT_EQ(quanser_with("libhil.so ", "../lib/libhil.so ").quanser->library, "/lib/libhil.so");
   const RigFile rig = quanser_with("libhil.so ", "./libhil.so ");
@@ -195,7 +204,7 @@ TEST(RigFile, RefusesPartsThatDoNotFit) {
     const char* says;
   };
   const Case cases[] = {
-      {"{encoders: simulated, output: comedi}", output_and_cart, "use simulated for all of it or for none"},
+      {"{encoders: simulated, output: comedi}", output_and_cart, "use simulated for all parts or for none"},
       {"{cart_encoder: simulated, pendulum_encoder: simulated, output: comedi}", output_and_cart, "for none"},
       {"{cart_encoder: comedi, output: comedi}", output_and_cart, "add pendulum_encoder"},
       {"{encoders: comedi, cart_encoder: comedi, pendulum_encoder: gpio, output: comedi}", output_and_cart,
@@ -234,21 +243,21 @@ TEST(RigFile, RefusesWhatComediCannotMean) {
       {"plain_counter, subdevice: 3, channel: 1",
        "plain_counter, subdevice: 3, channel: 1, lines: {a: 1, b: 2}", "lines"},
       {"plain_counter, subdevice: 3, channel: 1", "counter, subdevice: 3, channel: 1, lines: {a: 1, b: 1}",
-       "give A and B a line each"},
+       "use a different line for each"},
       {"plain_counter, subdevice: 3, channel: 1", "counter, subdevice: 3, channel: 1, lines: {a: 1, b: 16}",
        "0 to 15"},
       {"plain_counter, subdevice: 3, channel: 1",
-       "plain_counter, device: /dev/comedi1, subdevice: 0, channel: 2", "its own channel"},
+       "plain_counter, device: /dev/comedi1, subdevice: 0, channel: 2", "a different channel for each"},
       {"range_v: [-10, 10]", "range_v: [10, -10]", "lower and the upper end"},
       {"range_v: [-10, 10]", "range_v: 10", "range_v"},
-      {"range_v: [-10, 10]", "range_v: [0, 10]", "range of both signs"},
+      {"range_v: [-10, 10]", "range_v: [0, 10]", "does not contain zero volts"},
       {"range_v: [-10, 10]", "range_v: [-10, .inf]", "range_v"},
-      {"range_v: [-10, 10]", "range_v: [-5, 10]", "amplifier.limit_v at most 5"},
+      {"range_v: [-10, 10]", "range_v: [-5, 10]", "amplifier.limit_v to at most 5"},
       {"amplifier_gain: 1", "amplifier_gain: 0", "amplifier_gain"},
       {"amplifier_gain: 1", "gain: 1", "add amplifier_gain"},
       {"reference: difference", "reference: differential", "reference"},
       {"counts_per_v: 1000", "counts_per_v: .nan", "counts_per_v"},
-      {"counts_per_v: 1000", "counts_per_v: 2e6", "counts_per_v at most 1677721"},
+      {"counts_per_v: 1000", "counts_per_v: 2e6", "counts_per_v to at most 1677721"},
       {"counts_per_v: 1000", "counts_per_v: 1000, counts: 3", "remove it"},
   };
   for (const Malformed& item : cases) {
@@ -298,12 +307,12 @@ TEST(RigFile, RefusesWhatCannotBeMeant) {
   const Malformed cases[] = {
       {"backend: modbus-tcp", "backend: modbus", "did you mean modbus-"},
       {"backend: modbus-tcp", "backend: {encoders: modbus-tcp}", "add output"},
-      {"backend: modbus-tcp", "backend: {encoders: modbus-tcp, output: modbus-rtu}", "use one of"},
+      {"backend: modbus-tcp", "backend: {encoders: modbus-tcp, output: modbus-rtu}", "use either"},
       {"backend: modbus-tcp", "backend: modbus-rtu", "add device"},
       {"m_per_count: 2.27485e-5", "m_per_count: .nan", "is not finite"},
       {"m_per_count: 2.27485e-5", "m_per_count: 0", "m_per_count"},
       {"m_per_count", "m_per_counts", "add m_per_count"},
-      {"sign: 1", "sign: 0", "give sign 1 or -1"},
+      {"sign: 1", "sign: 0", "use 1 or -1"},
       {"sign: 1", "sign: 2", "sign"},
       {"width_bits: 32", "width_bits: 33", "8 to 32"},
       {"width_bits: 32", "width_bits: 7", "8 to 32"},
@@ -325,7 +334,7 @@ TEST(RigFile, RefusesWhatCannotBeMeant) {
       {"watchdog_s: 0.1", "watchdog_s: 0.0005", "response_timeout_s"},
       {"port: 1502", "port: 0", "port"},
       {"port: 1502", "port: 70000", "port"},
-      {"host: 127.0.0.1", "host: [127, 0, 0, 1]", "is not a text"},
+      {"host: 127.0.0.1", "host: [127, 0, 0, 1]", "is not text"},
       {"unit: 1", "unit: 256", "unit"},
       {"response_timeout_s: 0.0008", "response_timeout_s: 5", "response_timeout_s"},
       {"exchange: read_write", "exchange: readwrite", "did you mean read_write"},
@@ -336,7 +345,7 @@ TEST(RigFile, RefusesWhatCannotBeMeant) {
       {"pendulum_address: 2", "pendulum_address: 1", "shares a register"},
       {"pendulum_address: 2", "pendulum_address: 200", "125 registers"},
       {"pendulum_address: 2", "pendulum_address: 65535", "beyond register 65535"},
-      {"registers: 2", "registers: 1", "width_bits 16"},
+      {"registers: 2", "registers: 1", "width_bits to 16"},
       {"registers: 2", "registers: 3", "registers"},
       {"word_order: high_first", "word_order: big", "high_first"},
       {"boot_count_address: 4", "boot_count_address: 3", "shares a register"},
@@ -351,7 +360,7 @@ TEST(RigFile, RefusesWhatCannotBeMeant) {
       {"time_s: 0.1, seconds", "time_s: 0, seconds", "time_s"},
       {"seconds_per_count: 0.001", "second_per_count: 0.001", "seconds_per_count"},
       {"modbus:\n", "modbus:\n  hots: x\n", "did you mean host"},
-      {"watchdog_s: 0.1", "watchdog_s: 0.1\nwatchdog_s: 0.2", "stands twice"},
+      {"watchdog_s: 0.1", "watchdog_s: 0.1\nwatchdog_s: 0.2", "appears twice"},
       {"modbus:\n", "modbuss:\n", "add modbus"},
   };
   for (const Malformed& item : cases) {
@@ -395,12 +404,12 @@ TEST(RigFile, RandomLinesReadBackExactly) {
 
 TEST(RigFile, RefusesLinesThatCannotBeMeant) {
   const Malformed cases[] = {
-      {"chip: gpiochip0", "chip: \"\"", "give chip a text"},
+      {"chip: gpiochip0", "chip: \"\"", "set chip to text"},
       {"  chip: gpiochip0", "  chipp: gpiochip0", "did you mean chip"},
       {"line: 4", "line: -1", "line"},
-      {"line: 4", "line: 5", "each its own line"},
-      {"a: 22", "a: 23", "each its own line"},
-      {"a: 22", "a: 18", "each its own line"},
+      {"line: 4", "line: 5", "different line for each"},
+      {"a: 22", "a: 23", "different line for each"},
+      {"a: 22", "a: 18", "different line for each"},
       {"line: 4, active: high", "line: 4", "add active"},
       {"line: 4, active: high", "line: 4, active: closed", "one of"},
       {"active: high, bias: pull_up", "active: high, bias: up", "pull_up"},
@@ -422,7 +431,7 @@ TEST(RigFile, RefusesLinesThatCannotBeMeant) {
     EXPECT_NE(sentence.find("rig.yaml:"), std::string::npos) << sentence;
   }
   const std::string none = text_of(rigs / "simulated.yaml") + "gpio: {chip: gpiochip0}\n";
-  EXPECT_NE(refusal(none).find("name a line"), std::string::npos) << refusal(none);
+  EXPECT_NE(refusal(none).find("add a line"), std::string::npos) << refusal(none);
   const std::string unused =
       text_of(rigs / "simulated.yaml") +
       "gpio: {chip: gpiochip0, pendulum_encoder: {a: 1, b: 2, fastest_edges_per_s: 5000}}\n";

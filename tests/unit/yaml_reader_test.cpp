@@ -59,7 +59,7 @@ TEST(YamlReader, RefusesDoubledKeysBrokenYamlAndDeepNesting) {
 
 TEST(YamlReader, RefusesASecondDocumentAndEndlessDocuments) {
   EXPECT_EQ(message_of([] { YamlMap::from_text("a: 1\n---\nb: 2\n", "f.yaml"); }),
-            "f.yaml:2: a second document begins here: keep one YAML document");
+            "f.yaml:2: a second document begins here: keep only one YAML document");
   EXPECT_THROW(YamlMap::from_text("a:\n   , - b'\n", "f.yaml"), ConfigError);
 }
 

@@ -1,4 +1,4 @@
-// The one exception type of set-up code. Nothing in the control loop throws.
+// The exceptions that set-up code throws. The control loop throws none.
 #pragma once
 
 #include <stdexcept>
@@ -10,11 +10,11 @@ namespace upright {
 enum class ExitCode : int {
   done = 0,
   usage = 2,    ///< usage or configuration error: nothing moved
-  stopped = 3,  ///< the run ended by a safety stop, or the pendulum fell; its data are kept
+  stopped = 3,  ///< the run ended by a safety stop, or the pendulum fell; the data are kept
   device = 4,   ///< link or device error
 };
 
-/// One plain sentence, the cause first and then the remedy, and the exit code the command ends with.
+/// One sentence (cause first, then the remedy), and the exit code with which the command ends.
 class Error : public std::runtime_error {
  public:
   Error(ExitCode code, const std::string& sentence) : std::runtime_error(sentence), code_(code) {}
@@ -24,7 +24,7 @@ class Error : public std::runtime_error {
   ExitCode code_;
 };
 
-/// A file, a flag or a value the user gave is wrong (exit code 2).
+/// A file, an option or a value given by the user is wrong (exit code 2).
 class ConfigError : public Error {
  public:
   explicit ConfigError(const std::string& sentence) : Error(ExitCode::usage, sentence) {}

@@ -1,4 +1,4 @@
-// How work that takes long says how far it is.
+// Progress reports of long computations.
 #pragma once
 
 #include <functional>
@@ -6,8 +6,8 @@
 
 namespace upright {
 
-/// Called with the share of the work that is done (0 to 1; NaN: not known) and what is being done. It may be
-/// called by any thread, one at a time, and must not hold up the caller. Empty: nobody listens.
+/// Receives the completed share of the work (0 to 1; NaN: unknown) and the current activity. Calls may
+/// come from any thread, one at a time. The function must return quickly. Empty: no reports.
 using ProgressCallback = std::function<void(double share, const std::string& what)>;
 
 }  // namespace upright

@@ -1,6 +1,6 @@
-// Strict reading of YAML maps: every key is asked for by name with its type and range; whatever is missing,
-// unknown, doubled, of the wrong type, not finite or out of range is a ConfigError that gives remedy, file,
-// line and key.
+// Strict reading of YAML maps. Each key is requested by name with its type and range. A key that is
+// missing, unknown, duplicated, of the wrong type, not finite or out of range causes a ConfigError with
+// remedy, file, line and key.
 #pragma once
 
 #include <cstdint>
@@ -14,11 +14,11 @@
 
 namespace upright {
 
-/// The closed or half-open interval a number must lie in.
+/// The interval in which a number must lie, closed or half-open.
 struct Range {
   double low = -std::numeric_limits<double>::infinity();
   double high = std::numeric_limits<double>::infinity();
-  bool low_open = false;  ///< the low end itself is refused
+  bool low_open = false;  ///< the lower end is excluded
 
   static constexpr Range any() { return {}; }
   static constexpr Range positive() { return {0.0, std::numeric_limits<double>::infinity(), true}; }
@@ -31,18 +31,18 @@ struct Range {
   std::string text() const;
 };
 
-/// The name among `known` nearest to `word` by edit distance; empty when none is near enough to be meant.
+/// The name in `known` with the smallest edit distance to `word`; empty when none is close enough.
 std::string nearest_name(std::string_view word, const std::vector<std::string>& known);
 
-/// A number as text that reads back to the same bits (shortest form).
+/// A number in the shortest decimal form that reads back to the same bits.
 std::string exact_text(double value);
 
-/// One YAML map being read. Cheap to copy; copies share the record of which keys were asked for.
+/// One YAML map that is being read. Copies are cheap and share the record of requested keys.
 class YamlMap {
  public:
-  /// Reads a whole file, whose top level must be a map. Files over 16 MiB are refused.
+  /// Reads a file whose top level is a map. Throws ConfigError for files larger than 16 MiB.
   static YamlMap from_file(const std::filesystem::path& file);
-  /// The same from text; `file` is the name that errors show.
+  /// Reads a text in the same way. Errors show `file` as its name.
   static YamlMap from_text(const std::string& text, const std::filesystem::path& file);
 
   bool has(const std::string& key) const;
@@ -55,26 +55,26 @@ class YamlMap {
   bool flag_or(const std::string& key, bool fallback) const;
   std::string text(const std::string& key) const;
   std::string text_or(const std::string& key, const std::string& fallback) const;
-  /// A text that must be one of `names`; the error lists them and points at the nearest.
+  /// A text that must be one of `names`. The error lists them and suggests the nearest.
   std::string choice(const std::string& key, const std::vector<std::string>& names) const;
   std::vector<double> numbers(const std::string& key, const Range& range = {}) const;
   YamlMap map(const std::string& key) const;
   std::optional<YamlMap> optional_map(const std::string& key) const;
   std::vector<YamlMap> maps(const std::string& key) const;
-  /// True when the key is there and holds a plain value, a map or a list.
+  /// True when the key exists and its value is a scalar, a map or a list, respectively.
   bool is_scalar(const std::string& key) const;
   bool is_map(const std::string& key) const;
   bool is_list(const std::string& key) const;
   std::vector<std::string> keys() const;
 
-  /// Refuses every key that was never asked for. Call it when the map is read.
+  /// Refuses all keys that were not requested. Call it after the last request.
   void finish() const;
 
   /// Throws the error for `key` of this map: "remedy: file:line: path.key problem".
   [[noreturn]] void fail(const std::string& key, const std::string& problem, const std::string& remedy) const;
 
   const std::filesystem::path& file() const;
-  /// A path given in this file, relative to the folder the file is in.
+  /// A path from this file; a relative path is resolved against the folder of the file.
   std::filesystem::path path(const std::string& key) const;
 
  private:
@@ -83,7 +83,7 @@ class YamlMap {
   std::shared_ptr<Node> node_;
 };
 
-/// A text in single quotes, as a YAML scalar that reads back the same. Control characters become spaces.
+/// A text as a single-quoted YAML scalar that reads back unchanged. Control characters become spaces.
 std::string yaml_quoted(const std::string& text);
 
 }  // namespace upright

@@ -1,5 +1,5 @@
-// What the control step is asked to do in a period: balance about a set-point, or put out a voltage. `run`
-// has none and always balances; an experiment's script is one.
+// The demand on the control step in one period: feedback about a set-point, or a given voltage. `run` has
+// no command source and always balances. The script of an experiment is a command source.
 #pragma once
 
 #include <cstdint>
@@ -9,17 +9,17 @@
 namespace upright {
 
 struct Demand {
-  bool feedback = true;        ///< state feedback about the reference; false: `voltage_v` as it is
-  double reference_m = 0.0;    ///< set-point of the cart
-  double reference_rad = 0.0;  ///< whole turns at which the pendulum is upright
+  bool feedback = true;        ///< state feedback about the reference; false: `voltage_v` is applied directly
+  double reference_m = 0.0;    ///< set-point of the cart [m]
+  double reference_rad = 0.0;  ///< the upright angle about which feedback acts: a multiple of 2 pi [rad]
   double voltage_v = 0.0;
-  bool homing = false;     ///< on its way to where it starts: the cart may begin beyond the track limit
-  bool over = false;       ///< there is nothing more to do: the run is complete with this period
-  bool timed_out = false;  ///< what was waited for did not come: the run stops
+  bool homing = false;     ///< moving to the start position: the cart may begin beyond the track limit
+  bool over = false;       ///< nothing more to do: the run is complete with this period
+  bool timed_out = false;  ///< an awaited condition did not occur in time: the run stops
 };
 
-/// Called once per computed period, in the loop: no allocation, no lock, no exception. The same inputs give
-/// the same demands, bit for bit, so that a log replays.
+/// Called once per computed period, in the loop: no allocation, no lock, no exception. Equal inputs give
+/// bit-identical demands, so that a log can be replayed.
 class CommandSource {
  public:
   virtual ~CommandSource() = default;

@@ -1,6 +1,6 @@
-// The one control step, shared by run, replay, sweep and experiment: state estimates, delay, state
-// feedback and limiter as a pure function of counts-in-SI and what came before. Allocates at construction
-// only.
+// The control step shared by run, replay, sweep and experiment: state estimation, delay, state feedback
+// and limiter. The output is a deterministic function of the present sample and the earlier ones. Memory
+// is allocated at construction only.
 #pragma once
 
 #include <cstdint>
@@ -16,41 +16,41 @@
 
 namespace upright {
 
-/// One sample, already scaled and unwrapped.
+/// One sample in SI units, unwrapped.
 struct ControlInput {
-  std::uint64_t tick = 0;  ///< period number; grows. A gap means periods without a sample.
+  std::uint64_t tick = 0;  ///< period number; increasing. A gap means periods without a sample.
   double cart_m = 0.0;
   double theta_rad = 0.0;
-  double reference_m = 0.0;  ///< set-point of the cart position
+  double reference_m = 0.0;  ///< set-point of the cart position [m]
 };
 
 struct ControlOutput {
-  ControlState state;  ///< what was measured and estimated now
+  ControlState state;  ///< measured positions and estimated velocities
   double voltage_requested_v = 0.0;
   double voltage_v = 0.0;  ///< after the limiter; zero when the request was not finite
   bool saturated = false;
   bool finite = true;
-  Demand demand;          ///< what was asked for
-  double lean_rad = 0.0;  ///< theta from the upright pose that is balanced about
+  Demand demand;          ///< the demand of the command source
+  double lean_rad = 0.0;  ///< theta relative to the upright angle about which feedback acts [rad]
 };
 
 class Controller {
  public:
-  /// `amplifier_limit_v`: the limiter's. `parts`: those that the configuration asks for (`make_model_parts`).
-  /// Throws ConfigError when the configuration cannot be run, or a part of it is missing.
+  /// `amplifier_limit_v`: limit of the voltage. `parts`: those that the configuration requires
+  /// (`make_model_parts`). Throws ConfigError when the configuration is invalid or a part is missing.
   Controller(const ControlConfig& config, double amplifier_limit_v, ModelParts parts = {});
 
-  /// From now on `source` says what to do; null: balance about zero. It must outlive the controller.
+  /// From now on, demands come from `source`; null: balance about zero. It must outlive the controller.
   void follow(CommandSource* source) noexcept { source_ = source; }
   bool is_scripted() const noexcept { return source_ != nullptr; }
 
-  /// Forgets what came before: the next step begins from rest there.
+  /// Discards all history: the next step starts from rest at its sample.
   void reset() noexcept { started_ = false; }
 
-  /// The voltage for a sample. Samples missing since the last step are predicted by a state estimator;
-  /// without one they are taken as lying on the straight line between the two that are there. So estimates
-  /// and delay keep their time; at most `most_missing_periods` of them, beyond which the controller begins
-  /// anew from rest.
+  /// The voltage for a sample. A state estimator predicts through samples that are missing since the
+  /// last step. Without one they are interpolated linearly between the samples on both sides. At most
+  /// `most_missing_periods` are bridged in this way; after a longer gap the controller restarts from
+  /// rest.
   ControlOutput step(const ControlInput& input) noexcept;
 
   const ControlConfig& config() const { return config_; }

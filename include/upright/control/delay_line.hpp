@@ -1,4 +1,4 @@
-// A delay of whole or fractional periods over a ring buffer that is allocated once.
+// A delay of a whole or fractional number of periods, as a ring buffer that is allocated once.
 #pragma once
 
 #include <cstddef>
@@ -9,27 +9,27 @@
 
 namespace upright {
 
-/// Remembers one state per period and gives back the state `delay_s` ago: exact to the sample when the delay
-/// is a multiple of the period, linear between the two samples around it otherwise (`exact` says which).
-/// Before there are data, the first state is held, which is the constant history of the paper's equation
-/// (15).
+/// Stores one state per period and returns the state `delay_s` ago: exactly when the delay is a multiple
+/// of the period, otherwise by linear interpolation between the two neighbouring samples (`exact` tells
+/// which). Before the first sample, the first state is held: the constant history of equation (15) of the
+/// paper.
 class DelayLine {
  public:
-  /// A delay within 1e-9 periods of a whole number counts as that number (0.003 s at 1 kHz is 3 samples
-  /// although neither is a binary fraction). Throws ConfigError when the delay or the period is not usable.
+  /// A delay within 1e-9 periods of a whole number counts as that number (0.003 s at 1 kHz is 3 samples,
+  /// although neither is a binary fraction). Throws ConfigError when the delay or the period is invalid.
   DelayLine(double delay_s, double period_s);
 
   double delay_s() const { return delay_s_; }
   bool exact() const { return fraction_ == 0.0; }
-  /// Whole periods of the delay, and the rest as a fraction of a period.
+  /// The whole periods of the delay, and the remainder as a fraction of a period.
   std::size_t whole_periods() const { return whole_; }
   double fraction() const { return fraction_; }
 
-  /// Forgets everything and takes `state` as the history.
+  /// Discards the history and fills it with `state`.
   void start(const ControlState& state) noexcept;
-  /// Takes the state of the next period.
+  /// Appends the state of the next period.
   void push(const ControlState& state) noexcept;
-  /// The state `delay_s` before the one pushed last.
+  /// The state `delay_s` before the one appended last.
   ControlState delayed() const noexcept;
 
   static constexpr double longest_delay_s = 10.0;

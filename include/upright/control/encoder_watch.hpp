@@ -1,14 +1,14 @@
-// Notices an encoder that has stopped counting while the motor balances: its counts are fresh but no longer
-// true. A cable that came off looks like that, and so does an amplifier that is off or a cart that is
-// blocked. Pure, without allocation, bounded; one call per computed period.
+// Detects an encoder that has stopped counting while the loop balances: its counts are fresh but no
+// longer correct. Causes are a disconnected cable, a disabled amplifier or a blocked cart. One call per
+// computed period; deterministic, bounded work, no allocation.
 //
-// The cart: since its last count, carts at rest are moved by the voltages that were applied, one for each
-// corner of what is assumed about friction and lag. The encoder is stuck when every one of them has travelled
-// several counts, twice. A cart that rests because of its friction is thus never accused.
+// Cart: since its last count, models of a resting cart are driven by the applied voltages, one for each
+// corner of the assumed ranges of friction and lag. The encoder is stuck when all of them have travelled
+// several counts, twice. A cart that dry friction holds at rest is therefore not reported.
 //
-// The pendulum: while its angle is constant, the cart's acceleration is g tan(theta), a constant, but for
-// friction in the pivot and what hides within a count. The encoder is stuck when the cart leaves every
-// parabola by more than that.
+// Pendulum: while the angle is constant, the cart's acceleration is g tan(theta), a constant, up to the
+// friction in the pivot and the resolution of a count. The encoder is stuck when the cart's path deviates
+// from every parabola by more than that.
 #pragma once
 
 #include <array>
@@ -29,16 +29,16 @@ struct WatchedPeriod {
   double voltage_v = 0.0;  ///< applied from this period on
 };
 
-/// A cart at rest that the applied voltages move, with one friction and one lag. Motor and friction only: the
-/// upright pendulum's push on the cart is far below the uncertainty of the friction.
+/// A resting cart driven by the applied voltages, with one value of friction and one of lag. The force of
+/// the upright pendulum on the cart is neglected: it is far below the uncertainty of the friction.
 class DrivenCart {
  public:
   DrivenCart() = default;
   DrivenCart(const EncoderAssumptions& assumptions, double breakaway_v, double lag_s);
 
-  /// At rest again; the motor's force goes on.
+  /// Stops the cart; the motor's force continues.
   void rest() noexcept { velocity_mps_ = travel_m_ = 0.0; }
-  /// Moves on under `voltage_v`; returns the distance from where it rested.
+  /// Advances under `voltage_v`; returns the distance from the place of rest [m].
   double step(double voltage_v, double duration_s) noexcept;
 
  private:
@@ -46,13 +46,13 @@ class DrivenCart {
   double acting_v_ = 0.0, velocity_mps_ = 0.0, travel_m_ = 0.0;
 };
 
-/// The latest positions of the cart as means over short intervals, and how far they are from a parabola.
+/// The latest cart positions as means over short intervals, and their distance from a parabola.
 class CartPath {
  public:
   void clear() noexcept { count_ = filling_ = 0; }
   /// True when an interval was completed.
   bool add(double time_s, double cart_m) noexcept;
-  /// Root mean square distance from the best parabola [m]; 0 with fewer than `fewest` intervals.
+  /// Root mean square residual of the best parabola [m]; 0 with fewer than `fewest` intervals.
   double rms_from_parabola_m() const noexcept;
   double duration_s() const noexcept;
 
@@ -71,11 +71,11 @@ class CartPath {
 
 class EncoderWatch {
  public:
-  /// `m_per_count` and `rad_per_count`: what a count of either encoder means.
+  /// `m_per_count`, `rad_per_count`: resolution of the encoders.
   EncoderWatch(const EncoderAssumptions& assumptions, double m_per_count, double rad_per_count) noexcept;
 
   StuckEncoder step(const WatchedPeriod& period) noexcept;
-  /// Forgets what came before: for periods in which nothing balances.
+  /// Discards the history: for periods in which the loop does not balance.
   void reset() noexcept { started_ = false; }
   /// The first period in which that encoder did not count.
   std::uint64_t silent_since(StuckEncoder encoder) const noexcept {
@@ -83,13 +83,13 @@ class EncoderWatch {
   }
 
  private:
-  /// Since when an encoder has not counted.
+  /// The time since which an encoder has not counted.
   struct Silence {
     std::int64_t counts = 0;
     std::uint64_t since_tick = 0;
     double since_s = 0.0;
   };
-  /// One of the carts that may be there, and how often it has left its place unseen.
+  /// One of the cart models, and how often it has moved away without a count.
   struct Hypothesis {
     DrivenCart cart;
     int departures = 0;
@@ -103,7 +103,7 @@ class EncoderWatch {
   std::array<Hypothesis, 9> hypotheses_;
   CartPath path_;
   Silence cart_, pendulum_;
-  double moved_since_s_ = 0.0;  ///< since when every hypothesis has moved
+  double moved_since_s_ = 0.0;  ///< the time since which all hypotheses have moved
   bool every_moved_ = false;
   double last_s_ = 0.0, last_v_ = 0.0;
   bool started_ = false;

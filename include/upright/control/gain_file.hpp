@@ -1,4 +1,4 @@
-// Gain files (interface: "Gain file"): read strictly, written so that they read back exactly.
+// Gain files (docs/reference/files.md): read strictly; written files read back exactly.
 #pragma once
 
 #include <filesystem>
@@ -21,52 +21,52 @@ struct Gains {
 
 enum class CompensationKind : std::uint8_t { none, predictor };
 
-/// How the configured delay is made up for.
+/// Compensation of the configured delay.
 struct DelayCompensation {
   CompensationKind kind = CompensationKind::none;
   std::filesystem::path
-      plant;  ///< predictor only: the model it predicts with, resolved against the gain file
+      plant;  ///< predictor only: the plant file of its model, resolved against the gain file
 };
 
 enum class StateEstimatorKind : std::uint8_t {
   none,
   kalman,           ///< predicts with the plant file while the cart slides; friction is an unknown force
-  extended_kalman,  ///< predicts with the plant file as it is, its dry friction and every other effect
+  extended_kalman,  ///< predicts with the complete plant file, including dry friction and all effects
 };
 
-/// A Kalman filter in place of the velocity estimator. What is left out has a default that follows from the
-/// plant (`process_noise_of`) or from the rig's encoders (`with_encoders`).
+/// A Kalman filter in place of the velocity estimator. Values that are absent have defaults that follow
+/// from the plant (`process_noise_of`) or from the rig's encoders (`with_encoders`).
 struct StateEstimatorConfig {
   StateEstimatorKind kind = StateEstimatorKind::none;
-  std::filesystem::path plant;  ///< its model, resolved against the gain file
-  /// How fast the force on the cart that the model lacks may change: a random walk. The one number to tune:
-  /// more follows friction quicker, and bears less delay of the actuator that the model does not know. 0: no
+  std::filesystem::path plant;  ///< plant file of the model, resolved against the gain file
+  /// Intensity of the random walk that models the unknown force on the cart: the main tuning parameter. A
+  /// larger value follows friction faster, and tolerates less unmodelled delay of the actuator. 0: no
   /// such force.
   std::optional<double> cart_force_noise_n2_per_s;
-  /// The same of the angle's zero; 0: the zero is as calibrated.
+  /// Intensity of the random walk of the angle's zero; 0: the zero is as calibrated.
   std::optional<double> angle_zero_noise_rad2_per_s;
-  std::optional<double> cart_noise_m2_per_s3;        ///< white acceleration of the cart
-  std::optional<double> pendulum_noise_rad2_per_s3;  ///< white acceleration of the pendulum
-  std::optional<double> cart_resolution_m;           ///< step of the cart's encoder
-  std::optional<double> angle_resolution_rad;        ///< step of the pendulum's encoder
+  std::optional<double> cart_noise_m2_per_s3;        ///< white acceleration noise of the cart
+  std::optional<double> pendulum_noise_rad2_per_s3;  ///< white acceleration noise of the pendulum
+  std::optional<double> cart_resolution_m;           ///< resolution of the cart's encoder
+  std::optional<double> angle_resolution_rad;        ///< resolution of the pendulum's encoder
 };
 
-/// Share of the estimated force on the cart that the voltage takes away, 0 to 1.
+/// Share of the estimated disturbance force on the cart that the voltage cancels, 0 to 1.
 struct DisturbanceRejection {
   double share = 1.0;
-  /// A predictor lets the force fade with this time constant; 0: it stays as it is.
+  /// Time constant with which a predictor lets the force decay; 0: it stays constant.
   double decay_s = 0.0;
 };
 
-/// Share of the dry friction in an extended Kalman filter's plant file that the voltage takes away, 0 to 1.
+/// Share of the dry friction in an extended Kalman filter's plant file that the voltage cancels, 0 to 1.
 struct FrictionCompensation {
   double share = 1.0;
-  /// First-order lag of it: about what a real actuator is later than its model. Quicker, and it would push
-  /// before the motor has let go of the last direction.
+  /// Time constant of a first-order lag of the compensation [s]: about the delay of a real actuator
+  /// beyond its model. A shorter lag would act before the motor has reversed its force.
   double lag_s = 0.005;
 };
 
-/// Everything a controller is made of: V(t) = gains . [x, theta, x', theta'](t - delay_s).
+/// The configuration of a controller: V(t) = gains . [x, theta, x', theta'](t - delay_s).
 struct ControlConfig {
   Gains gains;
   double delay_s = 0.0;
@@ -87,13 +87,13 @@ inline constexpr double highest_sample_rate_hz = 20000.0;
 /// Reads a gain file. Throws ConfigError with remedy, file, line and key.
 ControlConfig read_gain_file(const std::filesystem::path& file);
 
-/// Reads the same keys from a map that is already parsed, and refuses every other key in it.
+/// Reads the same keys from a parsed map, and refuses all other keys in it.
 ControlConfig read_gains(const YamlMap& document);
 
-/// The gain file as text. `comments` become lines at its top.
+/// The gain file as text, with `comments` as lines at its top.
 std::string gain_text(const ControlConfig& config, const std::vector<std::string>& comments = {});
 
-/// Writes the gain file; an existing file is replaced. Throws Error when it cannot be written.
+/// Writes the gain file and replaces an existing one. Throws Error when it cannot be written.
 void write_gain_file(const ControlConfig& config, const std::filesystem::path& file,
                      const std::vector<std::string>& comments = {});
 

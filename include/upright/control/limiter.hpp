@@ -1,4 +1,4 @@
-// The last thing between a computed voltage and the amplifier.
+// The limiter between the computed voltage and the amplifier.
 #pragma once
 
 #include <algorithm>
@@ -9,7 +9,7 @@ namespace upright {
 struct LimitedVoltage {
   double voltage_v = 0.0;
   bool saturated = false;
-  bool finite = true;  ///< false: the request was not a number, the voltage is zero
+  bool finite = true;  ///< false: the request was not finite, the voltage is zero
 };
 
 inline LimitedVoltage limit_voltage(double requested_v, double limit_v) noexcept {

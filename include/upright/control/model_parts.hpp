@@ -1,4 +1,4 @@
-// The parts of a controller that need a plant file, from the configuration that asks for them.
+// The model-based parts of a controller, made from the configuration that requires them.
 #pragma once
 
 #include "upright/control/gain_file.hpp"
@@ -9,8 +9,8 @@ namespace upright {
 
 /// Reads the plant files that the configuration names. Throws ConfigError.
 ModelParts make_model_parts(const ControlConfig& config);
-/// The same with the plants given: the estimator's and the predictor's; each is used only where it is asked
-/// for.
+/// The same with given plants for the estimator and the predictor; each plant is used only where the
+/// configuration requires it.
 ModelParts make_model_parts(const ControlConfig& config, const Plant& estimated, const Plant& predicted);
 
 }  // namespace upright

@@ -1,4 +1,4 @@
-// What turns counts and voltages into the state that is fed back, where a gain file asks for a model.
+// Model-based estimation of the state for feedback, where a gain file requires it.
 #pragma once
 
 #include <memory>
@@ -7,32 +7,32 @@
 
 namespace upright {
 
-/// Called in the loop: no allocation, no lock, no exception, bounded work. The same inputs give the same
-/// states, bit for bit.
+/// Called in the loop: no allocation, no lock, no exception, bounded work. Equal inputs give
+/// bit-identical states.
 class StateEstimator {
  public:
   virtual ~StateEstimator() = default;
-  /// Begins at rest where the sensors show the body.
+  /// Starts at rest at the measured position and angle.
   virtual void start(double cart_m, double theta_rad) noexcept = 0;
-  /// One period later: what the sensors show now. `applied_v`: the voltage commanded over the period that
-  /// just ended, after the amplifier's limit.
+  /// Advances by one period and updates with the sensors' present values. `applied_v`: the voltage
+  /// commanded over the period that just ended, after the amplifier's limit.
   virtual ControlState update(double cart_m, double theta_rad, double applied_v) noexcept = 0;
-  /// One period later, without a reading.
+  /// Advances by one period without a measurement.
   virtual ControlState predict(double applied_v) noexcept = 0;
-  /// The voltage that takes away the force that is known and estimated, at an estimate of `update`.
+  /// The voltage that cancels the known and the estimated force, given an estimate of `update`.
   virtual double rejecting_v(const ControlState& estimate) const noexcept = 0;
-  /// The command that leaves `wanted_v` behind a dead zone that its plant file has.
+  /// The command that yields `wanted_v` after the dead zone of the plant file.
   virtual double command_v(double wanted_v) const noexcept = 0;
 };
 
-/// Makes up for the delay: turns the delayed state into an estimate of the present one. Called once per
-/// period, in the loop: no allocation, no lock, no exception.
+/// Compensates the delay: estimates the present state from the delayed one. Called once per period, in
+/// the loop: no allocation, no lock, no exception.
 class DelayCompensator {
  public:
   virtual ~DelayCompensator() = default;
-  /// Begins from rest at `state`, which has held for ever.
+  /// Starts at rest at `state`, with that state as constant history.
   virtual void start(const ControlState& state) noexcept = 0;
-  /// `delayed`: the state one delay ago. `applied_v`: the voltage that was held over the period that just
+  /// `delayed`: the state one delay ago. `applied_v`: the voltage held over the period that just
   /// ended.
   virtual ControlState compensate(const ControlState& delayed, double applied_v) noexcept = 0;
 };

@@ -1,4 +1,4 @@
-// Velocities from sampled positions.
+// Estimation of velocities from sampled positions.
 #pragma once
 
 #include <cstdint>
@@ -16,35 +16,35 @@ struct EstimatorConfig {
   double damping = 0.9;     ///< zeta
 };
 
-/// One step of an estimator as numbers, for the loop and for engines that run many lanes:
+/// One step of an estimator in coefficients, for the loop and for engines with many lanes:
 ///   velocity' = p21 lag + p22 velocity + g2 dx
 ///   lag'      = p11 lag + p12 velocity + g1 dx
-/// with dx = x' - x, and lag = (filtered position - position). The backward difference is the same step with
-/// g2 = 1 / T and everything else zero.
+/// where dx = x' - x and lag = filtered position - position. The backward difference is the same step
+/// with g2 = 1 / T and all other coefficients zero.
 ///
-/// The filter is discretised ramp-invariantly (first-order hold): it is exact when the position moves
-/// linearly between samples, the right reading of an encoder on a body that cannot jump. A constant gives
-/// exactly zero and a ramp its exact slope once settled, at any sampling rate.
+/// The filter is discretised with a first-order hold (ramp invariance). It is exact when the position is
+/// linear between samples, the appropriate assumption for an encoder on a body with inertia. After the
+/// transient, a constant gives exactly zero and a ramp its exact slope, at any sampling rate.
 struct EstimatorStep {
   double p11 = 0.0, p12 = 0.0, p21 = 0.0, p22 = 0.0, g1 = 0.0, g2 = 0.0;
 };
 
-/// Throws ConfigError when the configuration cannot be run at this period.
+/// Throws ConfigError when the configuration is invalid for this period.
 EstimatorStep make_estimator_step(const EstimatorConfig& config, double period_s);
 
-/// Follows one coordinate.
+/// Estimates the velocity of one coordinate.
 class VelocityEstimator {
  public:
   explicit VelocityEstimator(const EstimatorStep& step) : step_(step) {}
 
-  /// At rest at `position`.
+  /// Starts at rest at `position`.
   void start(double position) noexcept {
     position_ = position;
     lag_ = 0.0;
     velocity_ = 0.0;
   }
 
-  /// Takes the position one period later and returns the velocity there.
+  /// Takes the position of the next period and returns the velocity there.
   double step(double position) noexcept {
     const double dx = position - position_;
     const double velocity = step_.p21 * lag_ + step_.p22 * velocity_ + step_.g2 * dx;

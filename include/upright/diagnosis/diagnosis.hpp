@@ -1,5 +1,5 @@
-// Where a plant file and measured runs disagree, which effect is missing, and how much smaller the gap is
-// with it.
+// Diagnosis of a plant file with measured runs: where they disagree, which effect is missing, and how
+// much it reduces the gap.
 #pragma once
 
 #include <atomic>
@@ -20,7 +20,7 @@ std::string kind_of(std::size_t effect);
 enum class Verdict { explained, no_discrepancy, unexplained, not_excited };
 std::string_view name_of(Verdict verdict);
 
-/// An effect the data ask for.
+/// An effect that the data require.
 struct FoundEffect {
   std::size_t effect = 0;
   double gap_before = 0.0, gap_after = 0.0;
@@ -32,25 +32,25 @@ struct FoundEffect {
 struct CandidateScore {
   std::size_t effect = 0;
   double gap_after = 0.0;
-  double evidence = 0.0;  ///< fall of minus twice the log likelihood, training runs
+  double evidence = 0.0;  ///< reduction of minus twice the log likelihood, training runs
 };
 
-/// One effect fitted in one round of the search, and why it was taken or not.
+/// The fit of one effect in one round of the search, and the decision on it.
 struct Trial {
   std::size_t round = 0;
   std::size_t effect = 0;
-  double evidence = 0.0;   ///< fall of minus twice the log likelihood, training runs
+  double evidence = 0.0;   ///< reduction of minus twice the log likelihood, training runs
   double held = 0.0;       ///< the same on held-out runs
-  double t_value = 0.0;    ///< of the fall per quarter of a second
-  double certainty = 0.0;  ///< standard errors of its size from nothing
-  Noise noise;             ///< as estimated with it
+  double t_value = 0.0;    ///< of the reduction per quarter of a second
+  double certainty = 0.0;  ///< distance of its size from zero effect [standard errors]
+  Noise noise;             ///< estimated together with the effect
   std::vector<ParameterEstimate> parameters;
-  std::string rule = "undecided";  ///< that decided: docs/reference/diagnosis-rules.md lists them
+  std::string rule = "undecided";  ///< the deciding rule, see docs/reference/diagnosis-rules.md
   bool taken = false;
 };
 
-/// The effects in the model after one step of the search: one added, exchanged or dropped. Values are of the
-/// training runs.
+/// The effects of the model after one step of the search (addition, exchange or removal of an effect).
+/// Values are those of the training runs.
 struct Step {
   struct Effect {
     std::size_t effect = 0;
@@ -62,60 +62,60 @@ struct Step {
 struct NextExperiment {
   std::string name;
   std::string description;
-  std::string file;       ///< of the experiment, for `upright experiment`
-  double distance = 0.0;  ///< smallest separation of the surviving explanations [noise standard deviations]
+  std::string file;       ///< the experiment file, for `upright experiment`
+  double distance = 0.0;  ///< smallest separation of the remaining explanations [noise standard deviations]
 };
 
 struct Diagnosis {
   Verdict verdict = Verdict::no_discrepancy;
-  /// A signal ended the search: what stands here is the best answer so far. Where it was not examined the
-  /// verdict is `unexplained`, and gaps that were not measured are not numbers.
+  /// A signal ended the search: the result is the best so far. If it was not examined, the verdict is
+  /// `unexplained`, and gaps that were not measured are NaN.
   bool interrupted = false;
-  /// The bound of the search ended it. What it had found until then was examined as usual, where that did not
-  /// reach a bound of its own.
+  /// The bound of the search ended it. The result so far was examined as usual, unless that reached a
+  /// bound of its own.
   bool bound_reached = false;
-  bool examined = true;  ///< what is left was examined: the verdict is one
+  bool examined = true;  ///< the residual was examined, so that the verdict is valid
   double gap_before = 0.0, gap_after = 0.0;
-  std::vector<FoundEffect> effects;        ///< in the order found
+  std::vector<FoundEffect> effects;        ///< in the order of discovery
   std::vector<CandidateScore> candidates;  ///< of the first round, best first
-  std::vector<Trial> trials;               ///< every whole fit of the search, in order
-  std::vector<Step> steps;                 ///< how the model grew
+  std::vector<Trial> trials;               ///< all complete fits of the search, in order
+  std::vector<Step> steps;                 ///< the model after each step
   std::optional<NextExperiment> next_experiment;
-  Plant model;  ///< the plant with the effects added
+  Plant model;  ///< the plant file with the effects added
   Noise noise;
   std::vector<std::string> notes;  ///< how the data were read and split
-  std::string residual;            ///< what the remaining residual looks like
+  std::string residual;            ///< description of the remaining residual
   std::vector<std::size_t> held_out_runs;
-  /// On held-out segments, with the plant file as given and with the model that was found.
+  /// On held-out segments, with the plant file as given and with the model found.
   std::vector<ResidualTrace> residual_before, residual_after;
 };
 
-/// Of the round that added an effect: how it did there, and the others that came near and are told apart from
-/// it, the best first, three at most. Points into the diagnosis.
+/// The round that added an effect: its trial, and at most three distinguishable effects with the next
+/// largest evidence, best first. Points into the diagnosis.
 struct NextBest {
   const Trial* taken = nullptr;
   std::vector<const Trial*> others;
 };
 
-/// Nothing of an effect that was added otherwise: in a pair, by an exchange, or as a correction.
+/// Empty for an effect that was added in a pair, by an exchange, or as a correction.
 NextBest next_best(const Diagnosis& diagnosis, const FoundEffect& effect);
 
-/// How often a search may follow each sample of the data at most, before the bound ends it. Searches on
-/// simulated rigs needed 150 to 750; on data in wrong units, of which nothing comes, 2000 and more.
+/// Default bound of a search, in evaluations of each sample. Searches on simulated rigs needed 150 to
+/// 750; on data in wrong units, which yield no result, 2000 and more.
 inline constexpr double default_search_bound = 10000.0;
 
 struct DiagnosisOptions {
-  /// Once it is not zero the search gives up, within some tenths of a second. Null: never.
+  /// A nonzero value interrupts the search within some tenths of a second. Null: no interruption.
   const std::atomic<int>* signal = nullptr;
   double search_bound = default_search_bound;
-  /// Told from time to time how far the work is (0 to 1) and what it does.
+  /// Called from time to time with the progress (0 to 1) and the current activity.
   std::function<void(double, const std::string&)> progress;
   void tell(double done, const std::string& what) const {
     if (progress) progress(done, what);
   }
 };
 
-/// Diagnoses. Throws ConfigError when the plant cannot be simulated or shares nothing with the runs.
+/// Throws ConfigError when the plant cannot be simulated or shares no measured quantity with the runs.
 Diagnosis diagnose(const Plant& plant, const std::vector<Measurement>& runs,
                    const DiagnosisOptions& options = {});
 

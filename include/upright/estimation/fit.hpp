@@ -1,12 +1,12 @@
 // Multiple-shooting fit of a plant to measured runs.
 //
-// Every run is cut into segments. Each is followed from its own initial state with the recorded voltages by
-// an extended Kalman filter through the event engine, whose noise is the encoders' quantisation, timing
-// jitter, and a white force and torque that stand for what no model explains; without force and torque it is
-// a plain simulation. The sum of squared innovations and log variances is minus twice the log likelihood.
-// Parameters and initial states follow by Gauss-Newton with exact derivatives (dual numbers through the event
-// engine); the initial states are eliminated (Schur complement), and the noise is estimated by maximum
-// likelihood in turn.
+// Each run is cut into segments. For each segment an extended Kalman filter with the event engine
+// processes the recorded voltages and measurements from its own initial state. Its noise: the encoders'
+// quantisation, timing jitter, and a white force and torque for unmodelled disturbances; without these it
+// is a free-run simulation. Minus twice the log likelihood is the sum of squared normalised innovations
+// and of the log variances. Gauss-Newton with exact derivatives (dual numbers) estimates parameters and
+// initial states; the latter are eliminated (Schur complement). The noise is estimated by maximum
+// likelihood in alternation.
 #pragma once
 
 #include <Eigen/Core>
@@ -22,23 +22,24 @@
 
 namespace upright {
 
-/// A parameter of an effect that the fit may move, and what is believed of it beforehand.
+/// A parameter of an effect that the fit may change, with its prior.
 struct FreeParameter {
   std::size_t effect = 0;
   std::size_t index = 0;
   double low = 0.0;
   double high = 0.0;
-  double scale = 1.0;  ///< its order of magnitude
+  double scale = 1.0;  ///< order of magnitude
   double prior_mean = 0.0;
-  double prior_sigma = 0.0;  ///< 0: nothing is believed
+  double prior_sigma = 0.0;  ///< standard deviation; 0: no prior
 };
 
-/// A state at the start of each segment, from the data alone.
-std::vector<PlantState<double>> guess_starts(const std::vector<Measurement>& runs,
-                                             const std::vector<Segment>& segments, const Plant& plant);
+/// Estimates the state at the start of each segment from the data alone (local parabolas).
+std::vector<PlantState<double>> estimate_initial_states(const std::vector<Measurement>& runs,
+                                                        const std::vector<Segment>& segments,
+                                                        const Plant& plant);
 
-/// Moves starts with the sensors, where one plant shows the same motion otherwise than another.
-void follow_sensors(std::vector<PlantState<double>>& starts, const Plant& from, const Plant& to);
+/// Converts initial states to a plant whose sensors show the same motion differently.
+void convert_initial_states(std::vector<PlantState<double>>& starts, const Plant& from, const Plant& to);
 
 struct FitPoint {
   Plant plant;
@@ -49,52 +50,53 @@ struct FitPoint {
 struct FitResult {
   FitPoint point;
   double objective = 0.0;  ///< minus twice the log of likelihood and priors
-  /// Of the objective in a further step, were residuals linear; nothing where a step must be cut short.
-  std::optional<double> promised_fall;
-  double bounded_fall = 0.0;               ///< the same of a step that is cut short where it must be
-  std::vector<double> segment_objective;   ///< the likelihood part, by segment
+  /// Predicted reduction by a further step, residuals being linear; absent where bounds cut it short.
+  std::optional<double> predicted_reduction;
+  double bounded_reduction = 0.0;          ///< the same for a step that is cut short at bounds
+  std::vector<double> segment_objective;   ///< likelihood part, by segment
   std::vector<double> block_objective;     ///< the same by blocks of a quarter of a second, in order
   std::vector<double> segment_chi_square;  ///< sum of squared whitened residuals, by segment
-  std::vector<double> segment_samples;     ///< how many numbers that sums, by their weight
-  Eigen::MatrixXd covariance;              ///< of the free parameters, robust to noise that is not white
-  Eigen::MatrixXd information;             ///< of the free parameters, initial states eliminated
+  std::vector<double> segment_samples;     ///< number of residuals in that sum, weighted
+  Eigen::MatrixXd covariance;   ///< of the free parameters, robust to coloured noise (sandwich estimator)
+  Eigen::MatrixXd information;  ///< of the free parameters, initial states eliminated
   bool converged = false;
-  double work_samples = 0.0;  ///< how many samples were followed, each as often as it was
+  double work_samples = 0.0;  ///< number of samples processed, counting repetitions
 };
 
-/// What is believed of all free parameters together: a Gaussian, in their order.
-struct Belief {
+/// A joint Gaussian prior of all free parameters, in their order.
+struct GaussianPrior {
   Eigen::VectorXd mean;
   Eigen::MatrixXd information;
 };
 
 struct FitOptions {
-  int most_iterations = 12;
-  int noise_rounds = 6;           ///< how often the noise is estimated anew at most; 0: as given
-  std::optional<Noise> or_noise;  ///< another place from which to search for the noise, if it is the better
-  bool noise_last = false;        ///< with no rounds: estimate the noise once, roughly, after the descent
-  std::optional<Belief> belief;   ///< in the place of what each free parameter says of itself
-  double tolerance = 1e-4;        ///< relative fall of the objective per sample at which to stop
+  int max_iterations = 12;
+  int noise_rounds = 6;                    ///< upper bound of noise estimations; 0: the noise is fixed
+  std::optional<Noise> alternative_noise;  ///< second starting point of the noise search, used where it gives
+                                           ///< the better result
+  bool noise_at_end = false;               ///< without rounds: one coarse noise estimation after the descent
+  std::optional<GaussianPrior> joint_prior;  ///< replaces the priors of the free parameters
+  double tolerance = 1e-4;                   ///< stop at this relative reduction of the objective per sample
 };
 
-/// Fits. A fit that fails returns an infinite objective. Throws only Interrupted (parallel.hpp), and
-/// BoundReached where the bound of the data was reached before it began; one that reaches it on its way ends
-/// where it is.
+/// Fits a plant. The objective of a failed fit is infinite. Throws only Interrupted (parallel.hpp), and
+/// BoundReached if the bound of the data was reached beforehand. A fit that reaches the bound returns its
+/// present point.
 FitResult fit(const FitData& data, const FitPoint& start, const std::vector<FreeParameter>& free,
               const FitOptions& options = {});
 
-/// Fits the initial states alone, with plant and noise held. Throws as `fit` does.
+/// Fits the initial states only, with fixed plant and noise. Throws as `fit` does.
 FitResult fit_initial_states(const FitData& data, const FitPoint& start,
-                             int most_iterations = FitOptions{}.most_iterations);
+                             int max_iterations = FitOptions{}.max_iterations);
 
-/// The point with its initial states fitted, for a first fit: what guessed ones leave is not noise. As it
-/// was where they cannot be.
+/// The point with fitted initial states, for a first fit, since errors of estimated ones are not noise.
+/// Unchanged where the fit fails.
 FitPoint with_fitted_initial_states(const FitData& data, FitPoint point);
 
-/// Linearised steps of every segment at a point, for residual analysis.
+/// The linearised steps of all segments at a point, for residual analysis.
 std::vector<std::vector<LinearStep>> linearise(const FitData& data, const FitPoint& point);
 
-/// Root mean square over all samples of the whitened residuals [noise standard deviations].
+/// Root mean square of the whitened residuals over all samples [noise standard deviations].
 double whitened_rms(const FitResult& result);
 
 }  // namespace upright

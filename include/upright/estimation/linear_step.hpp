@@ -1,4 +1,4 @@
-// A sample of a segment, linearised along the trajectory that the extended Kalman filter estimates.
+// One sample of a segment, linearised along the trajectory of the extended Kalman filter.
 #pragma once
 
 namespace upright {
@@ -6,17 +6,17 @@ namespace upright {
 /// State order: x, theta, v, omega, bristle. Channels: cart, pendulum.
 struct LinearStep {
   static constexpr int states = 5;
-  double transition[states][states];  ///< from the sample before, after its update; identity at the first
+  double transition[states][states];  ///< from the previous sample, after its update; identity at the first
   double by_force[2], by_torque[2];   ///< accelerations of cart and pendulum per unit force and torque
-  double residual[2];                 ///< measured minus predicted from the samples before
-  double innovation[2];               ///< the same, but predicted from the sample's earlier channel as well
-  double update[2][states];           ///< Kalman gain of each channel, taken in turn
+  double residual[2];                 ///< measured minus predicted from the previous samples
+  double innovation[2];               ///< the same, predicted from the sample's earlier channel as well
+  double update[2][states];           ///< Kalman gain of each channel, applied in sequence
   double correction[states];          ///< of the state, by the gains and innovations of both channels
   double variance[2];                 ///< of each innovation
-  double weight[2];                   ///< how much of a measurement each is
-  double gain[2];                     ///< d output / d state of the sensors
+  double weight[2];                   ///< weight of each measurement (see Measurement::cart_weight)
+  double gain[2];                     ///< derivative of the sensor's output with respect to its coordinate
   double rate[2];                     ///< velocities, for jitter
-  double holds[2];  ///< level [N, N m] at which cart and pendulum rest in the end; 0: they move
+  double holds[2];  ///< dry friction [N, N m] that holds cart and pendulum at the end; 0: they move
   double period_s;
 };
 

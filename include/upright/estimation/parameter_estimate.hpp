@@ -1,4 +1,4 @@
-// A parameter of an effect as the data have it.
+// An estimated parameter of an effect.
 #pragma once
 
 #include <string>
@@ -9,7 +9,7 @@ struct ParameterEstimate {
   std::string name;
   std::string unit;
   double value = 0.0;
-  double low = 0.0, high = 0.0;  ///< 95 percent interval
+  double low = 0.0, high = 0.0;  ///< 95 percent confidence interval
 };
 
 }  // namespace upright

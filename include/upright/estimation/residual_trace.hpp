@@ -1,4 +1,4 @@
-// What a plant leaves unexplained along a run.
+// The residual of a plant along a run.
 #pragma once
 
 #include <cstddef>
@@ -6,7 +6,7 @@
 
 namespace upright {
 
-/// Residual force and torque along a segment, smoothed, with what they are seen against.
+/// Smoothed residual force and torque along a segment, with the quantities on which they may depend.
 struct ResidualTrace {
   std::size_t run = 0;
   std::vector<double> time_s, force_n, torque_nm, cart_m, cart_mps, voltage_v;

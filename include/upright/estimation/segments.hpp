@@ -1,4 +1,4 @@
-// Measured runs cut into segments, for multiple shooting.
+// Segments of measured runs, for multiple shooting.
 #pragma once
 
 #include <cstddef>
@@ -16,15 +16,15 @@ struct Segment {
   std::size_t last = 0;
 };
 
-/// Cuts runs into segments: at gaps in the record, and so short that a small error does not grow out of
-/// proportion where the pendulum stands upright.
+/// Cuts runs into segments: at gaps in the record, and short enough that the instability of the upright
+/// pendulum does not amplify a small error excessively.
 std::vector<Segment> cut_segments(const std::vector<Measurement>& runs, double longest_s = 2.0);
 
-/// What a fit works on.
+/// The data of a fit.
 struct FitData {
   const std::vector<Measurement>* runs = nullptr;
   std::vector<Segment> segments;
-  WorkBound* bound = nullptr;  ///< of the search that the fit is a part of; null: none
+  WorkBound* bound = nullptr;  ///< of the search to which the fit belongs; null: none
 };
 
 }  // namespace upright

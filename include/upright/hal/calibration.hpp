@@ -1,4 +1,4 @@
-// From encoder counts to metres and radians, and from volts to what the amplifier may be given: the layer all
+// Conversion from encoder counts to metres and radians, and limitation of voltages: the layer that all
 // backends share. Nothing here allocates, locks or throws.
 #pragma once
 
@@ -8,23 +8,23 @@
 
 namespace upright {
 
-/// What the pendulum does when its counts are at zero.
+/// The pose of the pendulum at zero counts.
 enum class ZeroPose : std::uint8_t { upright, hanging };
 
-/// How one encoder counts.
+/// Calibration of one encoder.
 struct EncoderCalibration {
-  double per_count = 0.0;  ///< m or rad, positive
-  int sign = 1;            ///< +1 or -1: -1 where the device counts against the positive direction
-  int width_bits = 32;     ///< the counter wraps at 2^width_bits (8 to 32)
-  /// Faster than this (m/s or rad/s) the shaft cannot turn: counts that say so are not believed.
+  double per_count = 0.0;  ///< resolution: m or rad per count, positive
+  int sign = 1;            ///< +1 or -1; -1: the device counts against the positive direction
+  int width_bits = 32;     ///< width of the counter, which wraps at 2^width_bits (8 to 32)
+  /// Greatest possible speed of the shaft (m/s or rad/s): counts that imply more are rejected.
   double fastest_per_s = 0.0;
 };
 
-/// Both encoders and where their zero is.
+/// Calibration of both encoders and their zeros.
 struct Calibration {
   EncoderCalibration cart;
   EncoderCalibration pendulum;
-  /// True: the pose at the first reading is the zero. False: the counts below are.
+  /// True: the pose at the first reading is the zero. False: the counts below are the zero.
   bool zero_at_start = false;
   std::int64_t cart_zero_counts = 0;
   std::int64_t pendulum_zero_counts = 0;
@@ -33,31 +33,31 @@ struct Calibration {
   double zero_angle_rad() const { return zero_pose == ZeroPose::hanging ? std::numbers::pi : 0.0; }
 };
 
-/// The lowest `width_bits` bits of a count, read as a signed number: from -2^(w-1) to 2^(w-1) - 1.
+/// The lowest `width_bits` bits of a count as a two's complement number: -2^(w-1) to 2^(w-1) - 1.
 constexpr std::int64_t signed_counts(std::int64_t counts, int width_bits) noexcept {
   const int unused = 64 - width_bits;
   return static_cast<std::int64_t>(static_cast<std::uint64_t>(counts) << unused) >> unused;
 }
 
-/// How far a counter of so many bits moved, the short way round. What a damaged log may hold is more than a
-/// signed difference can.
+/// Signed difference of two readings of a counter, modulo its width. Computed without overflow, since a
+/// damaged log may hold any counts.
 constexpr std::int64_t counts_between(std::int64_t from, std::int64_t to, int width_bits) noexcept {
   const std::uint64_t moved = static_cast<std::uint64_t>(to) - static_cast<std::uint64_t>(from);
   return signed_counts(static_cast<std::int64_t>(moved), width_bits);
 }
 
-/// Follows a counter across its wraps. Right as long as the counter moves by less than half its range between
-/// two readings.
+/// Unwraps the counts of one counter. Correct as long as the counter moves by less than half its range
+/// between two readings.
 class Unwrapper {
  public:
   explicit constexpr Unwrapper(int width_bits = 32) noexcept : width_bits_(width_bits) {}
 
-  /// Starts at `counts`, measured from `zero` the short way round.
+  /// Starts at `counts`, relative to `zero` modulo the counter's range.
   constexpr void start(std::int64_t counts, std::int64_t zero) noexcept {
     last_ = counts;
     total_ = counts_between(zero, counts, width_bits_);
   }
-  /// Takes a new reading; returns the counts from zero, without wraps.
+  /// Takes a new reading; returns the unwrapped counts relative to zero.
   constexpr std::int64_t follow(std::int64_t counts) noexcept {
     total_ += counts_between(last_, counts, width_bits_);
     last_ = counts;
@@ -77,7 +77,7 @@ struct Pose {
   double theta_rad = 0.0;
 };
 
-/// Turns the device's counts into a pose. The first reading starts it.
+/// Converts the device's counts to a pose. The first reading initialises it.
 class PoseScaler {
  public:
   explicit PoseScaler(const Calibration& calibration = {}) noexcept
@@ -98,9 +98,9 @@ class PoseScaler {
     return pose();
   }
 
-  /// Counts whole turns away so that the angle lies within -pi and pi, and the motion goes on from there
-  /// without a jump. For the moment the loop starts: a pendulum zeroed while hanging may have been lifted
-  /// either way round.
+  /// Removes whole turns so that the angle lies between -pi and pi; later poses continue from there.
+  /// Called when the loop starts, since a pendulum that was zeroed while hanging may have been lifted
+  /// either way.
   Pose nearest_turn() noexcept {
     turns_ = 0.0;
     turns_ = std::round(pose().theta_rad / (2.0 * std::numbers::pi));
@@ -124,8 +124,8 @@ class PoseScaler {
   bool started_ = false;
 };
 
-/// The counts an encoder shows at a position: the nearest whole count, wrapped to the counter's width and
-/// read as signed. The inverse of `PoseScaler` where the zero is given by counts.
+/// The counts of an encoder at a position: rounded to the nearest count, wrapped to the counter's width,
+/// signed. The inverse of `PoseScaler` where the zero is given by counts.
 inline std::int64_t counts_at(double position, double zero_position, std::int64_t zero_counts,
                               const EncoderCalibration& encoder) noexcept {
   const double counts = std::nearbyint(encoder.sign * (position - zero_position) / encoder.per_count);
@@ -137,22 +137,22 @@ struct EncoderCounts {
   std::int64_t pendulum = 0;
 };
 
-/// Both encoders' counts at a pose. Where the zero is taken at the start, counts are zero at x = 0 and at the
-/// pose the zero names.
+/// The counts of both encoders at a pose. If the zero is taken at the start, counts are zero at x = 0 and
+/// at the angle of the zero pose.
 inline EncoderCounts counts_at(const Pose& pose, const Calibration& calibration) noexcept {
   return {counts_at(pose.cart_m, 0.0, calibration.cart_zero_counts, calibration.cart),
           counts_at(pose.theta_rad, calibration.zero_angle_rad(), calibration.pendulum_zero_counts,
                     calibration.pendulum)};
 }
 
-/// A voltage as the amplifier may be given it: not finite becomes zero, the rest is clamped to the limit.
+/// A voltage that is safe for the amplifier: clamped to the limit; zero if it was not finite.
 inline double safe_voltage(double voltage_v, double limit_v) noexcept {
   if (!std::isfinite(voltage_v)) return 0.0;
   return voltage_v > limit_v ? limit_v : voltage_v < -limit_v ? -limit_v : voltage_v;
 }
 
-/// True when counts moved further within `elapsed_s` than the fastest motion allows. Two counts are always
-/// allowed: that much is quantisation.
+/// True when the counts moved further within `elapsed_s` than the greatest speed allows. Two counts are
+/// always allowed, because of quantisation.
 inline bool implausible_step(std::int64_t from, std::int64_t to, double elapsed_s,
                              const EncoderCalibration& encoder) noexcept {
   const double moved = std::abs(static_cast<double>(counts_between(from, to, encoder.width_bits)));

@@ -1,4 +1,4 @@
-// The clock a loop and its rig share: the machine's, or one that only moves when it is told to.
+// The clock that a loop and its rig share: the machine's monotonic clock, or a virtual one.
 #pragma once
 
 #include <time.h>
@@ -13,9 +13,9 @@ class Clock {
  public:
   virtual ~Clock() = default;
   virtual std::int64_t now_ns() noexcept = 0;
-  /// Returns at `time_ns` or later; early only when a signal came.
+  /// Returns at `time_ns` or later; earlier only after a signal.
   virtual void sleep_until(std::int64_t time_ns) noexcept = 0;
-  /// True when time passes only by `sleep_until`: the loop may wait for its log, and runs repeat exactly.
+  /// True when time advances only in `sleep_until`: the loop may wait for its log; runs are repeatable.
   virtual bool is_virtual() const noexcept = 0;
 };
 
@@ -36,7 +36,7 @@ class MonotonicClock final : public Clock {
   bool is_virtual() const noexcept override { return false; }
 };
 
-/// Stands still until it is told to move; never goes back.
+/// Advances only when requested; never goes back.
 class VirtualClock final : public Clock {
  public:
   std::int64_t now_ns() noexcept override { return now_ns_; }

@@ -1,4 +1,4 @@
-// How a rig is wired to Comedi devices: section `comedi` of a rig file.
+// Wiring of a rig to Comedi devices: section `comedi` of a rig file.
 #pragma once
 
 #include <cstdint>
@@ -8,21 +8,21 @@
 namespace upright {
 
 enum class ComediEncoderKind : std::uint8_t {
-  counter,        ///< a quadrature counter, set up as its driver needs it
-  plain_counter,  ///< a counter that something else has set up: it is only read
+  counter,        ///< a quadrature counter, configured as its driver requires
+  plain_counter,  ///< a counter that is configured elsewhere and only read
   analog_input,   ///< a potentiometer
 };
 
-/// What an analog input is measured against.
+/// Reference potential of an analog input.
 enum class ComediReference : std::uint8_t { ground, common, difference, other };
 
-/// The ends of a range that a channel offers.
+/// Limits of a voltage range that a channel offers.
 struct ComediRange {
   double low_v = 0.0;
   double high_v = 0.0;
 };
 
-/// The input lines (PFI) that a counter takes an encoder's A and B from, where its driver lets one choose.
+/// Input lines (PFI) for A and B of an encoder, where the driver can route them to a counter.
 struct ComediLines {
   int a = 0;
   int b = 0;
@@ -33,7 +33,7 @@ struct ComediEncoder {
   int subdevice = 0;
   int channel = 0;
   ComediEncoderKind kind = ComediEncoderKind::counter;
-  std::optional<ComediLines> lines;  ///< counter: as its driver asks for
+  std::optional<ComediLines> lines;  ///< counter: as its driver requires
   // Analog input only.
   ComediRange range;
   ComediReference reference = ComediReference::ground;
@@ -48,7 +48,7 @@ struct ComediOutput {
   double amplifier_gain = 1.0;  ///< volts at the motor per volt at the channel
 };
 
-/// What of a rig is on Comedi devices.
+/// The parts of a rig that are connected to Comedi devices.
 struct ComediRig {
   std::optional<ComediEncoder> cart;
   std::optional<ComediEncoder> pendulum;

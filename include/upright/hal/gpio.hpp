@@ -1,4 +1,4 @@
-// The digital lines of a rig (section `gpio` of the rig file): what is wired to which line of a GPIO chip.
+// Wiring of a rig to digital lines of a GPIO chip: section `gpio` of a rig file.
 #pragma once
 
 #include <cstdint>
@@ -8,10 +8,10 @@
 
 namespace upright {
 
-/// The chip's own resistors on an input, where it has them.
+/// Bias resistors of the chip on an input, where it has them.
 enum class LineBias : std::uint8_t { as_is, pull_up, pull_down };
 
-/// One line, by its number on the chip.
+/// One line, identified by its offset on the chip.
 struct DigitalLine {
   int line = 0;
   bool active_high = true;  ///< the level that means pressed, or enabled
@@ -26,12 +26,12 @@ struct LimitSwitch {
   DigitalLine line;
 };
 
-/// An incremental encoder whose edges the kernel reports: each edge of either line is one count.
+/// An incremental encoder whose edges the kernel reports. Each edge of either line is one count.
 struct LineEncoder {
-  int a = 0;  ///< it counts up where A leads B
+  int a = 0;  ///< counts increase where A leads B
   int b = 0;
   LineBias bias = LineBias::as_is;
-  double fastest_edges_per_s = 0.0;  ///< more than this is a fault: edges might be lost
+  double fastest_edges_per_s = 0.0;  ///< a higher rate is a fault, because edges might be lost
 };
 
 struct GpioRig {

@@ -1,4 +1,4 @@
-// How counts and volts are laid out in 16-bit Modbus registers. Pure functions, no allocation.
+// Encoding of counts and volts in 16-bit Modbus registers. Pure functions, no allocation.
 #pragma once
 
 #include <array>
@@ -25,22 +25,22 @@ struct VoltageFormat {
   double counts_per_v = 1.0;
 
   int registers() const noexcept { return encoding == VoltageEncoding::int16 ? 1 : 2; }
-  /// The largest voltage that fits.
+  /// The largest voltage that the format can represent.
   double largest_v() const noexcept;
 };
 
-/// Counts from registers, as the unsigned number they hold.
+/// Counts from registers, as an unsigned number.
 std::int64_t decode_counter(std::span<const std::uint16_t> registers, const CounterFormat& format) noexcept;
 void encode_counter(std::int64_t counts, const CounterFormat& format,
                     std::span<std::uint16_t> registers) noexcept;
 
-/// Volts that do not fit are clamped to what does; a value that is not finite becomes zero.
+/// Volts beyond the range of the format are clamped; a value that is not finite becomes zero.
 std::array<std::uint16_t, 2> encode_voltage(double voltage_v, const VoltageFormat& format) noexcept;
-/// May be not finite with float32: the registers hold whatever the other side wrote.
+/// The result may be non-finite with float32, since the registers hold what the device wrote.
 double decode_voltage(std::span<const std::uint16_t> registers, const VoltageFormat& format) noexcept;
 
-/// What a device's status register says has stopped the motor. Bit 0: the emergency stop; 1 and 2: the limit
-/// switches at the +x and the -x end; 3: edges of an encoder were lost.
+/// The cause for which a device has stopped the motor, from its status register. Bit 0: emergency stop;
+/// bits 1 and 2: limit switch at the +x and at the -x end; bit 3: encoder edges were lost.
 RigFault fault_in_status(std::uint16_t status) noexcept;
 
 }  // namespace upright

@@ -1,5 +1,5 @@
-// The seam between the control loop and a rig: what every backend (simulated, modbus, gpio, comedi,
-// quanser-hil) implements.
+// The interface between the control loop and a rig, implemented by each backend (simulated, modbus, gpio,
+// comedi, quanser-hil).
 #pragma once
 
 #include <cstdint>
@@ -9,34 +9,34 @@
 
 namespace upright {
 
-/// What a reading is worth.
+/// Validity of a reading.
 enum class RigStatus : std::uint8_t {
-  fresh,  ///< counts that were taken for this call
-  stale,  ///< no new counts: those of an earlier sequence number, not to be used as new
-  fault,  ///< no counts at all; `fault` says why
+  fresh,  ///< counts taken for this call
+  stale,  ///< no new counts: those of an earlier sequence number, not to be used as new ones
+  fault,  ///< no counts; `fault` gives the cause
 };
 
-/// Why a rig failed. One cause each, so that a stop can name it.
+/// Why a rig failed: one enumerator per cause, so that a stop can name it.
 enum class RigFault : std::uint8_t {
   none,
   link_timeout,      ///< no reply within the deadline
   link_lost,         ///< the connection is gone
   corrupt_reply,     ///< a reply failed its check sum or its format
   device_restarted,  ///< the device came back with its counters or its watchdog reset
-  counts_jumped,     ///< the counts went somewhere no motion leads to, and stayed there
-  device_refused,    ///< the device answered with an exception that will not pass by itself
-  device_busy,       ///< the device answered with an exception that says: later
+  counts_jumped,     ///< the counts changed to an implausible value, and stayed there
+  device_refused,    ///< the device answered with a permanent exception
+  device_busy,       ///< the device answered with an exception that means: retry later
   output_kept,       ///< the device acknowledged zero volts, but its output reads back as another voltage
-  not_finite,        ///< a value that is not a finite number was about to be used
-  out_of_range,      ///< counts or volts outside what the hardware can mean
+  not_finite,        ///< a value about to be used was not finite
+  out_of_range,      ///< counts or volts outside the range of the hardware
   emergency_stop,
   limit_switch,
-  limit_switch_plus,   ///< the one at the track's +x end
-  limit_switch_minus,  ///< the one at its -x end
+  limit_switch_plus,   ///< at the track's +x end
+  limit_switch_minus,  ///< at the track's -x end
   line_failed,         ///< a digital line could not be read or set
-  edges_lost,          ///< an encoder's edges passed unseen: its counts are wrong from here on
-  edges_too_fast,      ///< an encoder's edges came faster than they may, so that some could be lost
-  watchdog_expired,    ///< the device's own watchdog took the voltage away, and keeps it away
+  edges_lost,          ///< edges of an encoder were lost: its counts are wrong from here on
+  edges_too_fast,      ///< edges of an encoder came faster than allowed, so that some could be lost
+  watchdog_expired,    ///< the device's own watchdog has switched the voltage off, and keeps it off
 };
 
 constexpr bool is_emergency_stop(RigFault fault) noexcept {
@@ -48,21 +48,27 @@ constexpr bool is_limit_switch(RigFault fault) noexcept {
          fault == RigFault::limit_switch_minus;
 }
 
-/// Somebody, or the cart, stopped the rig through one of its inputs: nothing is wrong with its link.
+/// True for faults that an operator or the cart causes through an input: the link is intact.
 constexpr bool is_safety_input(RigFault fault) noexcept {
   return is_emergency_stop(fault) || is_limit_switch(fault);
 }
 
-/// One exchange with the encoders. Counts are the device's own, `width` bits wide, not unwrapped.
+/// One exchange with the encoders. Counts are the device's own, of its counter width, not unwrapped.
 struct RigReading {
   std::int64_t cart_counts = 0;
   std::int64_t pendulum_counts = 0;
-  std::int64_t time_ns = 0;    ///< when the counts were taken, on the clock the loop runs on
-  std::uint64_t sequence = 0;  ///< grows with each fresh reading
-  /// How often the link was brought back since the rig was opened: connected anew, or back in step.
+  std::int64_t time_ns = 0;    ///< when the counts were taken, on the loop's clock
+  std::uint64_t sequence = 0;  ///< increases with each fresh reading
+  /// How often the link was recovered since the rig was opened: reconnected or resynchronised.
   std::uint32_t recoveries = 0;
   RigStatus status = RigStatus::fault;
   RigFault fault = RigFault::none;
+};
+
+/// A sample that a device took on its own time.
+struct DeviceSample {
+  std::uint64_t number = 0;  ///< grows by one with each sample that arrived; 0: none has arrived yet
+  std::int64_t time_ns = 0;  ///< when it arrived, on the clock the loop runs on
 };
 
 /// Which digital inputs a rig has that stop the motor. While one is active every reading is a fault that
@@ -72,58 +78,66 @@ struct SafetyInputs {
   int limit_switches = 0;
 };
 
-/// What a device says of itself, for the record of a run: "serial_number" and its text, ...
+/// Identification of a device for the record of a run: "serial_number" and its text, ...
 using DeviceFacts = std::vector<std::pair<std::string, std::string>>;
 
-/// What is known of a stop. Zero volts is confirmed when the device has taken it and, where its output can be
+/// The state of a stop. Zero volts is confirmed when the device has accepted it and, if its output can be
 /// read back, when that reads zero.
 struct StopReport {
   bool zero_confirmed = false;
-  bool read_back = false;  ///< the output reads zero; false: the device's acknowledgement is all there is
-  bool disabled = true;    ///< the amplifier is disabled, or nothing here can disable it
-  /// The device's own watchdog takes the voltage away so long after the last request, as was programmed [s];
-  /// 0: it has none.
+  bool read_back = false;  ///< the output reads zero; false: only the device's acknowledgement is known
+  bool disabled = true;    ///< the amplifier is disabled, or the backend cannot disable it
+  /// Programmed time after the last request at which the device's own watchdog switches the voltage off
+  /// [s]; 0: it has no watchdog.
   double watchdog_s = 0.0;
-  bool watchdog_read_back = true;   ///< its time was read back, too; false: the device has accepted it
+  bool watchdog_read_back = true;   ///< its time was read back, too; false: the device has only accepted it
   RigFault fault = RigFault::none;  ///< of the latest attempt: why zero volts is not confirmed
-  int exception = 0;                ///< behind a fault: the number that the device answered with
+  int exception = 0;                ///< the exception code of the device that caused the fault
 
   bool done() const noexcept { return zero_confirmed && disabled; }
 };
 
-/// Of a rig that has no voltage to take away, or that cannot fail to.
+/// For a rig that has no voltage to switch off, or that cannot fail to do so.
 constexpr StopReport at_zero_volts() noexcept {
   StopReport report;
   report.zero_confirmed = true;
   return report;
 }
 
-/// A rig as the loop sees it. `open` may throw Error and take its time; everything else is called from the
-/// real-time thread and neither allocates, locks, throws nor blocks beyond the deadline the backend was
-/// opened with.
+/// A rig as seen by the loop. `open` may throw Error and may take long. All other functions are called
+/// from the real-time thread; they do not allocate, lock or throw, and do not block beyond the deadline
+/// with which the backend was opened.
 class Rig {
  public:
   virtual ~Rig() = default;
-  /// Connects, checks what can be checked, leaves the motor at zero volts.
+  /// Connects, checks the device, and sets the motor to zero volts.
   virtual void open() = 0;
   virtual RigReading read() noexcept = 0;
-  /// Commands a voltage that the limiter has passed. A value that is not finite is refused and becomes zero
+  /// Commands a voltage from the limiter. A value that is not finite is refused and replaced by zero
   /// volts.
   virtual RigFault write(double voltage_v) noexcept = 0;
-  /// Begins to put out zero volts and to disable the amplifier, by every means the backend has, and says what
-  /// is known of it so far. It never waits for an answer: call it again until the report is done. A backend
-  /// that has to wait goes on trying by itself, until the rig is opened again or destroyed.
+  /// Begins to set zero volts and to disable the amplifier, by all means that the backend has, and
+  /// returns the state so far. It never waits for a reply: call it again until the report is done. If
+  /// replies are pending, the backend continues by itself until the rig is opened again or destroyed.
   virtual StopReport stop() noexcept = 0;
-  /// Outside the loop: somebody has moved cart or pendulum of an open rig, its counts go on from elsewhere. A
-  /// rig around another one passes it on.
+  /// Outside the loop: an operator has moved the cart or the pendulum of an open rig, so that its counts
+  /// have changed. A decorator forwards the call.
   virtual void moved_by_hand() noexcept {}
-  /// The number of the exception that the device answered with last; 0: none. A rig around another one passes
-  /// on that one's.
+  /// The exception code that the device answered with last; 0: none. A decorator forwards the
+  /// call.
   virtual int last_exception() const noexcept { return 0; }
-  /// What is wired, of an open rig. A rig around another one passes on that one's.
+  /// The inputs that are wired, of an open rig. A decorator forwards the call.
   virtual SafetyInputs safety_inputs() const noexcept { return {}; }
-  /// Of an open rig, outside the loop. A rig around another one passes on that one's.
+  /// Of an open rig, outside the loop. A decorator forwards the call.
   virtual DeviceFacts device_facts() const { return {}; }
+  /// The device samples on its own time, and the loop waits for each sample with `wait_next` before it reads.
+  /// False: the loop follows the computer's clock. Of an open rig; a rig around another one passes on that
+  /// one's.
+  virtual bool is_clock() const noexcept { return false; }
+  /// Waits for a sample that this function has not returned yet, at most until `until_ns`. Returns the newest
+  /// sample, which has the number returned before where no new one came. A rig around another one passes it
+  /// on.
+  virtual DeviceSample wait_next(std::int64_t /*until_ns*/) noexcept { return {}; }
 };
 
 }  // namespace upright

@@ -1,5 +1,5 @@
-// Makes the rig over a hardware link that a rig file describes, and puts around it what every rig has. The
-// simulated one is made by simulated_rig.hpp.
+// Makes the rig that a rig file describes for a hardware link, with the checks that all rigs share.
+// simulated_rig.hpp makes the simulated rig.
 #pragma once
 
 #include <memory>
@@ -11,19 +11,19 @@ namespace upright {
 
 /// What a run adds to the rig file.
 struct RigOptions {
-  double period_s = 0.0;  ///< of the loop: links must answer within it
+  double period_s = 0.0;  ///< period of the loop, within which links must answer
 };
 
-/// Throws ConfigError where the rig's link cannot carry a loop of this period: its response timeout or the
-/// bytes of one period on a serial line take longer.
+/// Throws ConfigError where the link cannot sustain a loop of this period: the response timeout, or the
+/// bytes of one period on a serial line, take longer.
 void require_link_fits(const RigFile& rig, double period_s);
 
-/// The rig as every command uses it: the counts of `parts` are checked, and the digital lines of `rig` stop
-/// it.
+/// The rig as every command uses it: the counts of `parts` are checked for plausibility, and the digital
+/// lines of `rig` stop the motor.
 std::unique_ptr<Rig> assembled(std::unique_ptr<Rig> parts, const RigFile& rig);
 
-/// Throws ConfigError for what this build or this combination cannot do, and for a response timeout that does
-/// not fit into the period. The rig is not open yet.
+/// Makes a rig that is not yet open. Throws ConfigError for what this build or combination does not
+/// support, and for a response timeout that does not fit into the period.
 std::unique_ptr<Rig> make_rig(const RigFile& rig, const RigOptions& options);
 
 }  // namespace upright

@@ -1,6 +1,6 @@
-// The physics, written once: equations (1) and (2) of the paper with a free inertia about the pivot, and
-// every effect through its hooks. No state, no events: engines decide which contact is sticking and call this
-// for the motion.
+// The equations of motion: equations (1) and (2) of the paper with a free inertia about the pivot, and
+// all effects through their hooks. No state and no events: an engine decides which contacts stick and
+// evaluates the derivatives here.
 //
 //   (M + m) x''      + m l cos(th) th'' = m l sin(th) th'^2 + F
 //   m l cos(th) x''  + J th''           = m g l sin(th) + T
@@ -27,7 +27,7 @@ struct PlantState {
   S bristle_m{};
 };
 
-/// A dry contact: at rest together, or sliding one way.
+/// Mode of a contact with dry friction: sticking, or sliding in one direction.
 enum class Contact : std::int8_t { slip_backward = -1, stick = 0, slip_forward = 1 };
 
 struct Contacts {
@@ -35,8 +35,8 @@ struct Contacts {
   Contact pivot = Contact::slip_forward;
 };
 
-/// The physics of one plant. `Present` is the set of its effects: EffectSet, or a StaticEffectSet for engines
-/// that compile it in. Numbers that do not change along a run are worked out once, here.
+/// The physics of one plant. `Present` is the set of its effects: EffectSet, or a StaticEffectSet for
+/// engines that are compiled for it. Constants of a run are computed once, in the constructor.
 template <class S, class Present = EffectSet>
 class Dynamics {
  public:
@@ -71,7 +71,7 @@ class Dynamics {
   const BaseParameters<S>& base() const { return base_; }
   bool cart_can_stick() const { return cart_dry_ && !bristles_ && model_.smoothing == 0.0; }
   bool pivot_can_stick() const { return pivot_dry_ && model_.smoothing == 0.0; }
-  /// The force has a kink at zero velocity, so that engines should not step across it.
+  /// The force has a kink at zero velocity: engines should not step across it.
   bool cart_has_kink() const { return cart_can_stick() || cart_kink_; }
   bool pivot_has_kink() const { return pivot_can_stick() || pivot_kink_; }
   bool has_motor_lag() const { return lag_; }
@@ -79,7 +79,7 @@ class Dynamics {
   bool has_pendulum() const { return model_.has_pendulum; }
   bool cart_locked() const { return model_.cart_locked; }
 
-  /// Voltage after dead zone, gain, offset and saturation; delay and lag are the engine's.
+  /// Voltage after dead zone, gain, offset and saturation; engines treat delay and lag.
   S actuate(S volts) const {
     for (int stage = 1; stage <= 4; ++stage)
       for_each_effect([&]<std::size_t I>() {
@@ -110,9 +110,9 @@ class Dynamics {
     return constant;
   }
 
-  /// What the sensors show of a state (before quantisation).
+  /// The outputs of the sensors in a state (before quantisation).
   Outputs<S> measure(const PlantState<S>& state) const {
-    Outputs<S> outputs{state.cart_m + drive_yields_m(state), state.theta_rad};
+    Outputs<S> outputs{state.cart_m + drive_deflection_m(state), state.theta_rad};
     for (int stage = 1; stage <= 2; ++stage)
       for_each_effect([&]<std::size_t I>() {
         using E = EffectAt<I>;
@@ -122,8 +122,8 @@ class Dynamics {
     return outputs;
   }
 
-  /// Dry level of the cart in direction +1 or -1 at a speed >= 0: what sliding costs, and at speed 0 what
-  /// rest holds.
+  /// Level of dry friction of the cart in direction +1 or -1 at a speed >= 0: the friction while sliding,
+  /// and at speed 0 the largest static friction.
   S cart_dry_level(const S& x, const S& speed, const S& direction) const {
     S level(0.0);
     for_each_effect([&]<std::size_t I>() {
@@ -144,12 +144,12 @@ class Dynamics {
     return level;
   }
 
-  /// Of the motor, with its back-EMF [N].
+  /// Force of the motor including back-EMF [N].
   S motor_force(const PlantState<S>& state, const S& motor_v) const {
     return base_.force_per_volt_n * motor_v - base_.back_emf_n_per_mps * state.cart_mps;
   }
 
-  /// Motor and every smooth force on the cart; dry friction and bristles are not in it.
+  /// The motor force and all smooth forces on the cart, without dry friction and bristles.
   S cart_smooth_force(const PlantState<S>& state, const S& motor_v) const {
     S force = motor_force(state, motor_v);
     for_each_effect([&]<std::size_t I>() {
@@ -170,8 +170,8 @@ class Dynamics {
     return torque;
   }
 
-  /// Time derivative of the state with the voltage at the motor (after the whole actuator chain) given. The
-  /// derivative of motor_v is left at zero: the lag is linear, so engines follow it exactly.
+  /// Time derivative of the state for a given voltage at the motor (after the complete actuator chain).
+  /// The derivative of motor_v is zero: the lag is linear, and engines integrate it exactly.
   PlantState<S> derivative(const PlantState<S>& state, const S& motor_v, Contacts contacts) const {
     PlantState<S> rate{};
     S force = cart_smooth_force(state, motor_v);
@@ -194,7 +194,7 @@ class Dynamics {
     return rate;
   }
 
-  /// What a unit of force on a cart that does not stick adds to the accelerations.
+  /// Accelerations per unit of force on a cart that does not stick.
   PlantState<S> push(const PlantState<S>& state, Contacts contacts) const {
     const bool pivot_rests = !model_.has_pendulum || (contacts.pivot == Contact::stick && pivot_can_stick());
     PlantState<S> without{}, with{};
@@ -205,7 +205,7 @@ class Dynamics {
     return with;
   }
 
-  /// How fast bristles approach their steady deflection while the cart slides [1/s].
+  /// Rate at which bristles approach their steady deflection while the cart slides [1/s].
   double bristle_relaxation_radps(const PlantState<S>& state) const {
     const double v = value_of(state.cart_mps);
     const double level =
@@ -213,8 +213,8 @@ class Dynamics {
     return value_of(bristle_stiffness()) * std::abs(v) / std::max(level, smallest_level_n);
   }
 
-  /// As `derivative`, with the contact of the cart as a number, so that lanes may differ: -1 or 1 slides that
-  /// way, 0 rests. For plants whose cart can stick and whose pivot cannot.
+  /// As `derivative`, with the mode of the cart's contact as a number, so that lanes may differ: -1 or 1
+  /// slides in that direction, 0 sticks. For plants whose cart can stick and whose pivot cannot.
   PlantState<S> derivative_by_direction(const PlantState<S>& state, const S& motor_v,
                                         const S& direction) const {
     PlantState<S> rate{};
@@ -234,8 +234,8 @@ class Dynamics {
     return rate;
   }
 
-  /// The force that dry friction would have to balance to hold a resting cart: motor, smooth forces and the
-  /// pendulum's reaction together, with the pivot as it is.
+  /// The force that dry friction must balance to hold a resting cart: motor, smooth forces and the
+  /// pendulum's reaction, with the pivot in its present mode.
   S cart_load(const PlantState<S>& state, const S& motor_v, Contact pivot) const {
     PlantState<S> at_rest = state;
     at_rest.cart_mps = S(0.0);
@@ -251,7 +251,7 @@ class Dynamics {
     return force + coupling_ * (s * state.theta_radps * state.theta_radps - c * theta_acceleration);
   }
 
-  /// The torque that dry friction would have to balance to hold a resting pendulum, with the cart as it is.
+  /// The torque that dry friction must balance to hold a resting pendulum, with the cart's present mode.
   S pivot_load(const PlantState<S>& state, const S& motor_v, Contact cart) const {
     const auto [s, c] = elementary::sine_and_cosine(state.theta_rad);
     const S gravity = gravity_torque_ * s;
@@ -263,8 +263,8 @@ class Dynamics {
     return gravity - coupling_ * c * rate.cart_mps;
   }
 
-  /// Fastest rate of the motion here [1/s]; engines keep their steps below a fraction of its inverse. Without
-  /// `bristles` theirs do not count.
+  /// Greatest rate of the motion in this state [1/s]; engines keep their steps below a fraction of its
+  /// inverse. Without `bristles`, the rate of the bristles is excluded.
   double fastest_rate_radps(const PlantState<S>& state, bool bristles = true) const {
     const double mass = value_of(least_cart_inertia());
     const double v = value_of(state.cart_mps);
@@ -287,25 +287,25 @@ class Dynamics {
   S bristle_stiffness() const { return sum_of_bristles<true>(); }
   S bristle_damping() const { return sum_of_bristles<false>(); }
 
-  /// Smallest inertia that a force on the cart meets [kg].
+  /// Smallest inertia that a force on the cart acts on [kg].
   S least_cart_inertia() const {
     if (!model_.has_pendulum) return total_mass_;
     return total_mass_ - coupling_ * coupling_ / base_.inertia_about_pivot_kgm2;
   }
 
  private:
-  S drive_yields_m(const PlantState<S>& state) const {
-    S yields(0.0);
+  S drive_deflection_m(const PlantState<S>& state) const {
+    S deflection(0.0);
     for_each_effect([&]<std::size_t I>() {
       using E = EffectAt<I>;
-      if constexpr (requires { E::drive_yields_m(p<I>(), state.motor_v); })
+      if constexpr (requires { E::drive_deflection_m(p<I>(), state.motor_v); })
         if (present_.template has<I>())
-          yields = yields + E::drive_yields_m(p<I>(), motor_force(state, state.motor_v));
+          deflection = deflection + E::drive_deflection_m(p<I>(), motor_force(state, state.motor_v));
     });
-    return yields;
+    return deflection;
   }
 
-  /// A level that vanishes somewhere along the track lets the bristles slip freely, not divide by zero.
+  /// Lower bound of the level: where it vanishes, bristles slip freely without a division by zero.
   static constexpr double smallest_level_n = 1e-6;
 
   template <class E, class T>

@@ -1,6 +1,6 @@
-// What an effect says of itself, and the hooks by which it enters the plant. One file per effect in effects/,
-// one line in effects/all.hpp; the registry, plant files, engines, candidates and documents follow from
-// there.
+// The description of an effect and the hooks through which it enters the plant. Each effect is one file
+// in effects/ and one line in effects/all.hpp. The registry, plant files, engines, candidates and
+// documents are derived from there.
 //
 // An effect is a struct with `parameters` and `info`, and any of these static templates on the scalar S,
 // where p points at its own parameters in their declared order:
@@ -13,12 +13,12 @@
 //                                                   `actuator_stage`
 //   S input_delay_s(p), S motor_time_constant_s(p)
 //   S bristle_stiffness(p), S bristle_damping(p)
-//   S drive_yields_m(p, force)                      how far the motor is ahead of the cart [m]
+//   S drive_deflection_m(p, force)                  position of the motor relative to the cart [m]
 //   void measure(p, Outputs<S>&)                    one stage of the sensors, by `sensor_stage`
 //   void correct(p, BaseParameters<S>&)             the true base parameters from the model's
-//   double rate_radps(p, v, mass)                   fastest rate it brings [1/s], by which engines choose
+//   double rate_radps(p, v, mass)                   its greatest rate [1/s], by which engines choose
 //                                                   their steps
-// and the flags `kink_at_cart_rest`, `kink_at_pivot_rest` where its force is not smooth through zero
+// and the flags `kink_at_cart_rest`, `kink_at_pivot_rest` where the force is not smooth at zero
 // velocity.
 #pragma once
 
@@ -30,7 +30,7 @@
 
 namespace upright {
 
-/// Where an effect enters.
+/// The part of the plant to which an effect belongs.
 enum class Enters { cart, actuator, pendulum, sensor, parameter };
 
 constexpr std::string_view name_of(Enters enters) {
@@ -53,8 +53,8 @@ struct ParameterInfo {
   std::string_view name;
   std::string_view unit;
   Range range;
-  double neutral;  ///< the value at which the effect is not there; NaN where none (a shape, a place)
-  double typical;  ///< the order of magnitude on a laboratory cart; where a search starts
+  double neutral;  ///< value at which the effect vanishes; NaN where there is none (a shape, a position)
+  double typical;  ///< order of magnitude on a laboratory cart; start of a search
   std::string_view meaning;
 };
 
@@ -63,20 +63,20 @@ constexpr double no_neutral = std::numeric_limits<double>::quiet_NaN();
 struct EffectInfo {
   std::string_view kind;
   Enters enters;
-  bool dry;  ///< part of a contact: a level, not a force law
+  bool dry;  ///< a level of dry friction of a contact, not a force law
   std::string_view equation;
   std::string_view meaning;
   std::span<const ParameterInfo> parameters;
 };
 
-/// What the sensors show.
+/// The outputs of the sensors.
 template <class S>
 struct Outputs {
   S cart_m;
   S theta_rad;
 };
 
-/// The rigid body and the motor, as numbers of a scalar type.
+/// Parameters of the rigid body and the motor, as numbers of a scalar type.
 template <class S>
 struct BaseParameters {
   S cart_mass_kg;

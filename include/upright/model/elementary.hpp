@@ -1,11 +1,11 @@
-// Elementary functions whose bits do not depend on the machine. libm picks its sin, exp, ... by the processor
-// (with or without fused multiply-add) and changes them from release to release, so that a log written on one
-// machine would not replay on another. These use additions, multiplications, divisions and square roots
-// alone, which IEEE 754 rounds in one way. Errors are below 1 unit in the last place
+// Elementary functions with machine-independent results. libm selects sin, exp, ... by processor (with or
+// without fused multiply-add) and changes them between releases, so that a log written on one machine
+// would not replay on another. The functions here use additions, multiplications, divisions and square
+// roots only, which IEEE 754 rounds uniquely. Errors are below 1 unit in the last place
 // (tests/unit/elementary_test.cpp).
 //
-// Called by their qualified names, elementary::sin(x), they take every scalar of the physics: plain numbers,
-// dual numbers, and scalars that bring functions of their own, as lanes do.
+// Called by their qualified names, elementary::sin(x), they accept every scalar of the physics: double,
+// dual numbers, and scalars with own functions, such as lanes.
 #pragma once
 
 #include <cmath>
@@ -13,17 +13,17 @@
 
 namespace upright::elementary {
 
-/// Beyond 2^20 quarter turns an angle counts whole turns of the double nearest to 2 pi.
+/// Beyond 2^20 quarter turns, the period is the double nearest to 2 pi.
 double sin(double angle);
 double cos(double angle);
 double exp(double x);
-/// exp(x) - 1, exact near 0 too.
+/// exp(x) - 1, accurate near 0 too.
 double expm1(double x);
 double log(double x);
 double tanh(double x);
-/// x^y for x >= 0. The relative error grows with |y log x|, one unit in the last place for each unit of it.
+/// x^y for x >= 0. The relative error grows with |y log x|, by one unit in the last place per unit.
 double power(double x, double y);
-/// Length of (x, y) where the squares neither overflow nor underflow.
+/// Square root of x^2 + y^2, where the squares neither overflow nor underflow.
 inline double hypot(double x, double y) {
   return std::sqrt(x * x + y * y);
 }
@@ -32,16 +32,16 @@ template <class S>
 struct SineAndCosine {
   S sine, cosine;
 };
-/// Both for little more than the price of one.
+/// Both, at little more than the cost of one.
 SineAndCosine<double> sine_and_cosine(double angle);
 
-/// A dual number: `a` its value, `v` its derivatives (ceres::Jet).
+/// A dual number (ceres::Jet): `a` is its value, `v` are its derivatives.
 template <class S>
 concept Dual = requires(const S& x) {
   x.a;
   x.v;
 };
-/// Whatever is not a plain number.
+/// All scalars other than double.
 template <class S>
 concept Composed = std::is_class_v<S>;
 
@@ -51,7 +51,7 @@ S sin(const S& x) {
     const auto [s, c] = sine_and_cosine(x.a);
     return S(s, c * x.v);
   } else {
-    return sin(x);  // the scalar's own
+    return sin(x);  // the scalar's own function
   }
 }
 

@@ -1,4 +1,4 @@
-// A plant as its file describes it: rigid body, motor, and the effects it has. Plain data.
+// A plant as described by its file: rigid body, motor and effects. Plain data.
 #pragma once
 
 #include <array>
@@ -14,7 +14,7 @@ namespace upright {
 struct Pendulum {
   double mass_kg = 0.0;
   double length_to_com_m = 0.0;  ///< pivot to centre of mass
-  /// About the pivot. Not given: a uniform rod, 4/3 m l^2.
+  /// About the pivot. Absent: a uniform rod, 4/3 m l^2.
   std::optional<double> given_inertia_kgm2;
 
   double inertia_about_pivot_kgm2() const {
@@ -28,7 +28,7 @@ struct Motor {
   double back_emf_n_per_mps = 0.0;
 };
 
-/// One effect of a plant: its number in the registry and its parameter values in their declared order.
+/// One effect of a plant: its index in the registry and its parameter values in declared order.
 struct PlantEffect {
   std::size_t number = 0;
   std::array<double, most_effect_parameters> values{};
@@ -36,14 +36,14 @@ struct PlantEffect {
 
 struct Plant {
   double cart_mass_kg = 0.0;
-  std::optional<Pendulum> pendulum;  ///< none: the cart alone
+  std::optional<Pendulum> pendulum;  ///< absent: the cart alone
   double gravity_mps2 = 9.8;
   Motor motor;
   std::vector<PlantEffect> effects;  ///< each kind at most once
 
   const PlantEffect* find(std::size_t effect) const;
   const PlantEffect* find(std::string_view kind) const { return find(effect_number(kind)); }
-  /// Adds an effect, or gives new values to the one that is there.
+  /// Adds an effect, or replaces the values of an existing one.
   void set(std::size_t effect, std::span<const double> values);
   void set(std::string_view kind, std::initializer_list<double> values) {
     set(effect_number(kind), std::span<const double>(values.begin(), values.size()));
@@ -51,7 +51,7 @@ struct Plant {
   void remove(std::size_t effect);
 };
 
-/// What is wrong with a plant as a whole, "CAUSE: REMEDY"; empty when it can be simulated.
+/// The fault of a plant as a whole, "CAUSE: REMEDY"; empty when it can be simulated.
 std::string fault_of(const Plant& plant);
 
 }  // namespace upright

@@ -1,4 +1,4 @@
-// Plant files (interface: "Plant file"): read strictly, written so that they read back exactly.
+// Plant files (docs/reference/files.md): read strictly; written files read back exactly.
 #pragma once
 
 #include <filesystem>
@@ -13,13 +13,13 @@ namespace upright {
 /// Reads a plant file. Throws ConfigError with remedy, file, line and key.
 Plant read_plant_file(const std::filesystem::path& file);
 
-/// Reads a plant from a document that is already parsed; `document` holds the key `plant`.
+/// Reads a plant from a parsed document, which holds the key `plant`.
 Plant read_plant(const YamlMap& document);
 
-/// The plant file as text. `comments` become lines at its top.
+/// The plant file as text, with `comments` as lines at its top.
 std::string plant_text(const Plant& plant, const std::vector<std::string>& comments = {});
 
-/// Writes the plant file; an existing file is replaced. Throws Error when it cannot be written.
+/// Writes the plant file and replaces an existing one. Throws Error when it cannot be written.
 void write_plant_file(const Plant& plant, const std::filesystem::path& file,
                       const std::vector<std::string>& comments = {});
 

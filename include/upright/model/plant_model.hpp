@@ -1,5 +1,5 @@
-// A plant as numbers of a scalar type: what engines compute with. Differentiate with respect to a parameter
-// by making it a dual number here.
+// A plant as numbers of a scalar type, with which engines compute. To differentiate with respect to a
+// parameter, make it a dual number here.
 #pragma once
 
 #include <array>
@@ -12,11 +12,11 @@ template <class S>
 struct PlantModel {
   BaseParameters<S> base{};  ///< as in the plant file, before the parameter effects
   bool has_pendulum = false;
-  bool cart_locked = false;  ///< the cart is held: the pendulum swings alone
+  bool cart_locked = false;  ///< the cart is held: only the pendulum moves
   EffectSet present;
-  std::array<S, all_parameter_count> parameters{};  ///< flat, by parameter_offset
-  /// 0: dry friction is a contact with events. Above 0: sgn(v) becomes tanh(smoothing v), no sticking (for
-  /// linear design).
+  std::array<S, all_parameter_count> parameters{};  ///< contiguous, indexed by parameter_offset
+  /// 0: dry friction is a contact with events. Above 0: sgn(v) becomes tanh(smoothing v), without
+  /// sticking (for linear design).
   double smoothing = 0.0;
 
   template <std::size_t I>
@@ -24,8 +24,8 @@ struct PlantModel {
     return &parameters[parameter_offset<I>];
   }
 
-  /// Base parameters with the effects that correct them (cart_mass, pendulum_mass, pendulum_length, back_emf)
-  /// applied.
+  /// Base parameters after the effects that correct them (cart_mass, pendulum_mass, pendulum_length,
+  /// back_emf).
   BaseParameters<S> corrected() const {
     BaseParameters<S> result = base;
     for_each_effect([&]<std::size_t I>() {
@@ -37,7 +37,7 @@ struct PlantModel {
   }
 };
 
-/// The model of a plant with plain numbers converted to S.
+/// The model of a plant, with its numbers converted to S.
 template <class S>
 PlantModel<S> make_model(const Plant& plant, bool cart_locked = false) {
   PlantModel<S> model;
@@ -61,7 +61,7 @@ PlantModel<S> make_model(const Plant& plant, bool cart_locked = false) {
   return model;
 }
 
-/// The same model with the plain values of its numbers.
+/// The same model with the values of its numbers, without derivatives.
 template <class S>
 PlantModel<double> values_of(const PlantModel<S>& model) {
   PlantModel<double> plain;

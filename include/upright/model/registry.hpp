@@ -1,4 +1,4 @@
-// The list of every effect, at run time (names, units, ranges, equations) and at compile time (offsets,
+// The list of all effects: at run time (names, units, ranges, equations) and at compile time (offsets,
 // folds).
 #pragma once
 
@@ -24,7 +24,7 @@ using EffectAt = std::tuple_element_t<I, AllEffects>;
 template <std::size_t I>
 constexpr std::size_t parameter_count_of = std::size(EffectAt<I>::parameters);
 
-/// Where the parameters of effect I begin in the flat array of all effects' parameters.
+/// Offset of the parameters of effect I in the array of all parameters.
 template <std::size_t I>
 constexpr std::size_t parameter_offset = parameter_offset<I - 1> + parameter_count_of<I - 1>;
 template <>
@@ -33,7 +33,7 @@ inline constexpr std::size_t parameter_offset<0> = 0;
 constexpr std::size_t all_parameter_count =
     parameter_offset<effect_count - 1> + parameter_count_of<effect_count - 1>;
 
-/// Index of an effect type, by which plants and masks name it.
+/// Index of an effect type, which identifies it in plants and masks.
 template <class E, std::size_t I = 0>
 constexpr std::size_t effect_index() {
   if constexpr (std::is_same_v<EffectAt<I>, E>) {
@@ -52,13 +52,13 @@ constexpr void for_each_effect(F&& f) {
   (std::make_index_sequence<effect_count>{});
 }
 
-/// Every effect's description, in the order of registration; the index is the effect's number.
+/// The descriptions of all effects in the order of registration; the index is the effect's number.
 std::span<const EffectInfo> effect_registry();
 
-/// The number of a kind; `effect_count` when there is no such kind.
+/// The index of a kind; `effect_count` when it does not exist.
 std::size_t effect_number(std::string_view kind);
 
-/// Where the parameters of an effect begin in the flat array.
+/// Offset of the parameters of an effect in the array of all parameters.
 std::size_t effect_parameter_offset(std::size_t effect);
 
 /// A set of effects known at run time.
@@ -73,7 +73,7 @@ struct EffectSet {
 };
 static_assert(effect_count <= 64);
 
-/// A set of effects known at compile time: what is not in it costs nothing.
+/// A set of effects known at compile time: absent effects cost nothing.
 template <std::uint64_t Mask>
 struct StaticEffectSet {
   template <std::size_t I>

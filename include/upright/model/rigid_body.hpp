@@ -1,5 +1,5 @@
-// Cart and pendulum of a plant file as one rigid body, as equation (1) of the paper has them: what a known
-// motion asks of the force on the cart.
+// The rigid body of cart and pendulum, equation (1) of the paper: the force on the cart that a given
+// motion requires.
 #pragma once
 
 #include "upright/model/plant.hpp"
@@ -7,11 +7,11 @@
 namespace upright {
 
 struct RigidBody {
-  double mass_kg = 0.0;       ///< of both
+  double mass_kg = 0.0;       ///< total mass
   double moment_kgm = 0.0;    ///< m l; 0 without a pendulum
   double inertia_kgm2 = 0.0;  ///< about the pivot; 0 without a pendulum
 
-  /// Of the simple pendulum that swings alike: 4/3 l for a rod.
+  /// Length of the simple pendulum with the same motion: 4/3 l for a rod.
   double equivalent_length_m() const { return inertia_kgm2 / moment_kgm; }
 };
 
@@ -24,19 +24,19 @@ inline RigidBody rigid_body(const Plant& plant) {
   return body;
 }
 
-/// cos(th) th'' - sin(th) th'^2: the force of a moving pendulum on its cart is minus m l times it.
+/// cos(th) th'' - sin(th) th'^2: the pendulum's force on its cart is -m l times this.
 inline double pendulum_reaction(double sine, double cosine, double theta_radps, double theta_radps2) {
   return cosine * theta_radps2 - sine * theta_radps * theta_radps;
 }
 
-/// The angular acceleration of a pendulum without friction whose pivot accelerates.
+/// The angular acceleration of a frictionless pendulum on an accelerated pivot.
 inline double pendulum_radps2(double sine, double cosine, double pivot_mps2, double gravity_mps2,
                               double equivalent_length_m) {
   return (gravity_mps2 * sine - cosine * pivot_mps2) / equivalent_length_m;
 }
 
-/// What a unit of force on the cart and of torque on the pendulum make of both accelerations: the inverse of
-/// the mass matrix. By symmetry a force turns the pendulum as a torque moves the cart.
+/// The inverse of the mass matrix: accelerations per unit of force on the cart and of torque on the
+/// pendulum. It is symmetric.
 struct InverseMass {
   double cart_by_force = 0.0, coupled = 0.0, pendulum_by_torque = 0.0;  ///< [1/kg], [1/(kg m)], [1/(kg m^2)]
 };
@@ -48,7 +48,7 @@ inline InverseMass inverse_mass(const RigidBody& body, double cosine) {
   return {body.inertia_kgm2 / determinant, -off / determinant, body.mass_kg / determinant};
 }
 
-/// The same with the cart held in its place.
+/// The same with the cart held.
 inline InverseMass inverse_mass_at_held_cart(const RigidBody& body) {
   return {0.0, 0.0, body.inertia_kgm2 == 0.0 ? 0.0 : 1.0 / body.inertia_kgm2};
 }

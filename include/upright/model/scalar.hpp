@@ -1,17 +1,17 @@
-// What the physics asks of a scalar, so that the same text runs on double, on dual numbers (ceres::Jet) and
-// on SIMD lanes. A SIMD type adds an overload of `select` for its own comparison result; everything else
-// follows from it.
+// Requirements of the physics on a scalar, so that the same code works with double, dual numbers
+// (ceres::Jet) and SIMD lanes. A SIMD type adds an overload of `select` for its comparison result;
+// everything else follows.
 #pragma once
 
 namespace upright {
 
-/// Either of two values by a condition; both are evaluated, so that lanes may differ.
+/// One of two values, selected by a condition. Both are evaluated, so that lanes may differ.
 template <class S>
 S select(bool condition, const S& yes, const S& no) {
   return condition ? yes : no;
 }
 
-/// The plain number in a scalar: itself for double, the value part of a dual number.
+/// The value of a scalar: itself for double, without derivatives for a dual number.
 inline double value_of(double x) {
   return x;
 }
@@ -23,8 +23,8 @@ double value_of(const S& x) {
   return x.a;
 }
 
-/// True when x is this very number, with no derivative and in every lane: where a formula has a cheaper form
-/// for one value of a parameter. Scalars that do not say so take the general form.
+/// True when x equals `number`, without derivative and in every lane: for formulas with a cheaper form at
+/// one value of a parameter. Scalars without an overload take the general form.
 template <class S>
 bool is_plainly(const S& /*x*/, double /*number*/) {
   return false;
@@ -43,7 +43,7 @@ S positive_part(const S& x) {
   return select(x > S(0.0), x, S(0.0));
 }
 
-/// -1, 0 or 1.
+/// The sign: -1, 0 or 1.
 template <class S>
 S sign_of(const S& x) {
   return select(x > S(0.0), S(1.0), select(x < S(0.0), S(-1.0), S(0.0)));

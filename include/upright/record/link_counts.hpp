@@ -1,4 +1,4 @@
-// What the link to a rig did wrong during a run, by cause: a run that went on says what it went on after.
+// Counts of link faults during a run, by cause.
 #pragma once
 
 #include <array>
@@ -12,10 +12,10 @@ namespace upright {
 
 /// Why a cycle had no fresh counts.
 enum class LinkTrouble : std::uint8_t {
-  late,           ///< the reply was not there when the cycle could wait no longer
-  no_reply,       ///< none within the response timeout
+  late,           ///< the reply had not arrived when the cycle could wait no longer
+  no_reply,       ///< no reply within the response timeout
   no_connection,  ///< the connection is gone
-  wrong_reply,    ///< corrupt, of an earlier request, or counts that no motion leads to
+  wrong_reply,    ///< corrupt, of an earlier request, or implausible counts
   refused,        ///< the device answered with an exception
   other,          ///< a fault of the device, not of the link
 };
@@ -24,8 +24,8 @@ struct LinkCounts {
   static constexpr std::size_t kinds = 6;
 
   std::array<std::uint64_t, kinds> cycles{};  ///< by LinkTrouble
-  std::uint64_t longest = 0;                  ///< most cycles in a row without fresh counts
-  std::uint64_t recoveries = 0;               ///< how often the link was brought back
+  std::uint64_t longest = 0;                  ///< largest number of consecutive cycles without fresh counts
+  std::uint64_t recoveries = 0;               ///< how often the link was recovered
 
   std::uint64_t of(LinkTrouble trouble) const noexcept { return cycles[static_cast<std::size_t>(trouble)]; }
   void add(const RigReading& reading) noexcept;
@@ -37,11 +37,11 @@ struct LinkCounts {
 /// "late_reply", "no_reply", "no_connection", "wrong_reply", "refused", "other".
 const char* name_of(LinkTrouble trouble) noexcept;
 
-/// "3 late replies, 1 wrong reply, at most 2 in a row; the link was brought back 1 time"; empty when
-/// there was no trouble.
+/// "3 late replies, 1 wrong reply, at most 2 in a row; the link was brought back 1 time"; empty when all
+/// counts are zero.
 std::string sentence_of(const LinkCounts& counts);
 
-/// Calls see(name, count) for every count, as run.yaml and --json list them.
+/// Calls see(name, count) for each count, in the order of run.yaml and --json.
 template <class See>
 void for_each_count(const LinkCounts& link, See&& see) {
   for (std::size_t i = 0; i < LinkCounts::kinds; ++i)

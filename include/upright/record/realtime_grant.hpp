@@ -1,4 +1,4 @@
-// What a run was granted of the real-time set-up of its thread, read back.
+// The real-time settings that the thread of a run was granted, as read back.
 #pragma once
 
 #include <string>
@@ -10,7 +10,7 @@ struct RealtimeGrant {
   int priority = 0;
   bool memory_locked = false;
   int cpu = -1;      ///< -1: not pinned
-  std::string note;  ///< one sentence: what was granted, or what to do to be granted it
+  std::string note;  ///< one sentence: the granted settings, or the remedy
 };
 
 }  // namespace upright

@@ -1,4 +1,4 @@
-// Feeds a run's counts through its controller again.
+// Recomputes the voltages of a run from its counts with its controller.
 #pragma once
 
 #include <cstdint>
@@ -18,17 +18,17 @@ struct ReplayMismatch {
 };
 
 struct ReplayResult {
-  std::uint64_t rows = 0;  ///< compared
+  std::uint64_t rows = 0;  ///< number of rows compared
   std::optional<ReplayMismatch> first_mismatch;
-  /// Tick of the first row before which the log itself lost rows: replay cannot be exact from there on.
+  /// Tick of the first row before which the log has lost rows: from there on replay cannot be exact.
   std::optional<std::uint64_t> first_lost_tick;
 };
 
-/// Every voltage, requested and applied, must come out bit for bit. `parts` are those that the run's
-/// controller asks for (`make_model_parts`), and `source` is the run's, where it had one.
+/// All voltages, requested and applied, must be reproduced bit for bit. `parts`: those that the run's
+/// controller requires (`make_model_parts`). `source`: that of the run, if it had one.
 ReplayResult replay(const RunRecord& run, ModelParts parts = {}, CommandSource* source = nullptr);
 
-/// The same with the rows of a file: `run` is read without them. `progress` may be empty.
+/// The same with rows from a file: `run` is read without them. `progress` may be empty.
 ReplayResult replay(const RunRecord& run, SampleReader& rows, ModelParts parts = {},
                     CommandSource* source = nullptr, const ProgressCallback& progress = {});
 

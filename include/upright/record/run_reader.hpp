@@ -1,5 +1,5 @@
-// Reads run directories back, also those of runs that were killed: a cut last line and a missing outcome are
-// normal.
+// Reads run directories, including those of runs that were killed: a truncated last line and a missing
+// outcome are accepted.
 #pragma once
 
 #include <cstdint>
@@ -19,25 +19,25 @@ namespace upright {
 
 /// The rows of a samples.csv.
 struct Samples {
-  std::vector<LogRecord> rows;  ///< `time_ns` to the nanosecond
-  bool truncated = false;       ///< the last line was cut; it is not among the rows
+  std::vector<LogRecord> rows;  ///< `time_ns` with a resolution of a nanosecond
+  bool truncated = false;       ///< the last line was incomplete; it is not among the rows
 };
 
-/// Reads a samples.csv row by row, in the same memory however long the run was.
+/// Reads samples.csv row by row, with constant memory.
 class SampleReader {
  public:
-  /// Throws ConfigError for a column that is missing.
+  /// Throws ConfigError when a column is missing.
   explicit SampleReader(const std::filesystem::path& file);
   ~SampleReader();
   SampleReader(const SampleReader&) = delete;
   SampleReader& operator=(const SampleReader&) = delete;
 
-  /// False after the last row. Throws ConfigError with file and line for a line that is not a row, other than
-  /// at the end of the file.
+  /// False after the last row. Throws ConfigError with file and line for an invalid row, except at the
+  /// end of the file.
   bool next(LogRecord& row);
-  /// After the last row: the last line was cut and was left out.
+  /// After the last row: the last line was incomplete and was skipped.
   bool truncated() const noexcept;
-  /// How much of the file is read, 0 to 1.
+  /// Share of the file that has been read, 0 to 1.
   double share_read() const noexcept;
 
  private:
@@ -45,15 +45,15 @@ class SampleReader {
   std::unique_ptr<Implementation> implementation_;
 };
 
-/// All rows at once. Throws what SampleReader throws.
+/// Reads all rows. Throws as SampleReader does.
 Samples read_samples(const std::filesystem::path& file);
 
 struct RunRecord {
   std::filesystem::path path;
-  YamlMap document;  ///< all of run.yaml
+  YamlMap document;  ///< the complete run.yaml
   std::string label;
   std::string started_utc;
-  double duration_s = 0.0;  ///< asked for
+  double duration_s = 0.0;  ///< requested
   ControlConfig control;
   RigFile rig;
   std::optional<Plant> plant;      ///< simulated rigs only
@@ -64,7 +64,7 @@ struct RunRecord {
 /// Reads a run directory. Throws ConfigError with remedy, file, line and key.
 RunRecord read_run(const std::filesystem::path& directory);
 
-/// The same without the samples, for who reads them row by row.
+/// The same without samples, for callers that read them row by row.
 RunRecord read_run_without_samples(const std::filesystem::path& directory);
 
 }  // namespace upright

@@ -1,4 +1,4 @@
-// Durations gathered in the loop without allocation: exact extremes, percentiles to 1/8 octave.
+// Histogram of durations without allocation: exact extremes, percentiles within 1/8 octave.
 #pragma once
 
 #include <algorithm>
@@ -22,7 +22,7 @@ class DurationHistogram {
   double mean_us() const noexcept { return count_ == 0 ? 0.0 : sum_ns_ / static_cast<double>(count_) / 1e3; }
   double max_us() const noexcept { return static_cast<double>(max_ns_) / 1e3; }
 
-  /// The duration that `part` (0 to 1) of all stayed below: the upper end of its bucket, never above the
+  /// Quantile `part` (0 to 1) of the durations: the upper end of its bucket, at most the
   /// maximum.
   double quantile_us(double part) const noexcept {
     const double wanted = part * static_cast<double>(count_);

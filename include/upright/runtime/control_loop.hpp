@@ -1,5 +1,5 @@
 // The fixed-rate loop: read, compute, write at once, log, sleep. One function for every rig, real or
-// simulated.
+// simulated. It follows the computer's clock, or that of a rig whose device is the clock.
 #pragma once
 
 #include <atomic>
@@ -12,42 +12,48 @@
 #include "upright/hal/rig.hpp"
 #include "upright/record/loop_outcome.hpp"
 #include "upright/record/run_log.hpp"
+#include "upright/runtime/device_clock.hpp"
 #include "upright/runtime/sleep_policy.hpp"
 
 namespace upright {
 
-/// The latest of the loop, for whoever shows it. Written by the loop, read by others; each field for itself.
+/// The latest values of the loop, for display. The loop writes each field separately; others read it.
 struct LiveStatus {
   std::atomic<double> time_s{0.0}, cart_m{0.0}, theta_rad{0.0}, voltage_v{0.0}, worst_late_us{0.0};
   std::atomic<bool> running{false};
   std::atomic<bool> balancing{false};  ///< the state feedback acts
 };
 
-/// Set by a signal handler: the signal's number, or 0. The live page's stop button sets
+/// Set by a signal handler to the signal's number, otherwise 0. The stop button of the live page sets
 /// `stop_button_pressed`.
 using SignalFlag = std::atomic<int>;
 inline constexpr int stop_button_pressed = -1;
 
-/// Runs until the periods are over or a safety stop. The rig is open; when this returns its stop has begun
-/// (`LoopOutcome::stop`), and somebody else waits for it. The last row of a safety stop is at zero volts.
-/// Neither allocates, locks nor throws from the first cycle on, except that in virtual time it waits for the
-/// log.
+/// Runs for the given number of periods or until a safety stop. The rig must be open. On return its stop
+/// has begun (`LoopOutcome::stop`); the caller waits for its completion. The last row of a safety stop
+/// has zero volts. From the first cycle on it does not allocate, lock or throw, except that in virtual
+/// time it waits for the log.
 class ControlLoop {
  public:
+  /// Keeps references to all arguments: eight parts that no other function needs together.
   ControlLoop(Rig& rig, Clock& clock, Controller& controller, PoseScaler& scaler, RowSink& log,
               const LoopLimits& limits, const SignalFlag& signal, LiveStatus& live);
 
-  /// `outcome` is filled in while the loop runs.
+  /// `outcome` is updated while the loop runs.
   void run(LoopOutcome& outcome) noexcept;
 
  private:
   void stop(LoopOutcome& outcome, StopReason reason, std::uint64_t first_bad) noexcept;
   void stop_without_news(const Wake& wake, StopReason reason, std::uint64_t first_bad,
                          LoopOutcome& outcome) noexcept;
-  /// When the parts of a cycle were done, on the loop's clock.
+  /// Times at which the parts of a cycle ended, on the loop's clock.
   struct Stamps {
     std::int64_t read_ns, computed_ns, end_ns;
   };
+  std::int64_t wait_for_cycle() noexcept;
+  bool is_due(std::int64_t woke_ns, LoopOutcome& outcome) noexcept;
+  Wake begin_cycle(std::int64_t woke_ns) noexcept;
+  void begin_time(std::int64_t start_ns, LoopOutcome& outcome) noexcept;
   Stamps act(const Wake& wake, LoopOutcome& outcome) noexcept;
   bool asked_to_end(LoopOutcome& outcome) noexcept;
   void log_stop(std::int64_t woke_ns, LoopOutcome& outcome) noexcept;
@@ -73,6 +79,11 @@ class ControlLoop {
 
   EncoderWatch watch_;
   LoopPhase phase_;
+  std::int64_t start_ns_ = 0;  ///< time zero of the rows
+  DeviceClock device_clock_;
+  DeviceSample sample_;             ///< the latest of a device that is the clock
+  std::uint64_t sample_taken_ = 0;  ///< the number of the latest that is known to the clock
+  bool follows_device_ = false, sample_came_ = false;
   LogRecord row_;  ///< the latest: a cycle without fresh counts repeats its pose and voltage
   std::int64_t watchdog_ns_ = 0, last_fresh_ns_ = 0, last_write_ns_ = 0, read_done_ns_ = 0;
   std::uint64_t first_held_tick_ = 0, first_unwritten_tick_ = 0, first_late_tick_ = 0, periods_late_ = 0;

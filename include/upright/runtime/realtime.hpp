@@ -1,4 +1,4 @@
-// Real-time set-up of the thread that runs the loop, and what was granted of it, read back.
+// Real-time settings of the loop's thread, with read-back of what was granted.
 #pragma once
 
 #include <cstdint>
@@ -9,24 +9,24 @@
 namespace upright {
 
 struct RealtimeRequest {
-  int priority = 80;              ///< of SCHED_FIFO
-  int cpu = -1;                   ///< processor to stay on; -1: the last one allowed, when there are several
-  std::optional<double> spin_us;  ///< in place of the rig file's spin_us
+  int priority = 80;  ///< of SCHED_FIFO
+  int cpu = -1;       ///< processor for the thread; -1: the last one allowed, when there are several
+  std::optional<double> spin_us;  ///< replaces the rig file's spin_us
 };
 
-/// Asks for SCHED_FIFO, a processor and locked memory for the calling thread, touches its stack, and says
-/// plainly what was not granted. Never fails.
+/// Requests SCHED_FIFO, a processor and locked memory for the calling thread, pre-faults its stack, and
+/// reports what was not granted. Never fails.
 RealtimeGrant enter_realtime(const RealtimeRequest& request);
 
-/// Pages that the calling thread has waited for the kernel to bring in, so far.
+/// Number of page faults of the calling thread so far.
 std::uint64_t page_faults();
 
-/// The processor that enter_realtime would stay on, asked for from a thread that is not bound yet; -1: none.
+/// The processor that enter_realtime would choose, called from a thread that is not bound yet; -1: none.
 int loop_cpu(const RealtimeRequest& request);
 
-/// Keeps the calling thread, and threads it will start, off a processor where there is another one, and
-/// behind all other work without real-time priority: what merely shows a run must not delay it. -1: no
-/// processor.
+/// Restricts the calling thread, and threads that it starts, to other processors where there are any, and
+/// lowers its priority below all work without real-time priority, so that display does not delay a run.
+/// -1: no processor is reserved.
 void make_way(int cpu);
 
 }  // namespace upright

@@ -1,4 +1,4 @@
-// A run from its first file to its last: run directory, log, loop thread, outcome.
+// A complete run: run directory, log, loop thread, outcome.
 #pragma once
 
 #include <atomic>
@@ -15,48 +15,48 @@
 
 namespace upright {
 
-/// The default of LoopLimits::most_periods_late: so many periods as make 50 ms, at least 3. Well above the
-/// hiccups of a kernel without real-time scheduling, well below the time in which the pendulum falls.
+/// The default of LoopLimits::most_periods_late: the periods in 50 ms, at least 3. Far above the delays
+/// of a kernel without real-time scheduling, far below the time in which the pendulum falls.
 std::uint64_t default_periods_late(double period_s);
 
-/// Throws ConfigError where the loop would spend more of each period awake than it may.
+/// Throws ConfigError where the loop would poll the clock for too large a share of each period.
 void require_spin_fits(double spin_us, double period_s);
 
-/// What a rig file limits of a run: track, coast, fall, watchdog, and what the watch on the encoders assumes
-/// (the file's section `encoder_watch`, and what a plant of the rig implies where one is known; the widest of
-/// both); and whether somebody checked its signs. `periods`, `most_periods_late` and `delay_exceeded` are
-/// left to the caller.
+/// The limits of a run from a rig file: track, coast, fall, watchdog, the assumptions of the encoder
+/// watch (the union of the file's section `encoder_watch` and of what the rig's plant implies, where it
+/// is known), and whether the signs have been checked. The caller sets `periods`, `most_periods_late` and
+/// `delay_exceeded`.
 LoopLimits rig_limits(const RigFile& rig, const std::optional<Plant>& plant);
 
 struct SessionOptions {
-  std::filesystem::path out = "runs";  ///< the folder that run directories go to
-  RealtimeRequest realtime;            ///< not asked for in virtual time
+  std::filesystem::path out = "runs";  ///< parent folder of run directories
+  RealtimeRequest realtime;            ///< ignored in virtual time
   ModelParts parts;
   std::size_t log_queue_rows = RunLog::Options{}.queue_rows;
   CommandSource* source = nullptr;  ///< null: balance. It must outlive the session.
-  RowWatcher* watcher = nullptr;    ///< of the log's rows; null: nobody. It must outlive the session.
-  /// Called about five times per second from the calling thread while the loop runs; may be empty.
+  RowWatcher* watcher = nullptr;    ///< of the log's rows; null: none. It must outlive the session.
+  /// Called about five times per second by the calling thread while the loop runs; may be empty.
   std::function<void(const LiveStatus&)> show;
-  StopWatcher stop;  ///< of what comes after the loop: zero volts is waited for
+  StopWatcher stop;  ///< callbacks while the session waits for zero volts
 };
 
 struct SessionResult {
-  std::filesystem::path directory;  ///< where it is at the end
-  std::filesystem::path made_at;    ///< elsewhere: another program moved it while the run went on
+  std::filesystem::path directory;  ///< path at the end of the run
+  std::filesystem::path made_at;    ///< path at creation; different if another program moved the directory
   LoopOutcome outcome;
   LogSummary log;
   RealtimeGrant scheduling;
   bool outcome_written = false;
-  double elapsed_s = 0.0;  ///< of the machine's time
+  double elapsed_s = 0.0;  ///< wall-clock time
 };
 
-/// Makes zero counts of a calibration that takes its zero at the start: reads the rig until it has fresh
-/// counts. The rig is open. Throws DeviceError when there are none within `patience_s`.
+/// Determines the zero counts of a calibration whose zero is the pose at the start: reads the open rig
+/// until it has fresh counts. Throws DeviceError when there are none within `patience_s`.
 void find_zero(Rig& rig, Clock& clock, RigFile& file, double patience_s);
 
-/// Runs the loop of `setup` on a rig that is open, and leaves a complete run directory. When this returns the
-/// rig was stopped and the outcome's `stop` says what is known of it. When it throws the rig was stopped too;
-/// what is thrown is a DeviceError where zero volts could not be confirmed.
+/// Runs the loop of `setup` on an open rig and completes the run directory. In every case the rig has
+/// been stopped on exit; `stop` of the outcome describes the state. Throws DeviceError if zero volts
+/// could not be confirmed after an exception.
 SessionResult run_session(RunSetup setup, Rig& rig, Clock& clock, const SignalFlag& signal,
                           SessionOptions options);
 

@@ -1,5 +1,5 @@
-// When the next cycle is due, and how to wait for it: free functions over a small state, so that they can be
-// tested without the machine's clock.
+// The schedule of cycles and the wait for the next one: free functions on a small state, which tests can
+// run without the machine's clock.
 #pragma once
 
 #include <cstdint>
@@ -8,7 +8,7 @@
 
 namespace upright {
 
-/// Cycles are due at start + tick x period, for ever: an overrun never moves the phase.
+/// Cycles are due at start + tick x period: an overrun does not shift the phase.
 struct LoopPhase {
   std::int64_t start_ns = 0;
   std::int64_t period_ns = 1;
@@ -21,12 +21,12 @@ struct LoopPhase {
 
 struct Wake {
   std::uint64_t tick = 0;    ///< the cycle to run now
-  std::uint64_t missed = 0;  ///< cycles that were due before it and will never run
-  std::int64_t late_ns = 0;  ///< after the time the earliest of them was due
+  std::uint64_t missed = 0;  ///< cycles that were due before it and are skipped
+  std::int64_t late_ns = 0;  ///< lateness relative to the earliest of them
 };
 
-/// The cycle to run at `now_ns`, the time at which the loop woke or came back from a long cycle. A late cycle
-/// runs once, as the latest one that is due; those it overtook are counted, never made up for.
+/// The cycle to run at `now_ns`, the time at which the loop woke or finished a long cycle. After a delay
+/// only the latest due cycle is run; the skipped ones are counted and not made up for.
 inline Wake wake_at(LoopPhase& phase, std::int64_t now_ns) noexcept {
   Wake wake;
   const std::int64_t due = phase.due_ns(phase.next_tick);
@@ -37,9 +37,9 @@ inline Wake wake_at(LoopPhase& phase, std::int64_t now_ns) noexcept {
   return wake;
 }
 
-/// Sleeps until `spin_ns` before `due_ns` and then looks at the clock until it is due: who is awake already
-/// is not late by the time that the kernel takes to wake a thread. Returns the time. It is before `due_ns`
-/// only when a signal ended the sleep, or `given_up()` the spinning.
+/// Sleeps until `spin_ns` before `due_ns`, then polls the clock until it is due, which avoids the wake-up
+/// latency of the kernel. Returns the present time. It is earlier than `due_ns` only when a signal ended
+/// the sleep, or `given_up()` the polling.
 template <class GivenUp>
 std::int64_t wait_until_due(Clock& clock, std::int64_t due_ns, std::int64_t spin_ns,
                             const GivenUp& given_up) noexcept {

@@ -1,5 +1,5 @@
-// The end of every run: the motor is brought to zero volts, for as long as it takes to know, and what is
-// known is said.
+// The end of each run: the motor is set to zero volts, and the rig is polled until that is confirmed or
+// the time is over.
 #pragma once
 
 #include <functional>
@@ -9,19 +9,19 @@
 
 namespace upright {
 
-/// How long a stop is tried for at most. Devices restart, and other masters let go, within seconds.
+/// Time limit of a stop. Devices restart, and other masters release a device, within seconds.
 inline constexpr double stop_patience_s = 10.0;
 
-/// Who waits for a stop. Each may be empty.
+/// Callbacks during a stop. Each may be empty.
 struct StopWatcher {
-  /// How often somebody has asked for the end so far (Ctrl-C): once more ends the trying.
+  /// Number of requests so far to end the waiting (Ctrl-C). One more request ends it.
   std::function<unsigned()> end_requests;
-  /// Called about once per second as long as zero volts is not confirmed, with the time that is left.
+  /// Called about once per second while zero volts is not confirmed, with the remaining time.
   std::function<void(const StopReport&, double left_s)> trying;
 };
 
-/// Stops the rig and waits until zero volts is confirmed, the patience is over, or somebody asks for the end
-/// once more. Not from the loop's thread.
+/// Stops the rig and waits until zero volts is confirmed, the time limit is reached, or `end_requests`
+/// increases. Not for the loop's thread.
 StopReport stop_and_wait(Rig& rig, Clock& clock, const StopWatcher& watcher);
 
 }  // namespace upright

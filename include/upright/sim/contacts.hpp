@@ -1,6 +1,6 @@
-// What every engine shares of dry contacts and events: which events to watch for from a state, how to tell
-// that one has come, and which modes of the contacts hold together afterwards. Pure functions of their
-// arguments.
+// Contacts and events, shared by all engines: the events to watch for in a state,
+// functions whose roots are the events, and consistent contact modes after an event. Pure
+// functions.
 #pragma once
 
 #include <algorithm>
@@ -24,7 +24,7 @@ enum class EventKind : std::uint8_t {
   pivot_reversal,
   fall,
   track_end,
-  /// The voltage passes a corner of the actuator chain. Engines restart there; it is not counted as an event.
+  /// The voltage passes a corner of the actuator chain. Engines restart there; it counts as no event.
   actuator_corner,
 };
 
@@ -35,35 +35,35 @@ struct Event {
 
 struct EngineOptions {
   double max_step_s = 1e-3;
-  /// Steps of the Runge-Kutta engine are at most this fraction of the inverse of the fastest rate of the
-  /// motion.
+  /// Upper bound of the step of the Runge-Kutta engine, as a fraction of the inverse of the greatest rate
+  /// of the motion.
   double step_fraction = 0.2;
-  /// Steps of the Runge-Kutta engine are no shorter than this but at events, however fast the motion: a bound
-  /// on the work of an engine that a control loop waits for.
+  /// Lower bound of the step of the Runge-Kutta engine except at events: a bound on the work of an engine
+  /// for which a control loop waits.
   double min_step_s = 0.0;
-  /// Steps of the Runge-Kutta engine resolve the oscillation of the cart on its bristles even where their
-  /// relaxation damps it. Without, stiff bristles cost nothing, and positions err by less than 1e-6 m or so.
+  /// Whether Runge-Kutta steps resolve the cart's oscillation on its bristles where their relaxation
+  /// damps it. False: stiff bristles cost nothing, with position errors of about 1e-6 m.
   bool resolve_bristles = true;
   /// Relative tolerance of the reference engine.
   double relative_tolerance = 1e-10;
-  /// How exactly the Runge-Kutta engine finds the time of an event.
+  /// Tolerance of event times of the Runge-Kutta engine.
   double event_tolerance_s = 1e-14;
-  std::optional<double> fall_angle_rad;  ///< the run halts where |theta| reaches it
-  std::optional<double> track_limit_m;   ///< the run halts where |x| reaches it
-  /// Derivatives of the Runge-Kutta engine on dual numbers, where a step has no event, no motor lag and no
-  /// bristles: of the step's motion linearised in its middle, at a third of the cost. They err by some 1e-4
-  /// of their size then, of the order of the square of the step; the motion itself is the same.
+  std::optional<double> fall_angle_rad;  ///< the simulation halts where |theta| reaches it
+  std::optional<double> track_limit_m;   ///< the simulation halts where |x| reaches it
+  /// Derivatives of the Runge-Kutta engine with dual numbers, for steps without event, motor lag and
+  /// bristles: those of the motion linearised at the middle of the step, at a third of the cost. Their
+  /// relative error is about 1e-4, second order in the step; the motion itself is unchanged.
   bool quick_derivatives = false;
 };
 
-/// An event to look for. `sign` is the direction of the motion before it, `corner_v` the voltage of a corner.
+/// An event to watch for. `sign`: direction of the motion before it; `corner_v`: voltage of a corner.
 struct Watch {
   EventKind kind = EventKind::cart_stick;
   double sign = 1.0;
   double corner_v = 0.0;
 };
 
-/// A few watches, without allocation.
+/// A list of a few watches, without allocation.
 struct WatchList {
   std::array<Watch, 6> items{};
   std::size_t count = 0;
@@ -81,7 +81,7 @@ inline double sign_of_contact(Contact contact) {
   return static_cast<double>(contact);
 }
 
-/// Both contacts as the velocities say, before `settled_contacts` has its word on those at rest.
+/// The contact modes that follow from the velocities, before `settled_contacts` decides on those at rest.
 inline Contacts contacts_of(const PlantState<double>& s) {
   return {direction_of(s.cart_mps), direction_of(s.theta_radps)};
 }
@@ -102,9 +102,9 @@ inline bool holds(Contact mode, double load, double forward_level, double backwa
 
 }  // namespace detail
 
-/// Chooses the modes of contacts that are at rest so that they hold together: a sticking contact carries its
-/// load, a sliding one is driven the way it slides. Sticking is tried first. Moving contacts stay as they
-/// are.
+/// Chooses consistent modes for contacts at rest: a sticking contact carries its load, a
+/// sliding one accelerates in its direction. Sticking is tried first. Moving contacts are
+/// unchanged.
 template <class Present>
 Contacts settled_contacts(const Dynamics<double, Present>& dynamics, const PlantState<double>& s,
                           Contacts contacts) {
@@ -130,8 +130,8 @@ Contacts settled_contacts(const Dynamics<double, Present>& dynamics, const Plant
   return contacts;
 }
 
-/// The events that can come next. `held`: contacts that came to rest stay so, their breakaway is not watched
-/// (how engines end a flutter of events that no time separates).
+/// The events that are possible next. `held`: contacts at rest stay at rest, and their breakaway is not
+/// watched (which ends an unbounded sequence of events at one time).
 template <class S, class Present>
 WatchList next_events(const Dynamics<S, Present>& dynamics, double cart_mps, double theta_radps,
                       Contacts contacts, const EngineOptions& options, bool held = false) {
@@ -159,8 +159,8 @@ WatchList next_events(const Dynamics<S, Present>& dynamics, double cart_mps, dou
   return list;
 }
 
-/// A function of the state that is not positive before the event and positive after it. Corners of the
-/// actuator chain are the engine's own.
+/// An event indicator: not positive before the event, positive after it. Engines treat the corners of the
+/// actuator chain themselves.
 template <class S, class Present>
 S event_indicator(const Dynamics<S, Present>& dynamics, const PlantState<S>& s, Contacts contacts,
                   const Watch& watch, const EngineOptions& options) {
@@ -189,8 +189,8 @@ S event_indicator(const Dynamics<S, Present>& dynamics, const PlantState<S>& s, 
   return S(-1.0);
 }
 
-/// The modes after an event, at the state of the event with the velocity of a contact that came to rest set
-/// to zero. `held` as in `next_events`.
+/// The modes after an event, in the state of the event, with the velocity of a contact that came to rest
+/// set to zero. `held`: as in `next_events`.
 template <class Present>
 Contacts contacts_after(const Dynamics<double, Present>& dynamics, const PlantState<double>& s,
                         Contacts contacts, EventKind kind, bool held = false) {
@@ -214,14 +214,14 @@ Contacts contacts_after(const Dynamics<double, Present>& dynamics, const PlantSt
   }
 }
 
-/// What a stick is called once it is known whether the contact stays.
+/// The kind of a stick event, resolved once it is known whether the contact stays at rest.
 inline EventKind resolved_kind(EventKind kind, Contacts after) {
   if (kind == EventKind::cart_stick && after.cart != Contact::stick) return EventKind::cart_reversal;
   if (kind == EventKind::pivot_stick && after.pivot != Contact::stick) return EventKind::pivot_reversal;
   return kind;
 }
 
-/// Whether a run that starts here has ended already: fallen, or beyond the track.
+/// Whether a simulation has ended in this state: fallen, or beyond the track.
 inline std::optional<EventKind> ended_at(double theta_rad, double cart_m, bool has_pendulum,
                                          const EngineOptions& options) {
   if (has_pendulum && options.fall_angle_rad && std::abs(theta_rad) > *options.fall_angle_rad)
@@ -230,17 +230,17 @@ inline std::optional<EventKind> ended_at(double theta_rad, double cart_m, bool h
   return std::nullopt;
 }
 
-/// Time within [0, h] at which f turns positive, given that f(h) = f_high > 0. Where f(0) = f_low is not
-/// negative (the last event was this one) it looks inside for a time at which the motion has left it; 0 where
-/// it never does. At most about 120 evaluations.
+/// Time within [0, h] at which f becomes positive, given f(h) = f_high > 0. If f(0) = f_low is not
+/// negative (the last event was this one), the search starts at a time at which f is negative; 0 where
+/// there is none. At most about 120 evaluations.
 template <class F>
 double turning_positive(F&& f, double f_low, double f_high, double h, double tolerance_s = 1e-14) {
-  constexpr int most_iterations = 60;
+  constexpr int max_iterations = 60;
   constexpr double nearest_s = 1e-14;
   double low = 0.0, high = h;
   if (!(f_low < 0.0)) {
     double inside = h;
-    for (int i = 0; i < most_iterations && inside > nearest_s; ++i) {
+    for (int i = 0; i < max_iterations && inside > nearest_s; ++i) {
       inside *= 0.5;
       const double f_inside = f(inside);
       if (f_inside < 0.0) {
@@ -253,7 +253,7 @@ double turning_positive(F&& f, double f_low, double f_high, double h, double tol
     }
     if (!(f_low < 0.0)) return 0.0;
   }
-  for (int i = 0; i < most_iterations && high - low > tolerance_s; ++i) {
+  for (int i = 0; i < max_iterations && high - low > tolerance_s; ++i) {
     double t = high - f_high * (high - low) / (f_high - f_low);
     if (!(t > low && t < high) || i % 4 == 3) t = 0.5 * (low + high);
     const double f_t = f(t);
@@ -271,15 +271,15 @@ double turning_positive(F&& f, double f_low, double f_high, double h, double tol
   return high;
 }
 
-/// Counts events in windows of time. In a window with too many of them engines hold contacts at rest, so that
-/// no flutter costs unbounded work.
+/// Counts events in windows of time. In a window with too many events, engines keep contacts at rest, so
+/// that chattering does not cause unbounded work.
 class EventBudget {
  public:
   void restart(double time_s) {
     window_begin_s_ = time_s;
     events_ = 0;
   }
-  /// To be asked before each step.
+  /// Called before each step.
   bool spent(double time_s) {
     if (time_s - window_begin_s_ >= window_s) restart(time_s);
     return events_ >= most_events;
@@ -293,8 +293,8 @@ class EventBudget {
   int events_ = 0;
 };
 
-/// The corners of a plant's actuator chain, in command volts, in rising order: edges of the dead zone and of
-/// saturation.
+/// The corners of a plant's actuator chain in increasing order of the command [V]: limits of the dead
+/// zone and of saturation.
 template <class S>
 struct ActuatorCorners {
   std::array<double, 4> volts{};
@@ -323,9 +323,9 @@ struct ActuatorCorners {
     std::sort(volts.begin(), volts.begin() + static_cast<std::ptrdiff_t>(count));
   }
 
-  /// Adds the nearest corner on either side of a voltage.
+  /// Adds the nearest corners below and above a voltage.
   void watch(double at_v, WatchList& list) const {
-    const double here = 1e-12 * (1.0 + std::abs(at_v));  // on a corner: it has just been passed
+    const double here = 1e-12 * (1.0 + std::abs(at_v));  // a corner at this voltage was just passed
     double below = -std::numeric_limits<double>::infinity();
     for (std::size_t i = 0; i < count; ++i) {
       if (volts[i] < at_v - here) below = volts[i];
@@ -338,16 +338,16 @@ struct ActuatorCorners {
   }
 };
 
-/// The motion over one step of an engine, as a polynomial in time about `at_s`; `factor[k]` multiplies
-/// (t - at_s)^k. Step sinks get it where the voltage varies; it is the dense history of delayed feedback.
+/// The motion over one step as a polynomial in time about `at_s`; `factor[k]` multiplies (t - at_s)^k.
+/// Passed to step sinks under a varying voltage; dense output for delayed feedback.
 struct DenseStep {
   static constexpr int most_factors = 13;
   double begin_s = 0.0;
   double end_s = 0.0;
   double at_s = 0.0;
   int factors = 0;
-  bool ends_at_event = false;   ///< the acceleration jumps at `end_s`
-  bool ends_at_corner = false;  ///< its slope does
+  bool ends_at_event = false;   ///< the acceleration is discontinuous at `end_s`
+  bool ends_at_corner = false;  ///< the derivative of the acceleration is
   std::array<PlantState<double>, most_factors> factor{};
 };
 

@@ -1,6 +1,6 @@
-// The reference engine: SUNDIALS CVODE over the same physics, with root functions for breakaway, sticking,
-// reversal, fall and track end, restarted at every voltage jump and event. Slow and independent of the
-// Runge-Kutta steps of EventEngine, with the same interface, so that either takes the place of the other.
+// The reference engine: SUNDIALS CVODE on the same equations, with root functions for breakaway,
+// sticking, reversal, fall and track end, restarted at each voltage step and event. Slow; independent of
+// the Runge-Kutta steps of EventEngine, with the same interface.
 #pragma once
 
 #include <functional>
@@ -11,8 +11,8 @@
 namespace upright {
 
 /// Integrates a plant with error control (`EngineOptions::relative_tolerance`); `step_fraction` and
-/// `max_step_s` are not used. Adams for plants without stiff parts, BDF otherwise. Throws Error where CVODE
-/// gives up.
+/// `max_step_s` are not used. Adams method for plants without stiff parts, otherwise BDF. Throws Error
+/// where CVODE fails.
 class CvodeEngine {
  public:
   using Volts = std::function<double(double t_s, const PlantState<double>&)>;

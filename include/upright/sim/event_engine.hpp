@@ -1,6 +1,6 @@
-// The real-time engine: classical Runge-Kutta of order 4 with true stick-slip events, for any scalar. With
-// dual numbers the derivatives are right across events: the time of an event is itself a dual number, found
-// by one Newton step from the plain root, and the motion after it starts from there.
+// The real-time engine: the classical Runge-Kutta method of order 4 with stick-slip events, for any
+// scalar. With dual numbers the derivatives are correct across events: the event time is a dual number,
+// from one Newton step at the root of the values, and the motion after it starts there.
 #pragma once
 
 #include <algorithm>
@@ -17,7 +17,7 @@
 
 namespace upright {
 
-/// Integrates a plant over intervals of constant voltage, or under a voltage that varies. Allocates nothing
+/// Integrates a plant over intervals of constant voltage, or under a varying voltage. Allocates nothing
 /// after construction.
 template <class S>
 class EventEngine {
@@ -42,7 +42,7 @@ class EventEngine {
     settle();
   }
 
-  /// Moves on by `duration_s` with the voltage (after the input delay) held at `voltage_v`. Does nothing once
+  /// Advances by `duration_s` with constant `voltage_v` (after the input delay). Has no effect once
   /// halted.
   void advance(const S& duration_s, const S& voltage_v) {
     hold(voltage_v);
@@ -52,7 +52,7 @@ class EventEngine {
     while (value_of(remaining) > 0.0 && !halted_) {
       ++step_count_;
       const bool held = budget_.spent(time_s_);
-      look_at_bristles(value_of(state_.motor_v));
+      update_bristle_step_limit(value_of(state_.motor_v));
       const S step = next_step(remaining);
       FirstRate rate;
       const bool quick = linearises_in_middle();
@@ -76,9 +76,9 @@ class EventEngine {
     }
   }
 
-  /// Moves on by `duration_s` under a voltage that varies: `volts(t, state)` is the command (after the input
-  /// delay) at time t, smooth between events. Steps are at most `most_step_s`; `sink(const DenseStep&)` gets
-  /// each of them before the next one begins. A motor lag below a microsecond is taken as none here.
+  /// Advances by `duration_s` under a varying voltage: `volts(t, state)` is the command (after the input
+  /// delay) at time t, smooth between events. Steps are at most `max_step_s`; `sink(const DenseStep&)`
+  /// receives each step before the next begins. Motor lags below a microsecond are neglected here.
   template <class Volts, class Sink>
   requires(std::is_same_v<S, double>&& std::is_invocable_r_v<
            double, Volts, double, const PlantState<double>&>) void advance(double duration_s,
@@ -94,7 +94,7 @@ class EventEngine {
     while (!halted_ && end_s - time_s_ > smallest_step_s) {
       ++step_count_;
       const bool held = budget_.spent(time_s_);
-      look_at_bristles(lag ? state_.motor_v : plain_.actuate(command(time_s_, state_)));
+      update_bristle_step_limit(lag ? state_.motor_v : plain_.actuate(command(time_s_, state_)));
       double rate = motion_rate();
       if (lag) rate += 1.0 / dynamics_.motor_time_constant_s();
       const double step = even_step(end_s - time_s_, std::min(rate_step(rate), most_step_s));
@@ -133,18 +133,18 @@ class EventEngine {
 
   const PlantState<S>& state() const { return state_; }
   Outputs<S> outputs() const { return dynamics_.measure(state_); }
-  /// Replaces the state at the present time: its derivatives, for callers that chain sensitivities
-  /// themselves, or its values too, for observers that correct it. A contact goes on resting as long as its
-  /// velocity stays zero.
+  /// Replaces the present state: its derivatives, for callers that propagate sensitivities themselves, or
+  /// its values too, for observers that correct it. A sticking contact keeps sticking as long as its
+  /// velocity is zero.
   void correct(const PlantState<S>& state) {
     state_ = state;
     seeded_ = false;
     if (value_of(state.cart_mps) != 0.0) contacts_.cart = direction_of(value_of(state.cart_mps));
     if (value_of(state.theta_radps) != 0.0) contacts_.pivot = direction_of(value_of(state.theta_radps));
   }
-  /// Forgets the derivatives of the state (dual numbers only) and gives it those by itself, in the order x,
-  /// theta, v, omega, bristle, which no parameter may have. Of what cannot move there are none, nor of the
-  /// velocity of a contact at rest, which forgets a push at once.
+  /// Replaces the derivatives of the state (dual numbers only) by the identity, in the order x, theta, v,
+  /// omega, bristle; no parameter may use these places. Coordinates that cannot move have none, nor has
+  /// the velocity of a sticking contact, where an impulse has no effect.
   void seed() requires(!std::is_same_v<S, double>) {
     const bool cart = !dynamics_.cart_locked(), pendulum = dynamics_.has_pendulum();
     const auto set = [](S& number, int place, bool moves) {
@@ -162,14 +162,14 @@ class EventEngine {
   double time_s() const { return time_s_; }
   bool cart_at_rest() const { return dynamics_.cart_can_stick() && contacts_.cart == Contact::stick; }
   bool pivot_at_rest() const { return dynamics_.pivot_can_stick() && contacts_.pivot == Contact::stick; }
-  /// Why the run halted: fall or track_end.
+  /// The event that halted the engine: fall or track_end.
   std::optional<EventKind> halted() const { return halted_; }
 
-  /// Events since `start`: how many, and the latest of them (a ring of `kept_events`).
+  /// The number of events since `start`, and the latest of them (a ring of `kept_events`).
   std::uint64_t event_count() const { return event_count_; }
   const Event& event(std::uint64_t index) const { return events_[index % kept_events]; }
   static constexpr std::uint64_t kept_events = 256;
-  /// Steps taken since `start`, the measure of work.
+  /// Steps since `start`, a measure of computing time.
   std::uint64_t step_count() const { return step_count_; }
 
  private:
@@ -188,8 +188,8 @@ class EventEngine {
     double theta_radps2 = 0.0;
   };
 
-  /// Voltage at the motor under constant drive, as a Runge-Kutta step samples it (beginning, middle, end),
-  /// and what it is after the step.
+  /// Voltage at the motor for constant drive at the nodes of a Runge-Kutta step (beginning, middle, end)
+  /// and after the step.
   template <class T>
   struct LaggedMotor {
     T begin_v, middle_v, end_v, after_v;
@@ -220,10 +220,10 @@ class EventEngine {
     budget_.count();
   }
 
-  /// How bristles move at first, and how fast what a step must resolve of them changes: their way to the
-  /// steady deflection, the relaxation itself, and the cart on their stiffness, which a fast relaxation turns
-  /// from an oscillation into a creep.
-  void look_at_bristles(double motor_v) {
+  /// The initial rate of the bristles, and the greatest rate that a step must resolve: their approach to
+  /// the steady deflection, the relaxation, and the cart's oscillation on their stiffness, which a fast
+  /// relaxation overdamps.
+  void update_bristle_step_limit(double motor_v) {
     if (!dynamics_.has_bristle_state()) return;
     const PlantState<double> s = plain_state(state_);
     const PlantState<double> rate = plain_.derivative(s, motor_v, contacts_);
@@ -236,8 +236,8 @@ class EventEngine {
     const double damping = plain_.bristle_damping(), slowed = damping * push.cart_mps;
     const double spring = plain_.bristle_stiffness() * push.cart_mps;
     const double oscillation = std::sqrt(spring), creep = spring / std::max(relaxation + slowed, 1.0);
-    // Even without: a cart that damping holds against its bristles moves by small differences of large
-    // numbers.
+    // A margin against cancellation: a cart that damping holds against its bristles moves by small
+    // differences of large numbers.
     constexpr double of_damping = 0.05;
     const double on_stiffness =
         options_.resolve_bristles ? oscillation + slowed : std::min(oscillation, creep) + of_damping * slowed;
@@ -247,7 +247,7 @@ class EventEngine {
                  damping * push.theta_radps};
   }
 
-  /// Rate of the motion itself, capped so that no plant costs unbounded work.
+  /// Greatest rate of the motion itself, bounded so that no plant causes unbounded work.
   double motion_rate() const {
     const double rate = plain_.fastest_rate_radps(plain_state(state_), false) + bristle_change_radps_;
     return std::min(rate, most_rate_radps);
@@ -267,7 +267,7 @@ class EventEngine {
     if (dynamics_.has_motor_lag()) {
       const double gap_v = std::abs(value_of(drive_) - value_of(state_.motor_v));
       constexpr double settled_v = 1e-9;
-      // A lag that is shorter than the shortest step is over within it.
+      // A lag shorter than the shortest step has settled within it.
       if (gap_v > settled_v)
         rate = std::min(rate + options_.step_fraction / value_of(dynamics_.motor_time_constant_s()),
                         most_rate_radps);
@@ -287,7 +287,7 @@ class EventEngine {
       return {motor_v, drive + gap * half, drive + gap * half * half, drive + gap * half * half};
     }
     // The parabola with the same zeroth, first and second moment as exp(-r u), u in [0, 1]: the step then
-    // gets the whole impulse right, however short the lag.
+    // has the exact impulse, however short the lag.
     const T e = elementary::exp(T(-r));
     const T m0 = (T(1.0) - e) / r;
     const T m1 = (m0 - e) / r;
@@ -328,11 +328,11 @@ class EventEngine {
            !dynamics_.has_bristle_state();
   }
 
-  /// How the accelerations change with the state: columns cart_m, theta_rad, cart_mps, theta_radps.
+  /// Jacobian of the accelerations: columns cart_m, theta_rad, cart_mps, theta_radps.
   struct Slopes {
     std::array<double, 4> cart_mps2{}, theta_radps2{};
   };
-  /// As the derivatives of `rate` say, of a state with its seeds.
+  /// The Jacobian from the derivatives of `rate`, for a state with the identity as derivatives.
   static Slopes seeded_slopes(const PlantState<S>& rate) requires(!std::is_same_v<S, double>) {
     Slopes slopes;
     for (int i = 0; i < 4; ++i) {
@@ -359,11 +359,11 @@ class EventEngine {
     return slopes;
   }
 
-  /// Steps to `end`, with derivatives (dual numbers only): those of the motion that is linear in the middle,
+  /// Steps to `end`, with derivatives (dual numbers only): those of the motion linearised at the middle,
   /// x(h) = x + (h + h^2 A / 2 + h^3 A^2 / 6) (A x + b).
   void step_linearised(const PlantState<double>& end, const S& h) requires(!std::is_same_v<S, double>) {
     const PlantState<double> begin = plain_state(state_);
-    // The derivatives are taken in the middle, of the state as it is at the beginning.
+    // The Jacobian is evaluated at the middle, the derivatives are those at the beginning.
     PlantState<double> middle;
     const auto halfway = [&](double PlantState<double>::*of, S& number) {
       number.a = middle.*of = 0.5 * (begin.*of + end.*of);
@@ -376,11 +376,11 @@ class EventEngine {
     const PlantState<double> plain_rate = plain_state(rate);
     const double cart_moves = dynamics_.cart_locked() || cart_at_rest() ? 0.0 : 1.0;
     const double pivot_moves = !dynamics_.has_pendulum() || pivot_at_rest() ? 0.0 : 1.0;
-    // What has begun to move since then has no seed.
+    // Coordinates that started to move since the seeding have no derivatives.
     const bool all_seeded =
         seeded_ && state_.cart_mps.v[2] == cart_moves && state_.theta_radps.v[3] == pivot_moves;
     const Slopes slopes = all_seeded ? seeded_slopes(rate) : slopes_at(middle, plain_rate);
-    // Derivatives of what follows: rate is A x + b, `second` A (A x + b), `third` A A (A x + b).
+    // Derivatives of the solution: rate is A x + b, `second` A (A x + b), `third` A A (A x + b).
     using Slope = decltype(S::v);
     const auto bend = [](const std::array<double, 4>& slope, const auto& x, const auto& theta, const auto& v,
                          const auto& omega) {
@@ -398,7 +398,7 @@ class EventEngine {
       return bend(slope, plain_rate.cart_m, plain_rate.theta_rad, plain_rate.cart_mps,
                   plain_rate.theta_radps);
     };
-    // The length of the step may move too.
+    // The step length may have derivatives too.
     const double v_rate = plain_rate.cart_mps + 0.5 * length * bent(slopes.cart_mps2);
     const double omega_rate = plain_rate.theta_radps + 0.5 * length * bent(slopes.theta_radps2);
     const auto set = [&](S& number, double value, const Slope& first, const Slope& second, const auto& third,
@@ -414,7 +414,7 @@ class EventEngine {
     state_.motor_v = drive_;
   }
 
-  /// The same with plain numbers, from the present state.
+  /// The same in plain numbers, from the present state.
   PlantState<double> plain_step(double h) const {
     return rk4(plain_, plain_state(state_), value_of(drive_), h);
   }
@@ -424,7 +424,7 @@ class EventEngine {
     PlantState<double> end;
   };
 
-  /// Rate of the state under a command that varies, the motor's lag included.
+  /// Rate of the state under a varying command, including the motor's lag.
   template <class Command>
   PlantState<double> driven_rate(const Command& command, bool lag, double t,
                                  const PlantState<double>& s) const {
@@ -447,7 +447,7 @@ class EventEngine {
     return step;
   }
 
-  /// The cubic through the states and rates at both ends of the step from now to `to_s`.
+  /// The Hermite cubic through the states and rates at both ends of the step from now to `to_s`.
   template <class Command>
   DenseStep dense_step(const DrivenStep& step, const Command& command, bool lag, double to_s) const {
     const PlantState<double> last = driven_rate(command, lag, to_s, step.end);
@@ -472,7 +472,7 @@ class EventEngine {
     return dense;
   }
 
-  /// The first of the events within a step that ends at `end`; `along(t)` is the state at a time inside.
+  /// The first event within a step that ends at `end`; `along(t)` is the state at a time within it.
   template <class Along>
   std::optional<Found> first_event(const PlantState<double>& end, const FirstRate& rate, double h, bool held,
                                    const Along& along) const {
@@ -495,7 +495,7 @@ class EventEngine {
       const bool cart = watch.kind == EventKind::cart_stick || watch.kind == EventKind::cart_reversal;
       const bool pivot = watch.kind == EventKind::pivot_stick || watch.kind == EventKind::pivot_reversal;
       if (!cart && !pivot) continue;
-      // The velocity may dip through zero and come back within the step.
+      // The velocity may change sign twice within the step.
       const double from = watch.sign * (cart ? v : omega);
       const double slope = watch.sign * (cart ? rate.cart_mps2 : rate.theta_radps2);
       if (!(from > 0.0 && from + 0.5 * h * slope <= 0.0)) continue;
@@ -508,12 +508,12 @@ class EventEngine {
     return first;
   }
 
-  /// Moves to an event and through it. Returns the time it took, with its derivative.
+  /// Advances to an event and through it. Returns the elapsed time with its derivative.
   S pass(const Found& found, bool held) {
     S taken(found.after_s);
     PlantState<S> at = rk4(dynamics_, state_, drive_, taken);
     if constexpr (!std::is_same_v<S, double>) {
-      // The root moves with the parameters: dt = -dg / (dg/dt).
+      // The root depends on the parameters: dt = -dg / (dg/dt).
       const S g = event_indicator(dynamics_, at, contacts_, found.watch, options_);
       const double slope = indicator_slope(found);
       constexpr double flattest = 1e-9;  // a grazing event has no derivative; keep it finite
@@ -530,7 +530,7 @@ class EventEngine {
     return taken;
   }
 
-  /// Changes modes for an event at the present state.
+  /// Changes the contact modes for an event at the present state.
   void enter(const Watch& watch, bool held) {
     const EventKind kind = watch.kind;
     if (kind == EventKind::actuator_corner) return;
@@ -541,7 +541,7 @@ class EventEngine {
     note(resolved_kind(kind, contacts_));
   }
 
-  /// How fast the indicator rises where it crosses zero [1/s].
+  /// Rate of the indicator at its zero [1/s].
   double indicator_slope(const Found& found) const {
     constexpr double aside_s = 1e-7;
     const auto g = [&](double t) {
@@ -555,11 +555,11 @@ class EventEngine {
   ActuatorCorners<S> corners_;
   EngineOptions options_;
   PlantState<S> state_{};
-  bool seeded_ = false;  ///< the derivatives of the state are those by itself
+  bool seeded_ = false;  ///< the derivatives of the state are the identity
   Contacts contacts_;
   S drive_{};
   Bristles bristles_;                  ///< at the beginning of this step
-  double bristle_change_radps_ = 0.0;  ///< what steps must resolve of them
+  double bristle_change_radps_ = 0.0;  ///< the greatest rate of theirs that steps must resolve
   double time_s_ = 0.0;
   std::optional<EventKind> halted_;
   EventBudget budget_;

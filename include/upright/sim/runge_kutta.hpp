@@ -1,5 +1,5 @@
-// The classical Runge-Kutta method of order 4 over a plant's state, for any scalar: double, dual numbers,
-// lanes. Bristles that relax fast are followed by its exponential form.
+// The classical Runge-Kutta method of order 4 on a plant's state, for any scalar: double, dual numbers,
+// lanes. Bristles with fast relaxation are integrated by its exponential form.
 #pragma once
 
 #include <array>
@@ -11,7 +11,7 @@
 
 namespace upright {
 
-/// Whether the voltage at the motor is a state that moves, or held over the step.
+/// Whether the voltage at the motor is a state variable, or constant over the step.
 enum class MotorVoltage : std::uint8_t { held, moves };
 
 template <MotorVoltage motor = MotorVoltage::held, class S>
@@ -26,33 +26,33 @@ PlantState<S> moved(const PlantState<S>& s, const PlantState<S>& rate, const S& 
   return to;
 }
 
-/// Bristles at the beginning of a step, as the exponential method below splits their motion. Whatever the
-/// numbers are, the method has order 4; the nearer they are to the truth, the less a long step errs.
+/// Coefficients of the bristles at the beginning of a step, for the exponential method below. The method
+/// has order 4 for any coefficients; accurate ones reduce the error of long steps.
 struct Bristles {
-  double relaxation_radps = 0.0;  ///< R, with the velocity that their damping gives the cart
-  double drift_mps2 = 0.0;        ///< how fast the rest of their rate changes
+  double relaxation_radps = 0.0;  ///< R, including the velocity that their damping gives the cart
+  double drift_mps2 = 0.0;        ///< rate of change of the remaining part of their rate
   double cart_mps_per_m = 0.0;    ///< velocity that their damping takes from the cart per deflection
   double theta_radps_per_m = 0.0;
 };
 
-/// How bristles move within a step of length h however fast they relax: dz/dt = -R z + drift t + smooth part,
-/// by ETDRK4, equations (26)-(29) of Cox and Matthews, "Exponential time differencing for stiff systems", J.
-/// Comput. Phys. 176 (2002). With all of `Bristles` zero it is the classical method. Their damping pushes the
-/// cart by how far they moved, not by how fast they do at a few moments.
+/// Bristles within a step of length h for any relaxation rate: dz/dt = -R z + drift t + smooth part, by
+/// ETDRK4, equations (26)-(29) of Cox and Matthews, "Exponential time differencing for stiff systems", J.
+/// Comput. Phys. 176 (2002). With all of `Bristles` zero it is the classical method. The impulse of their
+/// damping on the cart follows from their displacement, not from their rate at the nodes.
 template <class S>
 struct Relaxation {
   Bristles bristles;
   S half_decay, decay;             ///< exp(-R h / 2), exp(-R h)
-  S half_weight;                   ///< of the smooth part over half the step
+  S half_weight;                   ///< weight of the smooth part over half the step
   std::array<S, 3> whole_weights;  ///< of the smooth part at the beginning, in the middle and at the end
-  S first_half_m, second_half_m, whole_m;  ///< what the drift adds
+  S first_half_m, second_half_m, whole_m;  ///< contribution of the drift
   S half_drift_mps, drift_mps;             ///< drift in the middle and at the end
 
-  /// The smooth part of their rate, where the drift has come to `drift`.
+  /// The smooth part of their rate at a drift of `drift`.
   S smooth(const PlantState<S>& at, const PlantState<S>& rate, const S& drift) const {
     return rate.bristle_m + S(bristles.relaxation_radps) * at.bristle_m - drift;
   }
-  /// Puts them where they are, in the place of where the classical method has them, and the cart with them.
+  /// Replaces the deflection that the classical method gives, and the cart's velocity accordingly.
   void put(PlantState<S>& at, const S& bristle_m) const {
     const S aside = bristle_m - at.bristle_m;
     at.bristle_m = bristle_m;
@@ -100,7 +100,7 @@ struct Relaxation {
         three = (two - 0.5) / c;
         return;
       }
-      constexpr int last = 18;  // of the factorials: the rest is below the rounding
+      constexpr int last = 18;  // number of terms: the remainder is below the rounding error
       double term = 1.0;
       for (int k = last; k > 3; --k) term = 1.0 + term * c / k;
       three = term / 6.0;
@@ -117,7 +117,7 @@ struct Relaxation {
     }
   };
 
-  /// A function of the length from its value and its slope there.
+  /// A function of the step length from its value and its derivative.
   static S along([[maybe_unused]] const S& h, double value, [[maybe_unused]] double slope) {
     if constexpr (std::is_same_v<S, double>)
       return value;
@@ -126,11 +126,11 @@ struct Relaxation {
   }
 };
 
-/// Where in a step a rate is asked for. Its beginning is asked for by the caller.
+/// The node of a step at which a rate is evaluated. The caller evaluates that of the beginning.
 enum class Stage : std::uint8_t { middle, end };
 
-/// One step of length h from `s`. `first` is the rate at its beginning, `rate(state, Stage)` that of the
-/// others. `bristles` is how they move, null where nothing relaxes fast.
+/// One step of length h from `s`. `first`: the rate at its beginning; `rate(state, Stage)`: at the other
+/// nodes. `bristles`: their motion, null where no relaxation is fast.
 template <MotorVoltage motor = MotorVoltage::held, class S, class Rate>
 PlantState<S> runge_kutta_4(const Rate& rate, const PlantState<S>& s, const PlantState<S>& first, const S& h,
                             const Relaxation<S>* bristles = nullptr) {

@@ -1,4 +1,4 @@
-// A plant with its input: commands take effect after the plant's input delay, the engine does the rest.
+// A plant with its input: commands act after the plant's input delay; an engine integrates the motion.
 #pragma once
 
 #include <cstddef>
@@ -8,18 +8,18 @@
 
 namespace upright {
 
-/// Follows a record of commanded voltages on any engine (EventEngine<S>, CvodeEngine) whose numbers are S.
+/// Simulates a sequence of voltage commands with any engine (EventEngine<S>, CvodeEngine) with numbers S.
 /// Allocates at construction only.
 template <class Engine, class S>
 class BasicSimulator {
  public:
-  /// `most_commands`: how many commands may be on their way at once (input delay times command rate, and
-  /// some).
+  /// `most_commands`: the largest number of commands within the input delay (input delay times command
+  /// rate, and a margin).
   explicit BasicSimulator(const PlantModel<S>& model, const EngineOptions& options = {},
                           std::size_t most_commands = 4096)
       : engine_(model, options), delay_s_(engine_.dynamics().input_delay_s()), waiting_(most_commands) {}
 
-  /// Starts at a time, with the voltage that has been acting until then.
+  /// Starts at a time, with the voltage that has acted until then.
   void start(const PlantState<S>& state, double time_s = 0.0, double acting_v = 0.0) {
     acting_v_ = acting_v;
     now_s_ = S(time_s);
@@ -28,8 +28,8 @@ class BasicSimulator {
     engine_.start(state, time_s, S(acting_v));
   }
 
-  /// The voltage commanded from `time_s` on. Times must not go back; commands from before the start are
-  /// welcome.
+  /// The voltage commanded from `time_s` on. Times must not decrease; commands from before the start are
+  /// allowed.
   void command(double time_s, double voltage_v) {
     if (count_ == waiting_.size()) drop_oldest();
     waiting_[(first_ + count_++) % waiting_.size()] = {S(time_s) + delay_s_, voltage_v};
@@ -48,7 +48,7 @@ class BasicSimulator {
   Engine& engine() { return engine_; }
   const Engine& engine() const { return engine_; }
   double time_s() const { return value_of(now_s_); }
-  /// The commanded voltage that acts now, after the input delay and before the rest of the actuator chain.
+  /// The command that acts at present: after the input delay, before the rest of the actuator chain.
   double acting_v() const { return acting_v_; }
 
  private:

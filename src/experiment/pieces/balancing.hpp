@@ -26,7 +26,7 @@ class Balancing : public PieceKind {
                  "balances"
                : "";
   }
-  void become(const ExperimentTrial& trial) override { delay_s_ = trial.delay_s; }
+  void set_trial(const ExperimentTrial& trial) override { delay_s_ = trial.delay_s; }
 
   bool balances() const override { return true; }
   bool swings_up() const override { return start_ == StartBy::swing_up; }

@@ -31,8 +31,8 @@ class ClosedLoop final : public PieceOf<ClosedLoop, Balancing> {
   void refuse_beyond(double travel_m, const YamlMap& map) const override {
     for (const double x : set_points_m_)
       if (std::abs(x) >= travel_m)
-        map.fail("set_points_m", "has " + exact_text(x) + ", beyond travel_m",
-                 "bring the set-points nearer to the middle");
+        map.fail("set_points_m", "contains " + exact_text(x) + ", which is beyond travel_m",
+                 "move the set-points closer to the middle");
   }
   PieceTime time() const override { return {hold_s_ * static_cast<double>(set_points_m_.size()), "hold_s"}; }
   double runs() const override {
@@ -63,8 +63,8 @@ class ClosedLoop final : public PieceOf<ClosedLoop, Balancing> {
         trials.push_back({0, round, delay_s_, controller});
     return trials;
   }
-  void become(const ExperimentTrial& trial) override {
-    Balancing::become(trial);
+  void set_trial(const ExperimentTrial& trial) override {
+    Balancing::set_trial(trial);
     if (controllers_.empty()) return;
     if (!starts_rad_.empty())
       theta0_rad = starts_rad_[static_cast<std::size_t>(trial.repeat) % starts_rad_.size()];

@@ -39,11 +39,11 @@ class ConstantVoltage final : public PieceOf<ConstantVoltage> {
       if (needed_m <= room_m) continue;
       double fits = v;
       while (fits > 0.05 && length_for_m(fits, context) > room_m) fits *= 0.98;
-      return Refusal{
-          "voltages_v",
-          "needs " + brief_text(needed_m) + " m to reach its speed at " + brief_text(v) +
-              " V and to stop, and has " + brief_text(room_m) + " m",
-          "lower the voltage to " + brief_text(fits) + " V or give travel_m " + brief_text(0.5 * needed_m)};
+      return Refusal{"voltages_v",
+                     "needs " + brief_text(needed_m) + " m to reach its speed at " + brief_text(v) +
+                         " V and to stop, but has " + brief_text(room_m) + " m",
+                     "lower the voltage to " + brief_text(fits) + " V, or raise travel_m to " +
+                         brief_text(0.5 * needed_m)};
     }
     return std::nullopt;
   }

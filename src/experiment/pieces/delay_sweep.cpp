@@ -60,7 +60,8 @@ void DelaySweep::keys(PieceKeys& keys) {
   keys.integer("repeats", repeats, 1, 100, 1);
   keys.number("bisect_to_s", bisect_to_s, Range::within(0.0, 1.0), 0.0);
   keys.check("bisect_to_s", bisect_to_s <= 0.0 || bisect_to_s >= finest_bisection_s,
-             "is " + exact_text(bisect_to_s), "give 0 or a number from " + exact_text(finest_bisection_s));
+             "is " + exact_text(bisect_to_s) + ", which is too fine",
+             "set it to 0 or to at least " + exact_text(finest_bisection_s));
   keys.number("stable_below_rad", stable_below_rad, Range{0.0, 1.0, true}, 0.0061);
   start_key(keys);
   keys.angle("theta0_deg", theta0_rad, release_deg, usual_release_deg);
@@ -83,8 +84,8 @@ std::optional<ExperimentTrial> DelaySweep::next_trial(std::size_t index,
   return std::nullopt;
 }
 
-void DelaySweep::become(const ExperimentTrial& trial) {
-  Balancing::become(trial);
+void DelaySweep::set_trial(const ExperimentTrial& trial) {
+  Balancing::set_trial(trial);
   delays_s = {trial.delay_s};
 }
 

@@ -19,7 +19,7 @@ class DelaySweep final : public PieceOf<DelaySweep, Balancing> {
 
   std::optional<ExperimentTrial> next_trial(std::size_t index,
                                             const std::vector<TrialResult>& done) const override;
-  void become(const ExperimentTrial& trial) override;
+  void set_trial(const ExperimentTrial& trial) override;
   std::string suffix(const ExperimentTrial& trial) const override;
   std::string words(const ExperimentTrial& trial) const override;
   bool is_result(const std::string& outcome) const override;

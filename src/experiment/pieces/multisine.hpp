@@ -20,7 +20,7 @@ class Multisine final : public PieceOf<Multisine> {
     keys.number("lowest_hz", lowest_hz_, hertz, required);
     keys.number("highest_hz", highest_hz_, hertz, required);
     keys.check("highest_hz", highest_hz_ > lowest_hz_, "is not above lowest_hz",
-               "give it a higher frequency");
+               "set it to a higher frequency");
     keys.integer("lines", lines_, 2, 64, 8);
     keys.number("duration_s", duration_s_, any_duration, required);
   }

@@ -19,7 +19,8 @@ class SlowSine final : public PieceOf<SlowSine> {
     keys.number("duration_s", duration_s_, any_duration, required);
   }
   void refuse_beyond(double travel_m, const YamlMap& map) const override {
-    if (amplitude_m_ >= travel_m) map.fail("amplitude_m", "is not below travel_m", "lower it");
+    if (amplitude_m_ >= travel_m)
+      map.fail("amplitude_m", "is not below travel_m", "lower it, or raise travel_m");
   }
   PieceTime time() const override { return {duration_s_}; }
 

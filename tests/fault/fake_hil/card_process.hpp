@@ -76,4 +76,9 @@ inline std::string fake_card_rig() {
   return text + "  amplifier_enable: {line: 0, active: high}\n";
 }
 
+/// The same, where the card is the clock.
+inline std::string on_the_cards_clock(const std::string& rig_text) {
+  return replaced(rig_text, "  board_type: q2_usb\n", "  board_type: q2_usb\n  clock: card\n");
+}
+
 }  // namespace upright::test

@@ -235,9 +235,30 @@ Reply FakeCard::counts() {
   return reply;
 }
 
+Reply FakeCard::start_task(const Request& request) {
+  if (is_unreachable()) return failed(board_not_found);
+  if (expired_) return failed(not_possible_now);
+  task_ = request;
+  task_.call = Call::read_encoder;
+  sample_period_ns_ = 1e9 / request.values[0] * (1.0 + 1e-6 * mishaps_.drift_ppm);
+  sample_due_exact_ns_ = static_cast<double>(now_ns_) + sample_period_ns_;
+  sample_due_ns_ = static_cast<std::int64_t>(sample_due_exact_ns_);
+  return {};
+}
+
+std::optional<Reply> FakeCard::sample() {
+  if (now_ns_ < sample_due_ns_) return std::nullopt;
+  sample_due_exact_ns_ += sample_period_ns_;
+  sample_due_ns_ = static_cast<std::int64_t>(sample_due_exact_ns_);
+  if (mishaps_.never_samples || is_due(mishaps_.stop_sampling_s)) return std::nullopt;
+  if (is_unreachable()) return failed(board_not_found);
+  if (!plant_.held() && mishaps_.drop_every > 0 && ++samples_ % mishaps_.drop_every == 0) return std::nullopt;
+  return expired_ ? failed(not_possible_now) : on_hardware(task_);
+}
+
 namespace {
 
-constexpr int step_ms = 1;
+constexpr std::int64_t step_ns = 1'000'000;
 
 int listening_at(const std::string& path) {
   const int descriptor = socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0);
@@ -259,16 +280,36 @@ void wait_until(FakeCard& card, std::int64_t until_ns) {
   }
 }
 
-/// False: the program at the other end is gone. `owner` becomes who has the card open.
-bool served(FakeCard& card, int client, int& owner) {
+/// Who has the card open, and whom its task sends samples.
+struct Owners {
+  int card = -1, task = -1;
+};
+
+/// False: the program at the other end is gone.
+bool served(FakeCard& card, int client, Owners& owners) {
   MonotonicClock clock;
   Request request;
   if (recv(client, &request, sizeof request, 0) != sizeof request) return false;
   card.advance_to(clock.now_ns());
   wait_until(card, clock.now_ns() + static_cast<std::int64_t>(1e9 * card.late_s(request)));
-  const Reply reply = card.answer(request);
-  if (request.call == Call::open && reply.result >= 0) owner = client;
+  const bool is_task = request.call == Call::task_start;
+  const Reply reply = is_task ? card.start_task(request) : card.answer(request);
+  if (request.call == Call::open && reply.result >= 0) owners.card = client;
+  if (is_task && reply.result >= 0) owners.task = client;
   return send(client, &reply, sizeof reply, MSG_NOSIGNAL) == sizeof reply;
+}
+
+void send_sample(FakeCard& card, int task) {
+  if (const std::optional<Reply> sample = card.sample())
+    // A program that stands still does not stop the card.
+    send(task, &*sample, sizeof *sample, MSG_NOSIGNAL | MSG_DONTWAIT);
+}
+
+void wait_for_requests(const FakeCard& card, std::vector<pollfd>& open) {
+  const std::int64_t until_sample_ns = card.sample_due_ns() - MonotonicClock().now_ns();
+  const timespec longest{0, std::clamp<std::int64_t>(until_sample_ns, 0, step_ns)};
+  if (ppoll(open.data(), open.size(), &longest, nullptr) < 0)
+    for (pollfd& descriptor : open) descriptor.revents = 0;  // a signal came
 }
 
 }  // namespace
@@ -279,19 +320,20 @@ void serve(FakeCard& card, const std::string& path, const volatile int& stopped,
   std::vector<pollfd> open = {{listening_at(path), POLLIN, 0}};
   std::printf("listening on %s\n", path.c_str());
   std::fflush(stdout);
-  int owner = -1;  // who has the card open
+  Owners owners;
   bool is_silent = false;
   while (stopped == 0) {
-    if (poll(open.data(), open.size(), step_ms) < 0)
-      for (pollfd& descriptor : open) descriptor.revents = 0;  // a signal came
+    wait_for_requests(card, open);
     card.advance_to(clock.now_ns());
+    send_sample(card, owners.task);
     if (silence != 0 && !is_silent) {
       is_silent = true;
       card.be_silent(clock.now_ns());
     }
     for (std::size_t i = open.size(); i-- > 1;) {
-      if (open[i].revents == 0 || served(card, open[i].fd, owner)) continue;
-      if (open[i].fd == owner) card.hang_up();
+      if (open[i].revents == 0 || served(card, open[i].fd, owners)) continue;
+      if (open[i].fd == owners.card) card.hang_up();
+      if (open[i].fd == owners.task) card.end_task();
       close(open[i].fd);
       open.erase(open.begin() + static_cast<std::ptrdiff_t>(i));
     }

@@ -31,6 +31,11 @@ struct Mishaps {
   int failed_openings = 0;  ///< so many attempts to open it fail
   bool locked_at_start = false;
   double silent_s = 1e9;  ///< once told to be silent: for so long
+  // Of a task on the card's own clock.
+  double drift_ppm = 0.0;        ///< its period is longer by this, from the beginning on
+  int drop_every = 0;            ///< one sample in so many is not taken
+  bool never_samples = false;    ///< nor is any other
+  double stop_sampling_s = 0.0;  ///< it takes no samples any more, and answers everything else
 };
 
 class FakeCard {
@@ -43,6 +48,14 @@ class FakeCard {
   /// How long this call's answer is held back.
   double late_s(const Request& request);
   Reply answer(const Request& request);
+  /// Begins a task: a sample is due with each period of the card's own clock.
+  Reply start_task(const Request& request);
+  /// The sample that is due; none: it is not due yet, or is not taken.
+  std::optional<Reply> sample();
+  /// When the next one is due; `for_ever_ns` without a task.
+  std::int64_t sample_due_ns() const { return sample_due_ns_; }
+  void end_task() { sample_due_ns_ = for_ever_ns; }
+  static constexpr std::int64_t for_ever_ns = INT64_MAX;
   /// The program that had it open is gone.
   void hang_up() { open_ = false; }
   /// From now on no call succeeds, for the time that the mishaps say.
@@ -73,7 +86,10 @@ class FakeCard {
   std::array<std::int64_t, lines> count_offset_{};
   std::optional<EncoderCounts> stuck_;
   double timeout_s_ = 0.0;
-  int calls_ = 0, openings_ = 0;
+  Request task_;
+  double sample_period_ns_ = 0.0, sample_due_exact_ns_ = 0.0;
+  std::int64_t sample_due_ns_ = for_ever_ns;
+  int calls_ = 0, openings_ = 0, samples_ = 0;
   bool open_ = false, watching_ = false, expired_ = false;
 };
 

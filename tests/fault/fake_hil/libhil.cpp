@@ -7,6 +7,8 @@
 #include <algorithm>
 #include <cstdio>
 #include <cstring>
+#include <string>
+#include <vector>
 
 #include "../../../hal/quanser/hil.hpp"
 #include "wire.hpp"
@@ -18,11 +20,19 @@ namespace hil = upright::hil;
 
 struct upright::hil::CardTag {
   int socket = -1;
+  std::string identifier;
+};
+
+/// A connection of its own, over which the card sends its samples when it takes them.
+struct upright::hil::TaskTag {
+  int socket = -1;
+  std::vector<unsigned> channels;
+  bool overwrites = false;
 };
 
 namespace {
 
-constexpr int connection_gone = 44;
+constexpr int connection_gone = 44, buffer_overflow = 111;
 
 int connected_to(const char* identifier) {
   const char* at = std::strstr(identifier, "@unix:");
@@ -37,12 +47,16 @@ int connected_to(const char* identifier) {
   return -1;
 }
 
-Reply asked(hil::Card card, const Request& request) {
+Reply asked(int socket, const Request& request) {
   Reply reply;
-  if (send(card->socket, &request, sizeof request, MSG_NOSIGNAL) != sizeof request ||
-      recv(card->socket, &reply, sizeof reply, 0) != sizeof reply)
+  if (send(socket, &request, sizeof request, MSG_NOSIGNAL) != sizeof request ||
+      recv(socket, &reply, sizeof reply, 0) != sizeof reply)
     reply.result = -connection_gone;
   return reply;
+}
+
+Reply asked(hil::Card card, const Request& request) {
+  return asked(card->socket, request);
 }
 
 template <class Value>
@@ -85,7 +99,7 @@ extern "C" {
 hil::Error hil_open(const char* type, const char* identifier, hil::Card* card) {
   const int descriptor = connected_to(identifier);
   if (descriptor < 0) return -hil::board_not_found;
-  *card = new hil::CardTag{descriptor};
+  *card = new hil::CardTag{descriptor, identifier};
   Request request;
   std::strncpy(request.text.data(), type, request.text.size() - 1);
   const hil::Error result = asked(*card, request).result;
@@ -189,6 +203,47 @@ hil::Error hil_set_digital_termination_state(hil::Card card, hil::Channels lines
 }
 hil::Error hil_write_termination_states(hil::Card card) {
   return tell(card, Call::write_termination);
+}
+
+hil::Error hil_task_create_encoder_reader(hil::Card card, unsigned samples_in_buffer, hil::Channels channels,
+                                          unsigned count, hil::Task* task) {
+  if (samples_in_buffer != 1) return -hil::not_supported;
+  const int descriptor = connected_to(card->identifier.c_str());
+  if (descriptor < 0) return -hil::board_not_found;
+  *task = new hil::TaskTag{descriptor, {channels, channels + count}};
+  return 0;
+}
+hil::Error hil_task_set_buffer_overflow_mode(hil::Task task, hil::BufferOverflowMode mode) {
+  task->overwrites = mode == hil::overwrite_on_overflow;
+  return 0;
+}
+hil::Error hil_task_start(hil::Task task, hil::Clock, double rate_hz, unsigned) {
+  Request request = request_for<double>(Call::task_start, task->channels.data(),
+                                        static_cast<unsigned>(task->channels.size()), nullptr);
+  request.values[0] = rate_hz;
+  return asked(task->socket, request).result;
+}
+hil::Error hil_task_read_encoder(hil::Task task, unsigned, std::int32_t* counts) {
+  Reply reply;
+  const ssize_t came = recv(task->socket, &reply, sizeof reply, 0);
+  if (came == 0) return 0;  // stopped
+  if (came != sizeof reply) return -connection_gone;
+  // The buffer holds one sample.
+  while (recv(task->socket, &reply, sizeof reply, MSG_DONTWAIT) == sizeof reply)
+    if (!task->overwrites) return -buffer_overflow;
+  if (reply.result < 0) return reply.result;
+  for (std::size_t i = 0; i < task->channels.size(); ++i)
+    counts[i] = static_cast<std::int32_t>(reply.values.at(i));
+  return 1;
+}
+hil::Error hil_task_stop(hil::Task task) {
+  shutdown(task->socket, SHUT_RDWR);
+  return 0;
+}
+hil::Error hil_task_delete(hil::Task task) {
+  close(task->socket);
+  delete task;
+  return 0;
 }
 
 }  // extern "C"

@@ -55,6 +55,10 @@ Arguments read(int argc, char** argv) {
       {"--failed-openings", whole(m.failed_openings)},
       {"--locked", [&m](const std::string& text) { m.locked_at_start = text == "true"; }},
       {"--silent-s", number(m.silent_s)},
+      {"--drift-ppm", number(m.drift_ppm)},
+      {"--drop-every", whole(m.drop_every)},
+      {"--never-samples", [&m](const std::string& text) { m.never_samples = text == "true"; }},
+      {"--stop-sampling-after", number(m.stop_sampling_s)},
   };
   for (int i = 1; i + 1 < argc; i += 2) flags.at(argv[i])(argv[i + 1]);
   return a;

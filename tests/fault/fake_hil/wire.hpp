@@ -33,6 +33,8 @@ enum class Call : std::uint32_t {
   set_analog_termination,
   set_digital_termination,
   write_termination,
+  /// values[0] is the rate [Hz]. The answer, and then a reply with each sample, until this side hangs up.
+  task_start,
 };
 
 struct Request {

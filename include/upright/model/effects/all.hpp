@@ -1,4 +1,4 @@
-// The registration of every effect: one line each. Their order here is the order of documents and candidates.
+// The registration of all effects, one line each, in the order of documents and candidates.
 #pragma once
 
 #include <tuple>

@@ -1,4 +1,4 @@
-// angle_offset: the angle sensor is zeroed off the vertical.
+// angle_offset: the zero of the angle sensor deviates from the vertical.
 #pragma once
 
 #include "upright/model/effect.hpp"

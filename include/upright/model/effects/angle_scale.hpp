@@ -1,4 +1,4 @@
-// angle_scale: the angle encoder counts more or fewer radians than there are; zero is upright.
+// angle_scale: scale error of the angle encoder about the upright position.
 #pragma once
 
 #include "upright/model/effect.hpp"

@@ -1,4 +1,4 @@
-// back_emf: the motor brakes more or less than the model says.
+// back_emf: the motor's back-EMF is larger or smaller than in the model.
 #pragma once
 
 #include "upright/model/effect.hpp"

@@ -1,4 +1,4 @@
-// bristle_friction: renders the dry level through elastic bristles instead of rigid sticking (paper,
+// bristle_friction: represents the dry friction by elastic bristles instead of rigid sticking (paper,
 // equations (8) and (9)).
 #pragma once
 

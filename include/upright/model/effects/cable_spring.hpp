@@ -1,4 +1,4 @@
-// cable_spring: the pull of a cable or a spring toward a place on the track.
+// cable_spring: the force of a cable or spring toward a position on the track.
 #pragma once
 
 #include "upright/model/effect.hpp"

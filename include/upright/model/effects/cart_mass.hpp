@@ -1,4 +1,4 @@
-// cart_mass: the cart is heavier or lighter than the model says.
+// cart_mass: the cart's mass is larger or smaller than in the model.
 #pragma once
 
 #include "upright/model/effect.hpp"

@@ -1,4 +1,4 @@
-// cart_scale: the cart encoder counts more or fewer metres than there are.
+// cart_scale: scale error of the cart encoder.
 #pragma once
 
 #include "upright/model/effect.hpp"

@@ -1,4 +1,4 @@
-// cogging_force: a force that repeats along the track: teeth, magnets.
+// cogging_force: a force that is periodic along the track, caused by teeth or magnets.
 #pragma once
 
 #include <cmath>

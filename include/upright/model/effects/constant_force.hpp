@@ -1,4 +1,4 @@
-// constant_force: a steady force on the cart: a tilted track, a bias.
+// constant_force: a constant force on the cart, for example from a tilted track.
 #pragma once
 
 #include "upright/model/effect.hpp"

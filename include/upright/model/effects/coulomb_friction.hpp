@@ -1,4 +1,4 @@
-// coulomb_friction: dry friction between cart and track with a level that does not depend on speed.
+// coulomb_friction: dry friction between cart and track with a level independent of speed.
 #pragma once
 
 #include "upright/model/effect.hpp"

@@ -1,6 +1,6 @@
-// drive_compliance: the drive gives way between the cart and its encoder, which sits on the motor's side. Its
-// own motion is over between two samples. What is fed back without a sampled loop (a linear plant, the
-// continuous loops) takes the drive as stiff, for there it would be a loop without delay.
+// drive_compliance: elastic deflection of the drive between the cart and its encoder (on the motor's
+// side). It is quasi-static: it settles between two samples. Unsampled loops (linear plants, the
+// continuous loops) treat the drive as rigid, because it would form a feedback loop without delay.
 #pragma once
 
 #include "upright/model/effect.hpp"
@@ -21,7 +21,7 @@ struct DriveCompliance {
       parameters};
 
   template <class S>
-  static S drive_yields_m(const S* p, const S& motor_force) {
+  static S drive_deflection_m(const S* p, const S& motor_force) {
     return p[0] * motor_force;
   }
 };

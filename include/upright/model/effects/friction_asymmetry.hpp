@@ -1,4 +1,4 @@
-// friction_asymmetry: dry friction that is larger one way than the other.
+// friction_asymmetry: dry friction whose level depends on the direction.
 #pragma once
 
 #include "upright/model/effect.hpp"

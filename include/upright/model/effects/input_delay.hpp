@@ -1,4 +1,4 @@
-// input_delay: the voltage acts later than commanded.
+// input_delay: delay between the command and the voltage.
 #pragma once
 
 #include "upright/model/effect.hpp"

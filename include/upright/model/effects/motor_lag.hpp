@@ -1,4 +1,4 @@
-// motor_lag: the motor force follows the voltage with a first-order lag; back-EMF acts unlagged.
+// motor_lag: first-order lag of the motor force behind the voltage; the back-EMF has no lag.
 #pragma once
 
 #include "upright/model/effect.hpp"

@@ -1,4 +1,4 @@
-// pendulum_length: the pendulum is longer or shorter than the model says.
+// pendulum_length: the pendulum is longer or shorter than in the model.
 #pragma once
 
 #include "upright/model/effect.hpp"

@@ -1,4 +1,4 @@
-// pendulum_mass: the pendulum is heavier or lighter than the model says.
+// pendulum_mass: the pendulum's mass is larger or smaller than in the model.
 #pragma once
 
 #include "upright/model/effect.hpp"

@@ -1,4 +1,4 @@
-// pivot_quadratic_drag: drag on the pendulum with the square of its rate: the air.
+// pivot_quadratic_drag: air drag on the pendulum, proportional to the square of its rate.
 #pragma once
 
 #include "upright/model/effect.hpp"

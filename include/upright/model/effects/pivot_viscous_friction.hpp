@@ -1,4 +1,4 @@
-// pivot_viscous_friction: friction in the pivot in proportion to the rate.
+// pivot_viscous_friction: friction in the pivot, proportional to the rate.
 #pragma once
 
 #include "upright/model/effect.hpp"

@@ -1,4 +1,4 @@
-// position_dependent_friction: dry friction that changes along the track.
+// position_dependent_friction: dry friction whose level varies linearly along the track.
 #pragma once
 
 #include "upright/model/effect.hpp"

@@ -1,4 +1,4 @@
-// quadratic_drag: drag on the cart with the square of its velocity.
+// quadratic_drag: drag on the cart, proportional to the square of its velocity.
 #pragma once
 
 #include "upright/model/effect.hpp"

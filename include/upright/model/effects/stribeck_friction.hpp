@@ -1,5 +1,5 @@
-// stribeck_friction: dry friction that is larger near rest: the breakaway level is Fc + Fe (paper, equation
-// (5)).
+// stribeck_friction: dry friction with a higher level near rest; the breakaway level is Fc + Fe (paper,
+// equation (5)).
 #pragma once
 
 #include <cmath>
@@ -43,7 +43,7 @@ struct StribeckFriction {
     if constexpr (std::is_same_v<S, double>) {
       return elementary::exp(-elementary::power(u, shape));
     } else {
-      constexpr double smallest = 1e-12;  // keeps log finite at rest, where the excess is whole anyway
+      constexpr double smallest = 1e-12;  // keeps log finite at rest, where the excess is complete
       return elementary::exp(S(-elementary::exp(S(shape * elementary::log(S(u + S(smallest)))))));
     }
   }

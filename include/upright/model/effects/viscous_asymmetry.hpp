@@ -1,4 +1,4 @@
-// viscous_asymmetry: viscous friction that is larger one way than the other.
+// viscous_asymmetry: viscous friction that depends on the direction.
 #pragma once
 
 #include "upright/model/effect.hpp"

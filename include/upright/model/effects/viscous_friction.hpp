@@ -1,4 +1,4 @@
-// viscous_friction: friction on the cart in proportion to its velocity.
+// viscous_friction: friction on the cart, proportional to its velocity.
 #pragma once
 
 #include "upright/model/effect.hpp"

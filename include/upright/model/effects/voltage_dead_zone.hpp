@@ -1,4 +1,4 @@
-// voltage_dead_zone: small voltages do nothing.
+// voltage_dead_zone: voltages within the dead zone have no effect.
 #pragma once
 
 #include "upright/model/effect.hpp"

@@ -1,4 +1,4 @@
-// voltage_gain: the amplifier gives more or less than commanded, in proportion.
+// voltage_gain: scale error of the amplifier.
 #pragma once
 
 #include "upright/model/effect.hpp"

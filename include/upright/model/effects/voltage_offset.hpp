@@ -1,4 +1,4 @@
-// voltage_offset: the amplifier adds a steady voltage, at zero command too.
+// voltage_offset: a constant voltage that the amplifier adds, also at zero command.
 #pragma once
 
 #include "upright/model/effect.hpp"

@@ -1,4 +1,4 @@
-// voltage_saturation: the amplifier gives no more than a limit, either way.
+// voltage_saturation: limit of the amplifier's voltage in both directions.
 #pragma once
 
 #include "upright/model/effect.hpp"

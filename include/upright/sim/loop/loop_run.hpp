@@ -1,6 +1,6 @@
-// One closed-loop run from a starting angle under a delay, reduced to what a sweep wants to know: did it
-// fall, and how large is the motion that is left. Several engines give it; each is a witness against the
-// others.
+// One closed-loop simulation from an initial angle with a delay, reduced to the results of a sweep:
+// whether the pendulum fell, and the amplitude of the remaining motion. Several independent engines can
+// be compared.
 #pragma once
 
 #include <algorithm>
@@ -14,42 +14,42 @@
 
 namespace upright {
 
-/// What all runs of a sweep have in common.
+/// Settings that all runs of a sweep share.
 struct LoopSetup {
   PlantModel<double> model;
-  ControlConfig control;  ///< its `delay_s` is not used: each run has its own
-  /// Continuous: V(t) = gains . y(t - delay), true velocities. Sampled: the control step at the gain file's
-  /// rate, with its velocity estimator, the encoders' steps and the amplifier's limit.
+  ControlConfig control;  ///< `delay_s` is ignored: each run has its own
+  /// Continuous: V(t) = gains . y(t - delay), with the true velocities. Sampled: the control step at the
+  /// gain file's rate, with velocity estimator, encoder resolution and amplifier limit.
   bool sampled = false;
-  double cart_resolution_m = 0.0;     ///< sampled: step of the encoder; 0: none
-  double angle_resolution_rad = 0.0;  ///< sampled: step of the encoder; 0: none
-  double amplifier_limit_v = 1e6;     ///< sampled; the default is out of reach of any loop
+  double cart_resolution_m = 0.0;     ///< sampled: resolution of the encoder; 0: exact
+  double angle_resolution_rad = 0.0;  ///< sampled: resolution of the encoder; 0: exact
+  double amplifier_limit_v = 1e6;     ///< sampled; the default is above any command
   double duration_s = 20.0;
   double fell_above_rad = 1.0;  ///< a run ends where |theta| reaches this
   /// Makes the estimator and the compensator of a sampled loop for one delay; empty: neither.
   std::function<ModelParts(const ControlConfig&)> make_parts;
 
-  /// The amplitudes are taken over the last third of the run.
+  /// Amplitudes are evaluated over the last third of the run.
   double window_begin_s() const { return duration_s * (2.0 / 3.0); }
 };
 
-/// Released at rest at an angle with the cart at 0, the history before that being the same (paper, (15)).
+/// Released at rest at an angle with the cart at 0 and constant history (paper, equation (15)).
 struct LoopCase {
   double theta0_rad = 0.0;
   double delay_s = 0.0;
 };
 
 struct LoopResult {
-  double fall_time_s = std::numeric_limits<double>::quiet_NaN();  ///< not a number: it did not fall
-  /// Half of peak to peak over the last third; of a run that fell, the largest value until then.
+  double fall_time_s = std::numeric_limits<double>::quiet_NaN();  ///< NaN: it did not fall
+  /// Half of peak to peak over the last third; for a run that fell, the largest absolute value.
   double theta_amplitude_rad = 0.0;
   double cart_amplitude_m = 0.0;
-  PlantState<double> end;  ///< where the run ended
+  PlantState<double> end;  ///< final state
 
   bool fell() const { return fall_time_s == fall_time_s; }
 };
 
-/// Smallest and largest angle and position over the last third, and the largest until a fall.
+/// Extremes of angle and position over the last third, and the largest absolute values until a fall.
 class MotionRange {
  public:
   explicit MotionRange(double window_begin_s) : window_begin_s_(window_begin_s) {}
@@ -76,13 +76,13 @@ class MotionRange {
   double theta_low_ = infinite, theta_high_ = -infinite, cart_low_ = infinite, cart_high_ = -infinite;
 };
 
-/// Called after every period (sampled) or slice (continuous) of a run: time, state, voltage commanded.
+/// Called after each period (sampled) or slice (continuous): time, state, commanded voltage.
 using LoopObserver = std::function<void(double time_s, const PlantState<double>& state, double voltage_v)>;
 
-/// The run by the event engine (Runge-Kutta, true stick-slip), one at a time.
+/// Simulates one run with the event engine (Runge-Kutta with stick-slip events).
 LoopResult run_with_events(const LoopSetup& setup, const LoopCase& start, const LoopObserver& observer = {});
 
-/// The run by CVODE: slow, tight, independent of the others.
+/// Simulates one run with CVODE: slow and accurate, independent of the other engines.
 LoopResult run_with_reference(const LoopSetup& setup, const LoopCase& start,
                               const LoopObserver& observer = {});
 

@@ -1,10 +1,10 @@
-#include "mistaken_plant.hpp"
+#include "perturbed_plant.hpp"
 
 #include <random>
 
 namespace upright {
 
-Plant mistaken_plant(Plant plant, unsigned seed, double share) {
+Plant perturbed_plant(Plant plant, unsigned seed, double share) {
   std::mt19937 random(seed);
   const auto part = [&] { return (random() & 1u) != 0 ? 1.0 + share : 1.0 - share; };
   plant.cart_mass_kg *= part();

@@ -1,0 +1,140 @@
+#include "quanser_sampler.hpp"
+
+#include <pthread.h>
+#include <sched.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "hal/word_wait.hpp"
+#include "upright/base/error.hpp"
+
+namespace upright {
+
+namespace {
+
+/// Above the loop's, so that the time of a sample is the time at which it came.
+constexpr int sampler_priority = 85;
+/// Of a task that was stopped while somebody waited for its sample.
+constexpr hil::Error stopped = -hil::interrupted;
+
+constexpr double measured_for_s = 0.5, fewest_periods = 5.0;
+constexpr int attempts_at_period = 3;  // a thread that is held up measures another period
+constexpr double first_within_s = 1.0;
+/// Cards divide their clock: a rate that they cannot make becomes the next one that they can. The controller
+/// computes with the rate of the gain file, so that more than this is another controller.
+constexpr double largest_deviation = 0.02;
+
+std::int64_t now_ns() noexcept {
+  return MonotonicClock().now_ns();
+}
+
+std::int64_t nanoseconds(double seconds) noexcept {
+  return static_cast<std::int64_t>(std::llround(1e9 * seconds));
+}
+
+}  // namespace
+
+QuanserSampler::QuanserSampler(QuanserCard& card, double period_s, const std::string& rig_file)
+    : card_(card), task_(card.start_sampling(1.0 / period_s)) {
+  try {
+    thread_ = std::thread([this] { take_samples(); });
+    const sched_param parameters{sampler_priority};
+    pthread_setschedparam(thread_.native_handle(), SCHED_FIFO, &parameters);  // where allowed
+    require_period(period_s, rig_file);
+  } catch (...) {
+    end();
+    throw;
+  }
+}
+
+QuanserSampler::~QuanserSampler() {
+  end();
+}
+
+void QuanserSampler::end() noexcept {
+  card_.stop_sampling(task_);
+  if (thread_.joinable()) thread_.join();
+  card_.delete_task(task_);
+}
+
+/// The thread.
+void QuanserSampler::take_samples() noexcept {
+  RawCounts counts;
+  for (std::uint64_t number = 1;; ++number) {
+    const hil::Error came = card_.wait_for_sample(task_, counts);
+    const std::int64_t time_ns = now_ns();
+    if (came > 0)
+      publish(number, time_ns, counts);
+    else
+      error_.store(came < 0 ? came : stopped, std::memory_order_release);
+    arrived_.fetch_add(1, std::memory_order_release);
+    wake_one(arrived_);
+    if (came <= 0) return;
+  }
+}
+
+void QuanserSampler::publish(std::uint64_t number, std::int64_t time_ns, const RawCounts& counts) noexcept {
+  Slot& slot = slots_[number % slots_.size()];
+  slot.cart.store(counts.cart, std::memory_order_release);
+  slot.pendulum.store(counts.pendulum, std::memory_order_release);
+  slot.time_ns.store(time_ns, std::memory_order_release);
+  slot.number.store(number, std::memory_order_release);
+}
+
+CardSample QuanserSampler::latest() const noexcept {
+  CardSample sample;
+  for (;;) {
+    const std::uint32_t arrived = arrived_.load(std::memory_order_acquire);
+    const hil::Error error = error_.load(std::memory_order_acquire);
+    // The last arrival is not a sample where it is the end.
+    const Slot& slot = slots_[(error < 0 ? arrived - 1 : arrived) % slots_.size()];
+    sample.counts.cart = slot.cart.load(std::memory_order_acquire);
+    sample.counts.pendulum = slot.pendulum.load(std::memory_order_acquire);
+    sample.when.time_ns = slot.time_ns.load(std::memory_order_acquire);
+    sample.when.number = slot.number.load(std::memory_order_acquire);
+    sample.error = error;
+    // The slot is written anew for the fourth sample from here, which begins once the third has come.
+    constexpr std::uint32_t safe_arrivals = 2;
+    if (arrived_.load(std::memory_order_acquire) - arrived <= safe_arrivals) return sample;
+  }
+}
+
+CardSample QuanserSampler::wait_for_another(std::uint64_t number, std::int64_t until_ns) const noexcept {
+  for (;;) {
+    const std::uint32_t arrived = arrived_.load(std::memory_order_acquire);
+    const CardSample sample = latest();
+    if (sample.when.number != number || sample.error < 0 || now_ns() >= until_ns) return sample;
+    wait_while(arrived_, arrived, until_ns);
+  }
+}
+
+void QuanserSampler::require_period(double period_s, const std::string& rig_file) const {
+  double measured_s = 0.0;
+  for (int i = 0; i < attempts_at_period; ++i) {
+    measured_s = measured_period_s(period_s, rig_file);
+    if (std::abs(measured_s / period_s - 1.0) <= largest_deviation) return;
+  }
+  throw DeviceError("the card of " + rig_file + " samples every " + exact_text(measured_s) +
+                    " s, and not every " + exact_text(period_s) +
+                    " s: give sample_rate_hz in the gain file a rate that the card's clock makes, or remove "
+                    "quanser_hil.clock, so that the loop follows the computer's clock");
+}
+
+double QuanserSampler::measured_period_s(double period_s, const std::string& rig_file) const {
+  const CardSample first = wait_for_another(latest().when.number,
+                                            now_ns() + nanoseconds(std::max(first_within_s, 2.0 * period_s)));
+  const std::int64_t until_ns = now_ns() + nanoseconds(std::max(measured_for_s, fewest_periods * period_s));
+  CardSample last = first;
+  while (last.error >= 0 && now_ns() < until_ns) last = wait_for_another(last.when.number, until_ns);
+  if (last.error < 0) card_.fail(last.error, "sampling on the card's own clock");
+  if (last.when.number == first.when.number)
+    throw DeviceError(
+        "the card of " + rig_file +
+        " takes no samples on its own clock: remove quanser_hil.clock, so that the loop follows "
+        "the computer's clock");
+  return 1e-9 * static_cast<double>(last.when.time_ns - first.when.time_ns) /
+         static_cast<double>(last.when.number - first.when.number);
+}
+
+}  // namespace upright
