@@ -67,7 +67,7 @@ TEST_F(Diagnose, NamesCoulombAndStribeckInThePapersOwnCase) {
   std::ostringstream page;
   page << std::ifstream(folder_ / "out" / "report.html").rdbuf();
   // The simulated traces, and the plant file's new line.
-  EXPECT_NE(page.str().find("Measured and simulated"), std::string::npos);
+  EXPECT_NE(page.str().find("Measurement and simulation of held-out data"), std::string::npos);
   EXPECT_NE(page.str().find("+     - {kind: coulomb_friction"), std::string::npos);
   EXPECT_EQ(run_upright(command + " --out " + in_folder("out")).exit_code, 2) << "never written over";
 }
