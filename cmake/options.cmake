@@ -30,6 +30,24 @@ if(UPRIGHT_FUZZ)
   target_compile_options(upright_options INTERFACE -fsanitize=fuzzer-no-link)
 endif()
 
+# upright_compile_together(NAME): the sources of a folder are one translation unit. Most of their compile time is the reading of
+# headers, which is done once then. The names in the unnamed namespaces of a folder must therefore differ.
+function(upright_compile_together name)
+  get_target_property(sources ${name} SOURCES)
+  foreach(source IN LISTS sources)
+    cmake_path(ABSOLUTE_PATH source)
+    cmake_path(RELATIVE_PATH source BASE_DIRECTORY ${CMAKE_CURRENT_SOURCE_DIR})
+    cmake_path(GET source PARENT_PATH folder)
+    string(MAKE_C_IDENTIFIER "${name}_${folder}" group)
+    set_source_files_properties(${CMAKE_CURRENT_SOURCE_DIR}/${source} PROPERTIES UNITY_GROUP ${group})
+  endforeach()
+  set_target_properties(${name} PROPERTIES UNITY_BUILD ${UPRIGHT_UNITY} UNITY_BUILD_MODE GROUP)
+  # g++ takes what such a unit includes for headers, and warns of their unnamed namespaces.
+  if(UPRIGHT_UNITY AND CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
+    target_compile_options(${name} PRIVATE -Wno-subobject-linkage)
+  endif()
+endfunction()
+
 # upright_library(NAME SOURCES... OFFERS HEADERS... LINK PUBLIC-TARGETS... PRIVATE PRIVATE-TARGETS...): the library of a
 # folder. Other folders may include its headers in include/upright and those it OFFERS (scripts/check_includes.py).
 function(upright_library name)
@@ -39,6 +57,7 @@ function(upright_library name)
     target_include_directories(${name} PUBLIC ${PROJECT_SOURCE_DIR}/include
                                ${PROJECT_SOURCE_DIR}/src ${PROJECT_SOURCE_DIR})
     target_link_libraries(${name} PUBLIC ${arg_LINK} PRIVATE ${arg_PRIVATE} upright_options)
+    upright_compile_together(${name})
   else()
     add_library(${name} INTERFACE)
     target_include_directories(${name} INTERFACE ${PROJECT_SOURCE_DIR}/include)

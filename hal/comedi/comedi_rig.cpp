@@ -15,11 +15,7 @@ namespace {
 
 constexpr double share_of_period = 0.75;  // the rest is for computing and writing
 constexpr int attempts_to_stop = 3;
-constexpr std::array references = {AREF_GROUND, AREF_COMMON, AREF_DIFF, AREF_OTHER};
-
-std::int64_t now_ns() noexcept {
-  return MonotonicClock().now_ns();
-}
+constexpr std::array driver_references = {AREF_GROUND, AREF_COMMON, AREF_DIFF, AREF_OTHER};
 
 RigFault fault_of_errno(int error) noexcept {
   if (error == ETIMEDOUT || error == ETIME || error == EINTR) return RigFault::link_timeout;
@@ -120,7 +116,7 @@ void ComediTransport::open_encoder(const ComediEncoder& wiring, const char* key,
   instruction.subdev = static_cast<unsigned int>(at.subdevice);
   instruction.chanspec =
       CR_PACK(static_cast<unsigned int>(at.channel), range_number,
-              static_cast<unsigned int>(references[static_cast<std::size_t>(wiring.reference)]));
+              static_cast<unsigned int>(driver_references[static_cast<std::size_t>(wiring.reference)]));
   encoders_.push_back(encoder);
   if (batches_.empty() || batches_.back().device != on.handle())
     batches_.push_back({on.handle(), {0, &instruction}});
@@ -170,14 +166,14 @@ void ComediTransport::open_counter(ComediCard& on, const ComediChannel& at, cons
 
 RigReading ComediTransport::read() noexcept {
   RigReading reading;
-  const std::int64_t asked_ns = now_ns();
+  const std::int64_t asked_ns = monotonic_ns();
   for (Batch& batch : batches_) {
     const int done = comedi_do_insnlist(batch.device, &batch.list);
     if (done == static_cast<int>(batch.list.n_insns)) continue;
     reading.fault = done < 0 ? fault_of_errno(comedi_errno()) : RigFault::corrupt_reply;
     return reading;
   }
-  const std::int64_t answered_ns = now_ns();
+  const std::int64_t answered_ns = monotonic_ns();
   reading.time_ns = asked_ns + (answered_ns - asked_ns) / 2;
   if (answered_ns - asked_ns > patience_ns_) {
     reading.status = RigStatus::stale;

@@ -13,7 +13,7 @@ namespace {
 
 constexpr int highest_line = 1023;
 constexpr std::size_t most_limit_switches = 8;
-constexpr Words<2> levels = {"low", "high"};
+constexpr Words<2> level_words = {"low", "high"};
 constexpr Words<3> biases = {"as_is", "pull_up", "pull_down"};
 constexpr Words<2> ends = {"plus_x", "minus_x"};
 
@@ -38,7 +38,7 @@ void bias_key(YamlKeys& keys, LineBias& bias) {
 
 void level_keys(YamlKeys& keys, DigitalLine& line, TakenLines& taken) {
   taken.line_key(keys, "line", line.line);
-  keys.one_of("active", line.active_high, levels);
+  keys.one_of("active", line.active_high, level_words);
 }
 
 void input_keys(YamlKeys& keys, DigitalLine& line, TakenLines& taken) {

@@ -14,7 +14,7 @@ namespace upright {
 
 namespace {
 
-constexpr std::uint32_t queue_size = 1024;  // the most that the kernel grants
+constexpr std::uint32_t request_queue_size = 1024;  // the most that the kernel grants
 constexpr std::size_t events_per_read = 64;
 constexpr std::uint64_t both_lines = 3;
 
@@ -50,7 +50,7 @@ int request(const GpioChip& chip, const LineEncoder& encoder, const std::string&
   lines.offsets[0] = static_cast<std::uint32_t>(encoder.a);
   lines.offsets[1] = static_cast<std::uint32_t>(encoder.b);
   lines.num_lines = 2;
-  lines.event_buffer_size = queue_size;
+  lines.event_buffer_size = request_queue_size;
   std::strncpy(lines.consumer, gpio_consumer, sizeof lines.consumer - 1);
   lines.config.flags = GPIO_V2_LINE_FLAG_INPUT | GPIO_V2_LINE_FLAG_EDGE_RISING |
                        GPIO_V2_LINE_FLAG_EDGE_FALLING | flag_of(encoder.bias);
@@ -67,7 +67,7 @@ class NumberedEdges final : public EdgeSource {
       : lines_(request(chip, encoder, use)), b_(static_cast<std::uint32_t>(encoder.b)) {}
 
   RigFault drain(QuadratureDecoder& decoder, std::int64_t now_ns) noexcept override {
-    for (std::uint32_t seen = 0; seen < queue_size;) {
+    for (std::uint32_t seen = 0; seen < request_queue_size;) {
       const ssize_t size = ::read(lines_.get(), events_.data(), sizeof events_);
       if (size < 0 && errno != EAGAIN) return decoder.fail(RigFault::line_failed);
       const std::size_t events = size > 0 ? static_cast<std::size_t>(size) / sizeof events_[0] : 0;
@@ -87,7 +87,7 @@ class NumberedEdges final : public EdgeSource {
     return true;
   }
 
-  int queue_edges() const noexcept override { return queue_size; }
+  int queue_edges() const noexcept override { return request_queue_size; }
 
  private:
   bool take(const gpio_v2_line_event& event, QuadratureDecoder& decoder) noexcept {

@@ -10,7 +10,7 @@ namespace upright {
 
 namespace {
 
-constexpr std::size_t queue_size = 16;  // for each line
+constexpr std::size_t line_queue_size = 16;  // for each line
 
 gpiod_line* request(const GpioChip& chip, int number, LineBias bias, const std::string& use) {
   gpiod_line* line = chip.line(number, use);
@@ -39,12 +39,12 @@ class LineQueue {
   bool fetch() noexcept {
     next_ = size_ = 0;
     const int read =
-        gpiod_line_event_read_fd_multiple(gpiod_line_event_get_fd(line_), events_.data(), queue_size);
+        gpiod_line_event_read_fd_multiple(gpiod_line_event_get_fd(line_), events_.data(), line_queue_size);
     if (read > 0) size_ = static_cast<std::size_t>(read);
     return read >= 0 || errno == EAGAIN;
   }
   /// The kernel drops what comes when its queue is full.
-  bool was_full() const noexcept { return size_ >= queue_size; }
+  bool was_full() const noexcept { return size_ >= line_queue_size; }
   bool empty() const noexcept { return next_ == size_; }
   std::int64_t time_ns() const noexcept { return nanoseconds(events_[next_].ts); }
   Edge take(bool of_b) noexcept {
@@ -55,7 +55,7 @@ class LineQueue {
 
  private:
   gpiod_line* line_;
-  std::array<gpiod_line_event, queue_size> events_{};
+  std::array<gpiod_line_event, line_queue_size> events_{};
   std::size_t next_ = 0, size_ = 0;
 };
 
@@ -83,7 +83,7 @@ class StampedEdges final : public EdgeSource {
     return a >= 0 && b >= 0;
   }
 
-  int queue_edges() const noexcept override { return 2 * static_cast<int>(queue_size); }
+  int queue_edges() const noexcept override { return 2 * static_cast<int>(line_queue_size); }
 
  private:
   LineQueue a_, b_;

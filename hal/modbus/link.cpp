@@ -9,6 +9,7 @@
 #include <span>
 
 #include "upright/base/error.hpp"
+#include "upright/hal/clock.hpp"
 
 namespace upright {
 
@@ -39,13 +40,6 @@ std::string name_of(const ModbusRig& rig, const std::string& address) {
 
 bool is_answer(RigFault fault) noexcept {
   return fault == RigFault::none || fault == RigFault::device_refused || fault == RigFault::device_busy;
-}
-
-std::int64_t now_ns() noexcept {
-  constexpr std::int64_t ns_per_s = 1'000'000'000;
-  timespec now{};
-  clock_gettime(CLOCK_MONOTONIC, &now);
-  return now.tv_sec * ns_per_s + now.tv_nsec;
 }
 
 }  // namespace
@@ -109,14 +103,14 @@ void ModbusLink::await_silence(double quiet_s) noexcept {
 /// TCP closes, so that the answer goes nowhere; a serial line resynchronises.
 RigFault ModbusLink::ask(const Pdu& request) noexcept {
   if (!connected_) return RigFault::link_lost;
-  const std::int64_t asked_ns = now_ns();
+  const std::int64_t asked_ns = monotonic_ns();
   channel_->flush();
   // A process that stood still in here does not send what it carries: a voltage that has become old.
-  if (static_cast<double>(now_ns() - asked_ns) > 1e9 * patience_s_) return RigFault::link_timeout;
+  if (static_cast<double>(monotonic_ns() - asked_ns) > 1e9 * patience_s_) return RigFault::link_timeout;
   RigFault fault = channel_->exchange(request, reply_, patience_s_);
   if (fault == RigFault::none) fault = check_reply(request, reply_, exception_);
   if (is_answer(fault)) return fault;
-  unanswered_ns_ = now_ns();
+  unanswered_ns_ = monotonic_ns();
   in_step_ = false;
   if (!serial_ || fault == RigFault::link_lost) {
     channel_->abandon();

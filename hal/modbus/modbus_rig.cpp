@@ -11,25 +11,19 @@
 #include "hal/voltage_freshness.hpp"
 #include "hal/word_wait.hpp"
 #include "upright/base/error.hpp"
+#include "upright/hal/clock.hpp"
 
 namespace upright {
 
 namespace {
 
-constexpr std::int64_t ns_per_s = 1'000'000'000;
-constexpr std::int64_t first_pause_ns = 2'000'000;
-constexpr std::int64_t longest_pause_ns = 100'000'000;
+constexpr std::int64_t first_connect_pause_ns = 2'000'000;
+constexpr std::int64_t longest_connect_pause_ns = 100'000'000;
 constexpr double connect_patience_s = 0.02;
 constexpr double open_patience_s = 1.0;
 constexpr double share_of_period = 0.75;  // the rest is for computing and writing
 constexpr int replies_until_certain = 3;  // a single one may have a wrong bit that nothing betrays
 constexpr int io_priority = 70;
-
-std::int64_t now_ns() noexcept {
-  timespec now{};
-  clock_gettime(CLOCK_MONOTONIC, &now);
-  return now.tv_sec * ns_per_s + now.tv_nsec;
-}
 
 const char* words_for(RigFault fault) {
   switch (fault) {
@@ -97,7 +91,7 @@ void ModbusTransport::fail(RigFault fault, const std::string& doing) {
 /// An exchange of open(), until it succeeds; a device that has just been switched on gets a second.
 template <class Exchange>
 void ModbusTransport::retried(Exchange exchange, const std::string& doing) {
-  const std::int64_t end_ns = now_ns() + static_cast<std::int64_t>(1e9 * open_patience_s);
+  const std::int64_t end_ns = monotonic_ns() + static_cast<std::int64_t>(1e9 * open_patience_s);
   int refusals = 0;
   RigFault last = RigFault::link_lost;
   for (;;) {
@@ -106,8 +100,8 @@ void ModbusTransport::retried(Exchange exchange, const std::string& doing) {
     last = exchange();
     if (last == RigFault::none) return;
     if (last == RigFault::device_refused && ++refusals == replies_until_certain) break;
-    if (now_ns() >= end_ns) break;
-    const timespec pause{0, first_pause_ns};
+    if (monotonic_ns() >= end_ns) break;
+    const timespec pause{0, first_connect_pause_ns};
     nanosleep(&pause, nullptr);
   }
   fail(last, doing);
@@ -185,7 +179,7 @@ void ModbusTransport::begin_serving() {
   other_boots_in_a_row_ = other_watchdogs_in_a_row_ = 0;
   checks_refused_in_a_row_ = reads_refused_in_a_row_ = writes_refused_in_a_row_ = 0;
   recoveries_ = 0;
-  pause_ns_ = first_pause_ns;
+  pause_ns_ = first_connect_pause_ns;
   next_attempt_ns_ = stop_begun_ns_ = 0;
   thread_ = std::thread([this] { serve(); });
   const sched_param parameters{io_priority};
@@ -198,14 +192,14 @@ void ModbusTransport::ring() noexcept {
 }
 
 RigReading ModbusTransport::read() noexcept {
-  const std::int64_t until_ns = now_ns() + patience_ns_;
+  const std::int64_t until_ns = monotonic_ns() + patience_ns_;
   const std::uint32_t number = read_wanted_.load(std::memory_order_relaxed) + 1;
   read_wanted_.store(number, std::memory_order_release);
   ring();
   for (;;) {
     const std::uint32_t answered = answered_.load(std::memory_order_acquire);
     if (answered == number) return reading_;
-    if (now_ns() >= until_ns) break;
+    if (monotonic_ns() >= until_ns) break;
     wait_while(answered_, answered, until_ns);
   }
   // The thread may still be writing reading_, so nothing of it is shown.
@@ -219,7 +213,7 @@ RigFault ModbusTransport::write(double voltage_v) noexcept {
   if (!roles_.output) return RigFault::device_refused;
   if (stopping_.load(std::memory_order_relaxed)) return RigFault::none;
   voltage_v_.store(safe_voltage(voltage_v, rig_.amplifier.limit_v), std::memory_order_relaxed);
-  commanded_ns_.store(now_ns(), std::memory_order_release);
+  commanded_ns_.store(monotonic_ns(), std::memory_order_release);
   write_wanted_.fetch_add(1, std::memory_order_release);
   ring();
   return std::isfinite(voltage_v) ? write_fault_.load(std::memory_order_relaxed) : RigFault::not_finite;
@@ -247,22 +241,23 @@ bool ModbusTransport::stop_is_due() const noexcept {
 void ModbusTransport::serve() noexcept {
   for (;;) {
     const std::uint32_t rung = doorbell_.load(std::memory_order_acquire);
-    if (stop_is_due() && now_ns() >= stop_sequence_.next_ns()) serve_stop();
+    if (stop_is_due() && monotonic_ns() >= stop_sequence_.next_ns()) serve_stop();
     if (write_wanted_.load(std::memory_order_acquire) != write_served_) serve_write();
     const std::uint32_t wanted = read_wanted_.load(std::memory_order_acquire);
     if (wanted != read_served_) serve_read(wanted);
     if (ending_.load()) {
       // Whoever wanted to know has asked by now.
       const auto patience_ns = static_cast<std::int64_t>(1e9 * rig_.watchdog_s);
-      if (!stop_is_due() || now_ns() > stop_begun_ns_ + patience_ns) break;
+      if (!stop_is_due() || monotonic_ns() > stop_begun_ns_ + patience_ns) break;
     }
-    wait_while(doorbell_, rung, stop_is_due() ? stop_sequence_.next_ns() : now_ns() + ns_per_s);
+    wait_while(doorbell_, rung,
+               stop_is_due() ? stop_sequence_.next_ns() : monotonic_ns() + nanoseconds_per_second);
   }
   link_.close();
 }
 
 bool ModbusTransport::voltage_is_fresh() const noexcept {
-  return now_ns() - commanded_ns_.load(std::memory_order_acquire) <= freshness_ns_;
+  return monotonic_ns() - commanded_ns_.load(std::memory_order_acquire) <= freshness_ns_;
 }
 
 /// What an exchange may carry that was not asked for to write.
@@ -280,10 +275,10 @@ RigFault ModbusTransport::noted(RigFault fault) noexcept {
 RigFault ModbusTransport::ready() noexcept {
   if (restarted_) return RigFault::device_restarted;
   if (!link_.connected()) {
-    if (now_ns() < next_attempt_ns_) return RigFault::link_lost;
+    if (monotonic_ns() < next_attempt_ns_) return RigFault::link_lost;
     if (const RigFault fault = link_.connect(connect_patience_s); fault != RigFault::none) {
-      next_attempt_ns_ = now_ns() + pause_ns_;
-      pause_ns_ = std::min(2 * pause_ns_, longest_pause_ns);
+      next_attempt_ns_ = monotonic_ns() + pause_ns_;
+      pause_ns_ = std::min(2 * pause_ns_, longest_connect_pause_ns);
       return fault;
     }
     verified_ = false;
@@ -299,7 +294,7 @@ RigFault ModbusTransport::ready() noexcept {
     verified_ = true;
     ++recoveries_;
   }
-  pause_ns_ = first_pause_ns;
+  pause_ns_ = first_connect_pause_ns;
   return RigFault::none;
 }
 
@@ -340,9 +335,9 @@ void ModbusTransport::serve_read(std::uint32_t number) noexcept {
   answer.fault = ready();
   if (answer.fault == RigFault::none) {
     DeviceReading reading;
-    const std::int64_t asked_ns = now_ns();
+    const std::int64_t asked_ns = monotonic_ns();
     answer.fault = certain(noted(link_.read(fresh_voltage_v(), reading)), reads_refused_in_a_row_);
-    answer.time_ns = asked_ns + (now_ns() - asked_ns) / 2;
+    answer.time_ns = asked_ns + (monotonic_ns() - asked_ns) / 2;
     if (answer.fault == RigFault::none) answer.fault = same_device(reading);
     if (answer.fault == RigFault::none) answer.fault = reading.stopped_by;
     if (answer.fault == RigFault::none) {
@@ -378,7 +373,7 @@ RigFault ModbusTransport::send_voltage() noexcept {
 }
 
 void ModbusTransport::serve_stop() noexcept {
-  if (stop_begun_ns_ == 0) stop_begun_ns_ = now_ns();
+  if (stop_begun_ns_ == 0) stop_begun_ns_ = monotonic_ns();
   stop_sequence_.attempt();
   const StopReport& report = stop_sequence_.report();
   stop_fault_.store(report.fault, std::memory_order_relaxed);

@@ -7,26 +7,21 @@
 #include <cmath>
 #include <span>
 
+#include "upright/hal/clock.hpp"
+
 namespace upright {
 
 namespace {
 
-constexpr std::int64_t ns_per_s = 1'000'000'000;
 constexpr std::int64_t first_pause_ns = 2'000'000, longest_pause_ns = 100'000'000;
 /// A reply is waited for twice as long in each attempt: whatever is slow now is mostly not slow for seconds.
 constexpr double longest_patience_s = 0.5;
 /// A device acts on a request that it has not answered within this time, or never.
-constexpr std::int64_t late_act_ns = ns_per_s, second_look_ns = 100'000'000;
+constexpr std::int64_t late_act_ns = nanoseconds_per_second, second_look_ns = 100'000'000;
 /// After so many attempts the line is left alone for as long as the device's own watchdog needs: a device
 /// that answers and does not obey feeds it with each of them.
 constexpr int attempts_per_silence = 6;
 constexpr double longest_silence_s = 2.0, silence_margin_s = 0.02, silence_share = 1.25;
-
-std::int64_t now_ns() noexcept {
-  timespec now{};
-  clock_gettime(CLOCK_MONOTONIC, &now);
-  return now.tv_sec * ns_per_s + now.tv_nsec;
-}
 
 bool is_exception(RigFault fault) noexcept {
   return fault == RigFault::device_refused || fault == RigFault::device_busy;
@@ -115,10 +110,10 @@ void StopSequence::attempt() noexcept {
     const RigFault fault = put_zero();
     note(fault);
     // Requests from before that were left without an answer may still be on their way, with another voltage.
-    const bool doubtful = now_ns() - link_.last_unanswered_ns() < late_act_ns && !looked_twice_;
+    const bool doubtful = monotonic_ns() - link_.last_unanswered_ns() < late_act_ns && !looked_twice_;
     if (fault == RigFault::none && doubtful) {
       looked_twice_ = true;
-      next_ns_ = now_ns() + second_look_ns;
+      next_ns_ = monotonic_ns() + second_look_ns;
     } else {
       looked_twice_ = looked_twice_ && fault == RigFault::none;
       report_.read_back = reads_back_ && fault == RigFault::none;
@@ -131,7 +126,7 @@ void StopSequence::attempt() noexcept {
     report_.disabled = fault == RigFault::none;
   }
   ++attempts_;
-  next_ns_ = std::max(next_ns_, now_ns() + pause_ns());
+  next_ns_ = std::max(next_ns_, monotonic_ns() + pause_ns());
 }
 
 }  // namespace upright

@@ -13,22 +13,16 @@
 #include <cerrno>
 
 #include "channel.hpp"
+#include "upright/hal/clock.hpp"
 
 namespace upright {
 
 namespace {
 
-constexpr std::int64_t ns_per_s = 1'000'000'000;
 constexpr std::size_t header_size = 7;
 
-std::int64_t now_ns() noexcept {
-  timespec now{};
-  clock_gettime(CLOCK_MONOTONIC, &now);
-  return now.tv_sec * ns_per_s + now.tv_nsec;
-}
-
 std::int64_t after_ns(double seconds) noexcept {
-  return now_ns() + static_cast<std::int64_t>(seconds * 1e9);
+  return monotonic_ns() + static_cast<std::int64_t>(seconds * 1e9);
 }
 
 class TcpChannel final : public ModbusChannel {
@@ -124,8 +118,8 @@ class TcpChannel final : public ModbusChannel {
   bool comes(short event, std::int64_t until_ns) const noexcept {
     pollfd watched{socket_, event, 0};
     for (;;) {
-      const std::int64_t left_ns = std::max<std::int64_t>(0, until_ns - now_ns());
-      const timespec timeout{left_ns / ns_per_s, left_ns % ns_per_s};
+      const std::int64_t left_ns = std::max<std::int64_t>(0, until_ns - monotonic_ns());
+      const timespec timeout{left_ns / nanoseconds_per_second, left_ns % nanoseconds_per_second};
       const int ready = ppoll(&watched, 1, &timeout, nullptr);
       if (ready > 0) return true;
       if (ready == 0 || errno != EINTR) return false;

@@ -11,10 +11,6 @@ namespace {
 constexpr double share_of_period = 0.75;  // the rest is for computing and writing
 constexpr int attempts_at_the_end = 3;
 
-std::int64_t now_ns() noexcept {
-  return MonotonicClock().now_ns();
-}
-
 }  // namespace
 
 QuanserTransport::QuanserTransport(const RigFile& rig, double period_s)
@@ -64,9 +60,9 @@ RigReading QuanserTransport::read() noexcept {
 RigReading QuanserTransport::read_now() noexcept {
   RigReading reading;
   RawCounts counts;
-  const std::int64_t asked_ns = now_ns();
+  const std::int64_t asked_ns = monotonic_ns();
   const hil::Error error = card_->read_counts(counts);
-  const std::int64_t answered_ns = now_ns();
+  const std::int64_t answered_ns = monotonic_ns();
   reading.time_ns = asked_ns + (answered_ns - asked_ns) / 2;
   if (error < 0) {
     reading.fault = has_expired() ? RigFault::watchdog_expired : fault_of(error);
@@ -108,7 +104,7 @@ RigReading QuanserTransport::fresh(RigReading reading, const RawCounts& counts) 
 bool QuanserTransport::has_expired() noexcept {
   if (!watching_) return false;
   const auto patience_ns = static_cast<std::int64_t>(1e9 * card_->watchdog_s());
-  const std::int64_t asked_ns = now_ns();
+  const std::int64_t asked_ns = monotonic_ns();
   const bool is_due = asked_ns - served_ns_ > patience_ns;
   if (is_due) served_ns_ = asked_ns;
   return card_->has_expired(is_due);
@@ -125,7 +121,7 @@ RigFault QuanserTransport::serve_watchdog() noexcept {
     if (answer == hil::expired_before) return RigFault::watchdog_expired;
     if (answer < 0) return fault_of(answer);
   }
-  served_ns_ = now_ns();
+  served_ns_ = monotonic_ns();
   return RigFault::none;
 }
 

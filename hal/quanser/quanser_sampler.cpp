@@ -8,6 +8,7 @@
 
 #include "hal/word_wait.hpp"
 #include "upright/base/error.hpp"
+#include "upright/hal/clock.hpp"
 
 namespace upright {
 
@@ -24,10 +25,6 @@ constexpr double first_within_s = 1.0;
 /// Cards divide their clock: a rate that they cannot make becomes the next one that they can. The controller
 /// computes with the rate of the gain file, so that more than this is another controller.
 constexpr double largest_deviation = 0.02;
-
-std::int64_t now_ns() noexcept {
-  return MonotonicClock().now_ns();
-}
 
 std::int64_t nanoseconds(double seconds) noexcept {
   return static_cast<std::int64_t>(std::llround(1e9 * seconds));
@@ -63,7 +60,7 @@ void QuanserSampler::take_samples() noexcept {
   RawCounts counts;
   for (std::uint64_t number = 1;; ++number) {
     const hil::Error came = card_.wait_for_sample(task_, counts);
-    const std::int64_t time_ns = now_ns();
+    const std::int64_t time_ns = monotonic_ns();
     if (came > 0)
       publish(number, time_ns, counts);
     else
@@ -104,7 +101,7 @@ CardSample QuanserSampler::wait_for_another(std::uint64_t number, std::int64_t u
   for (;;) {
     const std::uint32_t arrived = arrived_.load(std::memory_order_acquire);
     const CardSample sample = latest();
-    if (sample.when.number != number || sample.error < 0 || now_ns() >= until_ns) return sample;
+    if (sample.when.number != number || sample.error < 0 || monotonic_ns() >= until_ns) return sample;
     wait_while(arrived_, arrived, until_ns);
   }
 }
@@ -122,11 +119,12 @@ void QuanserSampler::require_period(double period_s, const std::string& rig_file
 }
 
 double QuanserSampler::measured_period_s(double period_s, const std::string& rig_file) const {
-  const CardSample first = wait_for_another(latest().when.number,
-                                            now_ns() + nanoseconds(std::max(first_within_s, 2.0 * period_s)));
-  const std::int64_t until_ns = now_ns() + nanoseconds(std::max(measured_for_s, fewest_periods * period_s));
+  const CardSample first = wait_for_another(
+      latest().when.number, monotonic_ns() + nanoseconds(std::max(first_within_s, 2.0 * period_s)));
+  const std::int64_t until_ns =
+      monotonic_ns() + nanoseconds(std::max(measured_for_s, fewest_periods * period_s));
   CardSample last = first;
-  while (last.error >= 0 && now_ns() < until_ns) last = wait_for_another(last.when.number, until_ns);
+  while (last.error >= 0 && monotonic_ns() < until_ns) last = wait_for_another(last.when.number, until_ns);
   if (last.error < 0) card_.fail(last.error, "sampling on the card's own clock");
   if (last.when.number == first.when.number)
     throw DeviceError(

@@ -18,7 +18,7 @@ namespace {
 constexpr int last_channel = 255;
 constexpr std::size_t longest_board_type = 64;
 constexpr std::size_t longest_text = 1000;
-constexpr Words<2> levels = {"low", "high"};
+constexpr Words<2> level_words = {"low", "high"};
 constexpr Words<2> clocks = {"computer", "card"};
 
 /// A name of the loader's or the card's.
@@ -116,7 +116,7 @@ void output_keys(YamlKeys& keys, const QuanserCardKind* kind, const std::string&
 
 void enable_keys(YamlKeys& keys, QuanserEnable& enable) {
   keys.integer("line", enable.line, 0, last_channel);
-  keys.one_of("active", enable.active_high, levels, true);
+  keys.one_of("active", enable.active_high, level_words, true);
 }
 
 void watchdog_key(YamlKeys& keys, const QuanserCardKind* kind, QuanserRig& rig) {

@@ -18,26 +18,20 @@
 
 #include "endpoint.hpp"
 #include "upright/base/error.hpp"
+#include "upright/hal/clock.hpp"
 #include "virtual_plant.hpp"
 
 namespace upright {
 
 namespace {
 
-constexpr std::int64_t ns_per_s = 1'000'000'000;
 constexpr std::int64_t tick_ns = 1'000'000;
 constexpr std::int64_t away_ns = 500'000'000;  // a master silent this long has gone
 constexpr int server_priority = 60;
 
-std::int64_t now_ns() {
-  timespec now{};
-  clock_gettime(CLOCK_MONOTONIC, &now);
-  return now.tv_sec * ns_per_s + now.tv_nsec;
-}
-
 void sleep_ns(std::int64_t duration_ns) {
   if (duration_ns <= 0) return;
-  const timespec duration{duration_ns / ns_per_s, duration_ns % ns_per_s};
+  const timespec duration{duration_ns / nanoseconds_per_second, duration_ns % nanoseconds_per_second};
   nanosleep(&duration, nullptr);
 }
 
@@ -99,7 +93,7 @@ class Server {
         registers_(*rig.modbus),
         plant_(rig, plant, options),
         random_(options.faults.seed),
-        boot_count_(static_cast<int>(now_ns() / tick_ns & 0xffff)) {
+        boot_count_(static_cast<int>(monotonic_ns() / tick_ns & 0xffff)) {
     int pair[2];
     if (socketpair(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0, pair) != 0)
       throw DeviceError("no socket pair can be opened: raise the limit on open files (ulimit -n)");
@@ -115,7 +109,7 @@ class Server {
   const std::string& name() const { return endpoint_.name(); }
 
   void run(const std::atomic<bool>& stopped) {
-    const std::int64_t started_ns = now_ns();
+    const std::int64_t started_ns = monotonic_ns();
     const auto duration_ns = static_cast<std::int64_t>(options_.duration_s * 1e9);
     while (!stopped.load()) {
       wait();
@@ -126,7 +120,7 @@ class Server {
       std::erase_if(endpoint_.peers(), [](const Peer& peer) { return peer.gone; });
       maybe_restart();
       maybe_cut();
-      if (duration_ns > 0 && now_ns() - started_ns > duration_ns) break;
+      if (duration_ns > 0 && monotonic_ns() - started_ns > duration_ns) break;
     }
     advance();
     plant_.command(0.0);
@@ -135,20 +129,20 @@ class Server {
  private:
   void wait() {
     std::vector<pollfd> watched;
-    std::int64_t until_ns = now_ns() + tick_ns;
+    std::int64_t until_ns = monotonic_ns() + tick_ns;
     if (!endpoint_.serial()) watched.push_back({endpoint_.listener(), POLLIN, 0});
     for (const Peer& peer : endpoint_.peers()) {
       watched.push_back({peer.descriptor.get(), POLLIN, 0});
       if (!peer.replies.empty()) until_ns = std::min(until_ns, peer.replies.front().leaves_ns);
     }
-    const std::int64_t left_ns = std::max<std::int64_t>(0, until_ns - now_ns());
-    const timespec timeout{left_ns / ns_per_s, left_ns % ns_per_s};
+    const std::int64_t left_ns = std::max<std::int64_t>(0, until_ns - monotonic_ns());
+    const timespec timeout{left_ns / nanoseconds_per_second, left_ns % nanoseconds_per_second};
     ppoll(watched.data(), watched.size(), &timeout, nullptr);
   }
 
   void advance() {
     const bool was_on = plant_.voltage_v() != 0.0;
-    plant_.advance_to(now_ns());
+    plant_.advance_to(monotonic_ns());
     if (was_on && plant_.voltage_v() == 0.0) registers_.clear_voltage();  // the watchdog's doing
     plant_.trace(false);
   }
@@ -168,7 +162,7 @@ class Server {
     return counts;
   }
 
-  bool master_away() const { return now_ns() - plant_.fed_ns() > away_ns; }
+  bool master_away() const { return monotonic_ns() - plant_.fed_ns() > away_ns; }
   bool motor_off() const { return plant_.voltage_v() == 0.0; }
 
   void accept_clients() {
@@ -235,7 +229,7 @@ class Server {
 
   void queue(Peer& peer, Reply reply) {
     const InjectedFaults& faults = options_.faults;
-    reply.leaves_ns = now_ns() + endpoint_.line_time_ns(reply.bytes.size());
+    reply.leaves_ns = monotonic_ns() + endpoint_.line_time_ns(reply.bytes.size());
     if (hits(faults.late_every)) reply.leaves_ns += static_cast<std::int64_t>(faults.late_s * 1e9);
     if (!peer.replies.empty()) reply.leaves_ns = std::max(reply.leaves_ns, peer.replies.back().leaves_ns);
     if (hits(faults.corrupt_every)) {
@@ -257,7 +251,7 @@ class Server {
 
   void send_due() {
     for (Peer& peer : endpoint_.peers()) {
-      while (!peer.replies.empty() && peer.replies.front().leaves_ns <= now_ns()) {
+      while (!peer.replies.empty() && peer.replies.front().leaves_ns <= monotonic_ns()) {
         const std::vector<std::uint8_t>& bytes = peer.replies.front().bytes;
         const ssize_t sent = endpoint_.serial() ? ::write(peer.descriptor.get(), bytes.data(), bytes.size())
                                                 : ::send(peer.descriptor.get(), bytes.data(), bytes.size(),

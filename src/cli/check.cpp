@@ -60,14 +60,14 @@ constexpr std::array file_kinds = {
              [](const std::filesystem::path& file) { read_measurement(file.string()); }},
 };
 
-struct Finding {
+struct CheckedFile {
   std::string file;
   std::string kind;
   std::string error;                  // empty: valid
   std::vector<std::string> warnings;  // valid, and hard to believe
 };
 
-const FileKind& kind_of(const YamlMap& document) {
+const FileKind& kind_of_file(const YamlMap& document) {
   for (const FileKind& kind : file_kinds)
     if (document.has(kind.key)) return kind;
   std::vector<std::string> known;
@@ -86,10 +86,10 @@ const FileKind& kind_of(const YamlMap& document) {
                     list);
 }
 
-Finding check(const std::string& file) {
-  Finding finding{file, "", "", {}};
+CheckedFile check(const std::string& file) {
+  CheckedFile finding{file, "", "", {}};
   try {
-    const FileKind& kind = kind_of(YamlMap::from_file(file));
+    const FileKind& kind = kind_of_file(YamlMap::from_file(file));
     finding.kind = kind.name;
     kind.read(file);
     if (finding.kind == plant_kind) finding.warnings = doubts_about(read_plant_file(file));
@@ -102,22 +102,22 @@ Finding check(const std::string& file) {
 }
 
 /// The one file of this kind; empty: there is none, or it is not valid.
-std::string only(const std::vector<Finding>& findings, const char* kind) {
-  for (const Finding& finding : findings)
+std::string only(const std::vector<CheckedFile>& findings, const char* kind) {
+  for (const CheckedFile& finding : findings)
     if (finding.kind == kind && finding.error.empty()) return finding.file;
   return "";
 }
 
 /// Files are those of one run where there is no second of a kind; others have nothing to do with each other.
-bool are_of_one_run(const std::vector<Finding>& findings) {
+bool are_of_one_run(const std::vector<CheckedFile>& findings) {
   const auto several = [&findings](const char* kind) {
     return std::count_if(findings.begin(), findings.end(),
-                         [kind](const Finding& finding) { return finding.kind == kind; }) > 1;
+                         [kind](const CheckedFile& finding) { return finding.kind == kind; }) > 1;
   };
   return !several(plant_kind) && !several(gain_kind) && !several(rig_kind);
 }
 
-Agreement agreement_among(const std::vector<Finding>& findings) {
+Agreement agreement_among(const std::vector<CheckedFile>& findings) {
   if (!are_of_one_run(findings)) return {};
   RunFiles files;
   if (const std::string file = only(findings, rig_kind); !file.empty()) files.rig = read_rig_file(file);
@@ -135,7 +135,7 @@ Json text_or_null(const std::string& text) {
   return text.empty() ? Json(nullptr) : Json(text);
 }
 
-Json json_of(const Finding& finding) {
+Json json_of(const CheckedFile& finding) {
   return {{"file", finding.file},
           {"valid", finding.error.empty()},
           {"kind", text_or_null(finding.kind)},
@@ -143,7 +143,7 @@ Json json_of(const Finding& finding) {
           {"warnings", finding.warnings}};
 }
 
-void print(const Finding& finding, bool as_json) {
+void print(const CheckedFile& finding, bool as_json) {
   if (!finding.error.empty()) std::cerr << "upright: " << finding.error << "\n";
   for (const std::string& warning : finding.warnings)
     std::cerr << "upright: warning: " << finding.file << ": " << warning << "\n";
@@ -158,7 +158,7 @@ void print(const Agreement& agreement) {
 }
 
 bool check_all(const std::vector<std::string>& files, bool as_json) {
-  std::vector<Finding> findings;
+  std::vector<CheckedFile> findings;
   bool all_valid = true;
   Json list = Json::array();
   for (const std::string& file : files) {

@@ -30,7 +30,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-struct Arguments {
+struct DoctorArguments {
   std::string rig, gains;
   std::optional<double> rate_hz;
   double seconds = 10.0, hand_s = 30.0;
@@ -46,7 +46,7 @@ struct Page {
 };
 
 /// The rate to examine: the one given, the gain file's, or what suits the link.
-double rate_of(const Arguments& arguments, const std::optional<RigFile>& rig) {
+double rate_of(const DoctorArguments& arguments, const std::optional<RigFile>& rig) {
   constexpr double usual_hz = 1000.0;
   if (arguments.rate_hz) return *arguments.rate_hz;
   if (!arguments.gains.empty()) return read_gain_file(arguments.gains).sample_rate_hz;
@@ -58,7 +58,7 @@ void append(std::vector<Finding>& to, const std::vector<Finding>& more) {
   to.insert(to.end(), more.begin(), more.end());
 }
 
-void examine_timing(const Arguments& arguments, double spin_us, Page& page) {
+void examine_timing(const DoctorArguments& arguments, double spin_us, Page& page) {
   RealtimeRequest request;
   request.spin_us = spin_us;
   std::fprintf(stderr, "upright: measuring wake-ups, %.0f s idle and %.0f s under load\n", arguments.seconds,
@@ -86,7 +86,7 @@ struct ExaminedRig {
   const SignalFlag& signal;
 };
 
-void examine_signs(const Arguments& arguments, const ExaminedRig& at, Page& page) {
+void examine_signs(const DoctorArguments& arguments, const ExaminedRig& at, Page& page) {
   if (arguments.by_hand)
     append(page.findings, examine_signs_by_hand(at.rig, at.clock, calibration_in_use(at.file),
                                                 arguments.hand_s, at.signal, ask_operator));
@@ -95,7 +95,8 @@ void examine_signs(const Arguments& arguments, const ExaminedRig& at, Page& page
                              "switch the amplifier off and run it with --by-hand"});
 }
 
-void examine_lines(const Arguments& arguments, const ExaminedRig& at, const LinkProbe& probe, Page& page) {
+void examine_lines(const DoctorArguments& arguments, const ExaminedRig& at, const LinkProbe& probe,
+                   Page& page) {
   const SafetyInputs inputs = at.rig.safety_inputs();
   append(page.findings, arguments.by_hand ? examine_safety_inputs_by_hand(at.rig, at.clock, arguments.hand_s,
                                                                           at.signal, ask_operator)
@@ -105,7 +106,7 @@ void examine_lines(const Arguments& arguments, const ExaminedRig& at, const Link
 }
 
 /// It has no link, but lines like any other.
-void examine_simulated(const Arguments& arguments, const RigFile& file, Page& page) {
+void examine_simulated(const DoctorArguments& arguments, const RigFile& file, Page& page) {
   page.findings.push_back({"link", Health::good, "none: the rig is simulated", ""});
   if (!file.gpio) return;
   const SignalFlag& signal = catch_signals();
@@ -136,7 +137,7 @@ bool examine_card(const RigFile& file, Page& page) {
   return passed;
 }
 
-void examine_rig(const Arguments& arguments, const RigFile& file, Page& page) {
+void examine_rig(const DoctorArguments& arguments, const RigFile& file, Page& page) {
   if (is_simulated(file)) {
     examine_simulated(arguments, file, page);
     return;
@@ -207,7 +208,7 @@ void print(const Page& page, Health verdict) {
   std::fflush(stdout);
 }
 
-ExitCode run(const Arguments& arguments) {
+ExitCode run(const DoctorArguments& arguments) {
   std::optional<RigFile> rig;
   if (!arguments.rig.empty()) rig = read_rig_file(arguments.rig);
   Page page;
@@ -231,7 +232,7 @@ void add_doctor(CommandLine& line) {
                    "Example:  upright doctor --rig config/rigs/modbus-tcp.yaml --rate 500\n"
                    "It keeps the motor at zero volts. Every problem comes with a remedy.\n"
                    "Exit code 4 means that the verdict is bad.");
-  const auto a = std::make_shared<Arguments>();
+  const auto a = std::make_shared<DoctorArguments>();
   command.option("--rig", a->rig, "Rig file; its link and wiring are tested too");
   command.option("--gains", a->gains, "Gain file; its sample rate is tested");
   command

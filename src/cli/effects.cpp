@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "commands.hpp"
+#include "json_number.hpp"
 #include "upright/model/registry.hpp"
 
 namespace upright::cli {
@@ -12,10 +13,6 @@ namespace upright::cli {
 namespace {
 
 using Json = nlohmann::ordered_json;
-
-Json finite_or_null(double value) {
-  return std::isfinite(value) ? Json(value) : Json(nullptr);
-}
 
 Json json_of(const ParameterInfo& parameter) {
   return {{"name", parameter.name},

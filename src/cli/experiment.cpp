@@ -20,6 +20,7 @@
 #include <utility>
 #include <vector>
 
+#include "base/angle_units.hpp"
 #include "commands.hpp"
 #include "commissioning/sign_check.hpp"
 #include "experiment/pieces/sign_check.hpp"
@@ -41,9 +42,7 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
-constexpr double degrees_per_rad = 180.0 / std::numbers::pi;
-
-struct Arguments {
+struct ExperimentArguments {
   std::string file, rig, plant, out, live_port;
   std::optional<double> rate_hz;
   std::optional<std::uint64_t> seed;
@@ -74,7 +73,7 @@ std::string utc_name(const std::string& name) {
 
 /// The folder that was asked for; or one of the same experiment under runs/ that is not finished; or a new
 /// one.
-fs::path folder_of(const Arguments& arguments, const ExperimentSetup& setup,
+fs::path folder_of(const ExperimentArguments& arguments, const ExperimentSetup& setup,
                    const std::vector<Piece>& pieces) {
   if (!arguments.out.empty()) {
     const std::vector<TrialResult> done = read_trials(arguments.out, setup, pieces);
@@ -197,7 +196,7 @@ void announce(const Piece& piece, const ExperimentTrial& trial, bool simulated, 
 
 void show_live(const LiveStatus& live, ScriptPhase phase) {
   std::fprintf(stderr, "\r%8.1f s  %-24s x %+7.1f mm  angle %+8.2f deg  %+6.2f V ", live.time_s.load(),
-               words_for(phase), live.cart_m.load() * 1e3, live.theta_rad.load() * degrees_per_rad,
+               words_for(phase), live.cart_m.load() * 1e3, live.theta_rad.load() * degrees_per_radian,
                live.voltage_v.load());
 }
 
@@ -220,7 +219,7 @@ void judge_sign_check(const ExperimentSetup& setup, const fs::path& run, bool qu
 }
 
 /// The page that --live asks for.
-std::unique_ptr<LiveView> open_live(const Arguments& arguments, const ExperimentSetup& setup) {
+std::unique_ptr<LiveView> open_live(const ExperimentArguments& arguments, const ExperimentSetup& setup) {
   LiveSubject subject;
   subject.title = setup.experiment.name + " on " + setup.rig.file.filename().string();
   subject.rig = &setup.rig;
@@ -233,14 +232,14 @@ std::unique_ptr<LiveView> open_live(const Arguments& arguments, const Experiment
 
 void print(const TrialResult& r) {
   std::printf("  %s, angle +-%.3f deg, cart +-%.1f mm", r.outcome.c_str(),
-              r.theta_amplitude_rad * degrees_per_rad, r.cart_amplitude_m * 1e3);
+              r.theta_amplitude_rad * degrees_per_radian, r.cart_amplitude_m * 1e3);
   if (std::isfinite(r.frequency_hz)) std::printf(", %.2f Hz", r.frequency_hz);
   std::printf("\n");
   std::fflush(stdout);
 }
 
 /// Runs the pieces that were planned.
-ExperimentResult perform(const Arguments& arguments, const ExperimentSetup& setup,
+ExperimentResult perform(const ExperimentArguments& arguments, const ExperimentSetup& setup,
                          const std::vector<Piece>& pieces, const fs::path& folder, const SignalFlag& signal,
                          LiveView* view) {
   const bool simulated = is_simulated(setup.rig);
@@ -300,7 +299,7 @@ ExperimentResult perform(const Arguments& arguments, const ExperimentSetup& setu
   return result;
 }
 
-ExitCode run(const Arguments& arguments) {
+ExitCode run(const ExperimentArguments& arguments) {
   const ExperimentSetup setup =
       resolve_experiment(arguments.file, arguments.rig, arguments.plant, arguments.rate_hz);
   const bool simulated = is_simulated(setup.rig);
@@ -354,7 +353,7 @@ void add_experiment(CommandLine& line) {
       "--fast\n"
       "Every piece is planned and rehearsed in simulation before anything moves; --dry-run stops there.\n"
       "The same command resumes an experiment that was interrupted.");
-  const auto a = std::make_shared<Arguments>();
+  const auto a = std::make_shared<ExperimentArguments>();
   command.option("file", a->file, "Experiment file").required();
   command.option("--rig", a->rig, "Rig file").required();
   command.option("--plant", a->plant,

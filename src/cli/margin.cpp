@@ -10,6 +10,7 @@
 #include "commands.hpp"
 #include "design/delay_margin.hpp"
 #include "design/physical_limits.hpp"
+#include "json_number.hpp"
 #include "progress.hpp"
 #include "runtime/overrun_limit.hpp"
 #include "upright/model/linear_plant.hpp"
@@ -39,10 +40,6 @@ constexpr const char* extended_note =
     "The extended Kalman filter is taken as its line while the cart slides, as a stationary one on the same "
     "plant: neither the friction in its prediction nor friction_compensation is in these margins. `upright "
     "design` judges both by simulated runs.";
-
-Json finite_or_null(double value) {
-  return std::isfinite(value) ? Json(value) : Json(nullptr);
-}
 
 Json json_of(std::complex<double> root) {
   return {root.real(), root.imag()};

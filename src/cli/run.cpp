@@ -10,9 +10,11 @@
 #include <numbers>
 #include <string>
 
+#include "base/angle_units.hpp"
 #include "commands.hpp"
 #include "control/filter_model.hpp"
 #include "histogram_json.hpp"
+#include "json_number.hpp"
 #include "live.hpp"
 #include "options.hpp"
 #include "progress.hpp"
@@ -34,9 +36,7 @@ namespace upright::cli {
 
 namespace {
 
-constexpr double degrees_per_rad = 180.0 / std::numbers::pi;
-
-struct Arguments {
+struct RunArguments {
   std::string rig, gains, plant, out = "runs", label = "run", live_port;
   std::optional<double> delay_s, theta0_deg, wait_s;
   double duration_s = 10.0;
@@ -45,7 +45,7 @@ struct Arguments {
   bool fast = false, as_json = false, unchecked = false, force = false;
 };
 
-void refuse_what_only_simulation_can(const Arguments& arguments) {
+void refuse_what_only_simulation_can(const RunArguments& arguments) {
   const std::string why = arguments.rig + " is not a simulated rig: remove ",
                     or_else = ", or use a simulated rig";
   if (arguments.fast) throw ConfigError(why + "--fast" + or_else);
@@ -53,7 +53,7 @@ void refuse_what_only_simulation_can(const Arguments& arguments) {
   if (arguments.seed) throw ConfigError(why + "--seed" + or_else);
 }
 
-void refuse_what_only_hardware_can(const Arguments& arguments, const RigFile& rig) {
+void refuse_what_only_hardware_can(const RunArguments& arguments, const RigFile& rig) {
   if (arguments.wait_s)
     throw ConfigError(arguments.rig +
                       " is a simulated rig, which starts upright without an operator: remove --wait");
@@ -64,7 +64,7 @@ void refuse_what_only_hardware_can(const Arguments& arguments, const RigFile& ri
 }
 
 /// The model to judge the gains by: the one named, the simulated rig's, or the predictor's.
-std::optional<Plant> model_of(const Arguments& arguments, const RunSetup& setup) {
+std::optional<Plant> model_of(const RunArguments& arguments, const RunSetup& setup) {
   if (!arguments.plant.empty()) return read_plant_file(arguments.plant);
   if (setup.plant) return setup.plant;
   if (setup.control.compensation.kind == CompensationKind::predictor)
@@ -72,7 +72,7 @@ std::optional<Plant> model_of(const Arguments& arguments, const RunSetup& setup)
   return std::nullopt;
 }
 
-RunSetup make_setup(const Arguments& arguments) {
+RunSetup make_setup(const RunArguments& arguments) {
   RunSetup setup;
   setup.command = command_line();
   setup.label = arguments.label;
@@ -92,7 +92,7 @@ RunSetup make_setup(const Arguments& arguments) {
   setup.control = with_encoders(setup.control, encoders.cart.per_count, encoders.pendulum.per_count);
   require_link_fits(setup.rig, setup.control.period_s());
   require_spin_fits(arguments.realtime.spin_us.value_or(setup.rig.spin_us), setup.control.period_s());
-  if (arguments.theta0_deg) setup.theta0_rad = *arguments.theta0_deg / degrees_per_rad;
+  if (arguments.theta0_deg) setup.theta0_rad = *arguments.theta0_deg / degrees_per_radian;
   setup.limits = rig_limits(setup.rig, model_of(arguments, setup));
   setup.limits.periods =
       static_cast<std::uint64_t>(std::llround(arguments.duration_s * setup.control.sample_rate_hz));
@@ -114,9 +114,9 @@ std::unique_ptr<Rig> make(const RunSetup& setup, Clock& clock) {
   return make_rig(setup.rig, {setup.control.period_s()});
 }
 
-void show_live(const LiveStatus& live) {
+void show_run(const LiveStatus& live) {
   std::fprintf(stderr, "\r%8.1f s  angle %+7.2f deg  %+6.2f V  worst lateness %7.0f us ", live.time_s.load(),
-               live.theta_rad.load() * degrees_per_rad, live.voltage_v.load(), live.worst_late_us.load());
+               live.theta_rad.load() * degrees_per_radian, live.voltage_v.load(), live.worst_late_us.load());
 }
 
 std::string seconds(double value_s) {
@@ -128,14 +128,14 @@ void show_wait(const WaitStatus& wait, bool on_terminal, bool first) {
       "lift the pendulum upright, hold it still and keep the cart away from the ends: waiting at zero volts";
   if (on_terminal)
     std::fprintf(stderr, "\r%s, %3.0f s left (angle %+7.2f deg, x %+.3f m; counts %lld, %lld) ", request,
-                 wait.left_s, wait.pose.theta_rad * degrees_per_rad, wait.pose.cart_m,
+                 wait.left_s, wait.pose.theta_rad * degrees_per_radian, wait.pose.cart_m,
                  static_cast<long long>(wait.cart_counts), static_cast<long long>(wait.pendulum_counts));
   else if (first)
     std::fprintf(stderr, "upright: %s for %.0f s\n", request, wait.left_s);
 }
 
 /// On a real rig the operator lifts the pendulum first. Seven parameters: all that a run has open by then.
-void wait_for_operator(const Arguments& arguments, Rig& rig, Clock& clock, const RigFile& file,
+void wait_for_operator(const RunArguments& arguments, Rig& rig, Clock& clock, const RigFile& file,
                        const SignalFlag& caught_signal, bool on_terminal, LiveView* view) {
   const double wait_s = arguments.wait_s.value_or(WaitOptions{}.patience_s);
   if (is_simulated(file) || wait_s <= 0.0) return;
@@ -152,10 +152,6 @@ void wait_for_operator(const Arguments& arguments, Rig& rig, Clock& clock, const
 }
 
 using Json = nlohmann::ordered_json;
-
-Json finite_or_null(double value) {
-  return std::isfinite(value) ? Json(value) : Json(nullptr);
-}
 
 Json json_of(const std::optional<OverrunTolerance>& tolerance) {
   if (!tolerance) return nullptr;
@@ -253,8 +249,8 @@ void print_summary(const SessionResult& result, const LoopLimits& limits, bool f
   if (!o.stop.done()) std::printf("%s.\n", sentence_of(o.stop).c_str());
   std::printf(
       "Largest angle %.3f deg, largest cart position %.1f mm, %llu of %llu periods at the voltage limit.\n",
-      o.worst_theta_rad * degrees_per_rad, o.worst_cart_m * 1e3, static_cast<unsigned long long>(c.saturated),
-      static_cast<unsigned long long>(c.periods));
+      o.worst_theta_rad * degrees_per_radian, o.worst_cart_m * 1e3,
+      static_cast<unsigned long long>(c.saturated), static_cast<unsigned long long>(c.periods));
   if (fast) {
     std::printf("Virtual time: %.3g times faster than real time.\n", o.time_s / result.elapsed_s);
   } else {
@@ -270,7 +266,7 @@ void print_summary(const SessionResult& result, const LoopLimits& limits, bool f
 }
 
 /// The page that --live asks for.
-std::unique_ptr<LiveView> open_live(const Arguments& arguments, const RunSetup& setup) {
+std::unique_ptr<LiveView> open_live(const RunArguments& arguments, const RunSetup& setup) {
   LiveSubject subject;
   subject.title = setup.label + " on " + setup.rig.file.filename().string();
   subject.rig = &setup.rig;
@@ -289,7 +285,7 @@ LiveState end_of(const SessionResult& result, const LoopLimits& limits) {
               ". The run is in " + result.directory.string()};
 }
 
-SessionResult balance(const Arguments& arguments, RunSetup setup, const SignalFlag& caught_signal,
+SessionResult balance(const RunArguments& arguments, RunSetup setup, const SignalFlag& caught_signal,
                       LiveView* view) {
   MonotonicClock real_clock;
   VirtualClock virtual_clock;
@@ -311,7 +307,7 @@ SessionResult balance(const Arguments& arguments, RunSetup setup, const SignalFl
   // On a terminal a run in real time shows where the cart is instead.
   std::optional<Progress> progress;
   if (on_terminal && !arguments.fast)
-    options.show = show_live;
+    options.show = show_run;
   else
     options.show = [&, duration_s = setup.duration_s](const LiveStatus& live) {
       progress->report(live.time_s / duration_s, seconds(live.time_s) + " of " + seconds(duration_s));
@@ -325,7 +321,7 @@ SessionResult balance(const Arguments& arguments, RunSetup setup, const SignalFl
   return result;
 }
 
-ExitCode run(const Arguments& arguments) {
+ExitCode run(const RunArguments& arguments) {
   RunSetup setup = make_setup(arguments);
   const OverrunLimit overrun = overrun_limit(model_of(arguments, setup), setup.control);
   if (!arguments.force) require_stabilized(overrun);
@@ -365,7 +361,7 @@ void add_run(CommandLine& line) {
       "Example:  upright run --rig config/rigs/simulated.yaml --gains config/gains/exponential.yaml "
       "--duration 60 --theta0-deg 3 --fast\n"
       "The last line of the output is the run directory.");
-  const auto a = std::make_shared<Arguments>();
+  const auto a = std::make_shared<RunArguments>();
   command.option("--rig", a->rig, "Rig file").required();
   command.option("--gains", a->gains, "Gain file").required();
   command.option(

@@ -9,6 +9,7 @@
 #include <string>
 
 #include "commands.hpp"
+#include "json_number.hpp"
 #include "progress.hpp"
 #include "sweep/mpi_executor.hpp"
 #include "upright/base/error.hpp"
@@ -49,10 +50,6 @@ struct SweepArguments {
 
 using Json = nlohmann::ordered_json;
 
-Json number_or_null(double value) {
-  return value == value ? Json(value) : Json(nullptr);
-}
-
 Json json_of(const SweepConfig& config, const SweepResult& result, const std::string& folder) {
   std::array<std::size_t, 3> counts{};
   for (const SweepRun& run : result.runs)
@@ -60,15 +57,15 @@ Json json_of(const SweepConfig& config, const SweepResult& result, const std::st
   Json transitions = Json::array();
   for (const Transition& t : result.transitions)
     transitions.push_back({{"theta0_rad", t.theta0_rad},
-                           {"oscillates_from_s", number_or_null(t.oscillates_from_s)},
-                           {"falls_from_s", number_or_null(t.falls_from_s)}});
+                           {"oscillates_from_s", finite_or_null(t.oscillates_from_s)},
+                           {"falls_from_s", finite_or_null(t.falls_from_s)}});
   return {{"folder", folder},           {"finished", !result.interrupted},
           {"runs", result.runs.size()}, {"runs_made", result.runs_made},
           {"stable", counts[0]},        {"oscillating", counts[1]},
           {"fell", counts[2]},          {"transitions", transitions}};
 }
 
-std::string milliseconds(double value_s) {
+std::string milliseconds_cell(double value_s) {
   if (value_s != value_s) return "     -";
   std::array<char, 32> text;
   std::snprintf(text.data(), text.size(), "%6.1f", 1e3 * value_s);
@@ -79,7 +76,7 @@ void print(const SweepResult& result, const std::string& folder) {
   std::printf("theta0 [deg]   oscillates from [ms]   falls from [ms]\n");
   for (const Transition& t : result.transitions)
     std::printf("%12.4f   %20s   %15s\n", t.theta0_rad * 57.29577951308232,
-                milliseconds(t.oscillates_from_s).c_str(), milliseconds(t.falls_from_s).c_str());
+                milliseconds_cell(t.oscillates_from_s).c_str(), milliseconds_cell(t.falls_from_s).c_str());
   std::printf("%zu runs simulated, results in %s\n", result.runs_made, folder.c_str());
   std::fflush(stdout);
 }

@@ -6,14 +6,13 @@
 #include <numbers>
 #include <optional>
 
+#include "base/angle_units.hpp"
 #include "upright/runtime/device_clock.hpp"
 #include "upright/runtime/sleep_policy.hpp"
 
 namespace upright {
 
 namespace {
-
-constexpr double degrees_per_rad = 180.0 / std::numbers::pi;
 
 bool signalled(const SignalFlag& signal) {
   return signal.load(std::memory_order_relaxed) != 0;
@@ -262,7 +261,7 @@ Finding judge_link(const LinkProbe& probe, double rate_hz) {
 
 Finding judge_zero(const std::vector<EncoderCounts>& counts, const Calibration& calibration) {
   constexpr std::int64_t at_rest_counts = 2;
-  constexpr double close_rad = 1.0 / degrees_per_rad;
+  constexpr double close_rad = 1.0 / degrees_per_radian;
   if (counts.empty())
     return {"zero", Health::not_examined, "no counts were received", "repair the link first"};
   const Spread cart = spread_of(counts, &EncoderCounts::cart);
@@ -280,7 +279,7 @@ Finding judge_zero(const std::vector<EncoderCounts>& counts, const Calibration& 
   const double off_rad = std::remainder(pose.theta_rad - std::numbers::pi, 2.0 * std::numbers::pi);
   char what[120];
   std::snprintf(what, sizeof what, "the pendulum rests %.2f degrees from hanging, the cart at %+.1f mm",
-                off_rad * degrees_per_rad, 1e3 * pose.cart_m);
+                off_rad * degrees_per_radian, 1e3 * pose.cart_m);
   if (std::abs(off_rad) <= close_rad) return {"zero", Health::good, what, ""};
   return {"zero", Health::poor, what, "if the pendulum hangs, " + zero_remedy(counts.back())};
 }

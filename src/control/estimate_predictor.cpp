@@ -1,20 +1,13 @@
 #include "estimate_predictor.hpp"
 
 #include <cmath>
-#include <numbers>
 
+#include "base/angle_units.hpp"
 #include "upright/base/error.hpp"
 #include "upright/base/yaml_reader.hpp"
+#include "whole_periods.hpp"
 
 namespace upright {
-
-namespace {
-
-/// A horizon this near to a whole number of periods is that number, as in the delay line.
-constexpr double whole_tolerance_periods = 1e-9;
-constexpr double full_turn_rad = 2.0 * std::numbers::pi;
-
-}  // namespace
 
 EstimatePredictor::EstimatePredictor(const ControlConfig& config, const Plant& plant)
     : actuator_(make_model<double>(plant)) {
@@ -26,10 +19,8 @@ EstimatePredictor::EstimatePredictor(const ControlConfig& config, const Plant& p
   const double period_s = config.period_s();
   // How far it looks ahead: the loop's delay and the plant's input delay.
   const double horizon_s = config.delay_s + model.input_delay_s;
-  const double periods = horizon_s / period_s;
-  const double whole = std::floor(periods + whole_tolerance_periods);
-  const double fraction = periods - whole > whole_tolerance_periods ? periods - whole : 0.0;
-  free_steps_ = static_cast<std::size_t>(std::ceil(config.delay_s / period_s - whole_tolerance_periods));
+  const auto [whole, fraction] = whole_periods(horizon_s, period_s);
+  free_steps_ = periods_within(config.delay_s, period_s);
   const ModelStep step = step_over(model, period_s), part = step_over(model, fraction * period_s),
                   lead = step_over(model, model.input_delay_s);
   step_a_ = step.a.topLeftCorner<carried, carried>();

@@ -2,20 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
+#include "base/angle_units.hpp"
 #include "upright/model/elementary.hpp"
+#include "whole_periods.hpp"
 
 namespace upright {
-
-namespace {
-
-constexpr double full_turn_rad = 2.0 * std::numbers::pi;
-
-/// An input delay this near to a whole number of periods is that number, as in the delay line.
-constexpr double whole_tolerance_periods = 1e-9;
-
-}  // namespace
 
 KalmanFilter::KalmanFilter(const ControlConfig& config, const Plant& plant)
     : actuator_(make_model<double>(plant)),
@@ -23,10 +15,9 @@ KalmanFilter::KalmanFilter(const ControlConfig& config, const Plant& plant)
       pendulum_(cart_) {
   const ContinuousModel model = continuous_model(plant);
   const double period_s = config.period_s();
-  const double periods = model.input_delay_s / period_s;
-  input_periods_ = static_cast<std::size_t>(std::floor(periods + whole_tolerance_periods));
-  input_fraction_ = periods - static_cast<double>(input_periods_);
-  if (std::abs(input_fraction_) <= whole_tolerance_periods) input_fraction_ = 0.0;
+  const WholePeriods input = whole_periods(model.input_delay_s, period_s);
+  input_periods_ = input.whole;
+  input_fraction_ = input.fraction;
   step_ = step_over(model, period_s);
   if (input_fraction_ > 0.0) {
     const ModelStep first = step_over(model, input_fraction_ * period_s),

@@ -5,13 +5,11 @@
 
 #include "upright/base/error.hpp"
 #include "upright/model/linear_plant.hpp"
+#include "whole_periods.hpp"
 
 namespace upright {
 
 namespace {
-
-/// A horizon this near to a whole number of periods is that number, as in the delay line.
-constexpr double whole_tolerance_periods = 1e-9;
 
 /// Position to velocity of an estimator: (n2 z^2 + n1 z + n0) / (z^2 + m1 z + m0).
 struct FilterPolynomials {
@@ -54,11 +52,10 @@ Predictor::Predictor(const ControlConfig& config, const Plant& plant) : actuator
   offset_ = linear.sensor_offset;
   const double period_s = config.period_s();
   horizon_s_ = config.delay_s + linear.input_delay_s;
-  const double periods = horizon_s_ / period_s;
-  whole_ = static_cast<std::size_t>(std::floor(periods + whole_tolerance_periods));
-  fraction_ = periods - static_cast<double>(whole_);
-  if (std::abs(fraction_) <= whole_tolerance_periods) fraction_ = 0.0;
-  free_steps_ = static_cast<std::size_t>(std::ceil(config.delay_s / period_s - whole_tolerance_periods));
+  const WholePeriods horizon = whole_periods(horizon_s_, period_s);
+  whole_ = horizon.whole;
+  fraction_ = horizon.fraction;
+  free_steps_ = periods_within(config.delay_s, period_s);
   step_ = sampled_line(a, b, f, period_s);
   lead_ = sampled_line(a, b, f, linear.input_delay_s);
   motor_gain_ = step_.b(model_states - 1);

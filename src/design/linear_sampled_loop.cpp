@@ -6,6 +6,7 @@
 #include "control/estimate_predictor.hpp"
 #include "control/kalman_filter.hpp"
 #include "control/predictor.hpp"
+#include "control/whole_periods.hpp"
 #include "controllable_part.hpp"
 #include "dense_algebra.hpp"
 #include "upright/base/error.hpp"
@@ -19,21 +20,6 @@ using Complex = std::complex<double>;
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
-
-/// A delay this near to a whole number of periods is that number, as in the delay line.
-constexpr double whole_tolerance_periods = 1e-9;
-
-struct Periods {
-  int whole;
-  double fraction;
-};
-
-Periods periods_of(double delay_s, double period_s) {
-  const double periods = delay_s / period_s;
-  const double whole = std::floor(periods + whole_tolerance_periods);
-  const double fraction = periods - whole;
-  return {static_cast<int>(whole), fraction > whole_tolerance_periods ? fraction : 0.0};
-}
 
 /// Of what a ControlState holds: the four of the gain file, the motor's voltage, the force on the cart.
 constexpr Index shown_count = 6;
@@ -55,7 +41,7 @@ LinearSampledLoop::LinearSampledLoop(const Plant& plant, const ControlConfig& co
     throw ConfigError("the plant has no pendulum to balance: name a plant file with a pendulum");
   const LinearPlant linear = linearize(plant, smoothing);
   const ControllablePart part = controllable_part(linear);
-  const Periods input = periods_of(linear.input_delay_s, period_s_);
+  const WholePeriods input = whole_periods(linear.input_delay_s, period_s_);
   const VectorXd per_volt = part.b * linear.actuator_slope;
   const SampledPlant late = hold_input(part.a, per_volt, (1.0 - input.fraction) * period_s_);
   const SampledPlant early = hold_input(part.a, per_volt, input.fraction * period_s_);
@@ -67,7 +53,7 @@ LinearSampledLoop::LinearSampledLoop(const Plant& plant, const ControlConfig& co
   VectorXd b = VectorXd::Zero(n + 1);
   b.head(n) = late.b;
   b(n) = 1.0;
-  entries_.push_back({input.whole, b, true});
+  entries_.push_back({static_cast<int>(input.whole), b, true});
   if (config.has_state_estimator())
     add_state_estimator(config, read_plant_file(config.state_estimator.plant), linear.sensor_scale.head<2>());
   else
@@ -167,8 +153,8 @@ void LinearSampledLoop::add_prediction(const ControlConfig& config) {
 }
 
 Complex LinearSampledLoop::line(Complex z, double delay_s) const {
-  const Periods delay = periods_of(delay_s, period_s_);
-  return std::pow(z, -delay.whole) * ((1.0 - delay.fraction) + delay.fraction / z);
+  const WholePeriods delay = whole_periods(delay_s, period_s_);
+  return std::pow(z, -static_cast<int>(delay.whole)) * ((1.0 - delay.fraction) + delay.fraction / z);
 }
 
 Complex LinearSampledLoop::transfer(Complex z) const {
@@ -201,8 +187,8 @@ Complex LinearSampledLoop::predicted_voltages(Complex z) const {
 
 /// The shares of the newest value and those before it in a delayed one.
 std::vector<double> LinearSampledLoop::shares(double delay_s) const {
-  const Periods delay = periods_of(delay_s, period_s_);
-  std::vector<double> list(static_cast<std::size_t>(delay.whole) + 1, 0.0);
+  const WholePeriods delay = whole_periods(delay_s, period_s_);
+  std::vector<double> list(delay.whole + 1, 0.0);
   list.back() = 1.0 - delay.fraction;
   if (delay.fraction > 0.0) list.push_back(delay.fraction);
   return list;

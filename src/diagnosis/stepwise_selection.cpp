@@ -11,11 +11,7 @@
 
 namespace upright {
 
-namespace {
-
-constexpr double infinity = std::numeric_limits<double>::infinity();
-
-}  // namespace
+namespace {}  // namespace
 
 StepwiseSelection::StepwiseSelection(Search& search, const DiagnosisOptions& options, Diagnosis& record)
     : search_(search),
@@ -116,7 +112,7 @@ Evidence StepwiseSelection::evidence_of(Change change, const Hypothesis& from, c
   e.change = change;
   e.improvement = compare(from, to);
   if (!std::isfinite(to.train.objective)) return e;
-  e.certainty = infinity;
+  e.certainty = std::numeric_limits<double>::infinity();
   for (const std::size_t effect : brought) {
     e.certainty = std::min(e.certainty, search_.certainty(to, effect));
     e.plausible = e.plausible && search_.is_plausible(to, effect);
@@ -331,7 +327,7 @@ Decision StepwiseSelection::try_finalist(int round, bool with_low_noise, Finalis
 
 std::size_t StepwiseSelection::choose(std::vector<Finalist>& accepted) {
   const auto largest = [&] {
-    double score = -infinity;
+    double score = -std::numeric_limits<double>::infinity();
     for (const Finalist& b : accepted) score = std::max(score, b.score);
     return score;
   };

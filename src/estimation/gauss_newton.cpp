@@ -17,12 +17,11 @@ namespace upright {
 
 namespace {
 
-constexpr int states = state_count;
 constexpr double infinity = std::numeric_limits<double>::infinity();
 using Matrix = Eigen::MatrixXd;
 
 /// Information on the initial state beyond the data: nearly none, enough to keep unmeasured states in place.
-constexpr double start_information[states] = {1.0, 1.0, 0.1, 0.01, 1e4};
+constexpr double start_information[state_count] = {1.0, 1.0, 0.1, 0.01, 1e4};
 
 /// By how much a quadratic objective falls along a way.
 double promise(const Matrix& information, const Eigen::VectorXd& slope, const Eigen::VectorXd& way) {
@@ -74,8 +73,8 @@ double Prior::objective(const Plant& plant) const {
 struct GaussNewton::ReducedEquations {
   Matrix information;
   Eigen::VectorXd score;
-  std::vector<Eigen::Matrix<double, states, Eigen::Dynamic>> back;
-  std::vector<Eigen::Matrix<double, states, 1>> base;
+  std::vector<Eigen::Matrix<double, state_count, Eigen::Dynamic>> back;
+  std::vector<Eigen::Matrix<double, state_count, 1>> base;
 };
 
 GaussNewton::GaussNewton(const FitData& data, const FitPoint& start, const std::vector<FreeParameter>& free,
@@ -199,14 +198,15 @@ GaussNewton::ReducedEquations GaussNewton::eliminate_initial_states(double dampi
   reduced.base.resize(linearised_.size());
   for (std::size_t s = 0; s < linearised_.size(); ++s) {
     const NormalEquations& n = linearised_[s].normal;
-    Eigen::Matrix<double, states, states> hii = n.information.topLeftCorner<states, states>();
-    for (int i = 0; i < states; ++i) hii(i, i) += start_information[i] + damping * hii(i, i);
-    const Eigen::LDLT<Eigen::Matrix<double, states, states>> solver(hii);
-    reduced.back[s] = solver.solve(n.information.topRightCorner(states, np));
-    reduced.base[s] = solver.solve(n.score.head<states>());
+    Eigen::Matrix<double, state_count, state_count> hii =
+        n.information.topLeftCorner<state_count, state_count>();
+    for (int i = 0; i < state_count; ++i) hii(i, i) += start_information[i] + damping * hii(i, i);
+    const Eigen::LDLT<Eigen::Matrix<double, state_count, state_count>> solver(hii);
+    reduced.back[s] = solver.solve(n.information.topRightCorner(state_count, np));
+    reduced.base[s] = solver.solve(n.score.head<state_count>());
     reduced.information += n.information.bottomRightCorner(np, np) -
-                           n.information.bottomLeftCorner(np, states) * reduced.back[s];
-    reduced.score += n.score.tail(np) - n.information.bottomLeftCorner(np, states) * reduced.base[s];
+                           n.information.bottomLeftCorner(np, state_count) * reduced.back[s];
+    reduced.score += n.score.tail(np) - n.information.bottomLeftCorner(np, state_count) * reduced.base[s];
   }
   return reduced;
 }
@@ -216,12 +216,12 @@ GaussNewton::Information GaussNewton::information() const {
   Matrix h = prior_.information(), spread = Matrix::Zero(np, np);
   for (const LinearisedSegment& segment : linearised_) {
     const NormalEquations& n = segment.normal;
-    Matrix hii = n.information.topLeftCorner(states, states);
-    for (int i = 0; i < states; ++i) hii(i, i) += start_information[i];
+    Matrix hii = n.information.topLeftCorner(state_count, state_count);
+    for (int i = 0; i < state_count; ++i) hii(i, i) += start_information[i];
     const Eigen::LDLT<Matrix> solver(hii);
-    const Matrix back = solver.solve(n.information.topRightCorner(states, np));
-    h += n.information.bottomRightCorner(np, np) - n.information.bottomLeftCorner(np, states) * back;
-    const Eigen::VectorXd score = n.score.tail(np) - back.transpose() * n.score.head(states);
+    const Matrix back = solver.solve(n.information.topRightCorner(state_count, np));
+    h += n.information.bottomRightCorner(np, np) - n.information.bottomLeftCorner(np, state_count) * back;
+    const Eigen::VectorXd score = n.score.tail(np) - back.transpose() * n.score.head(state_count);
     spread += score * score.transpose();
   }
   const auto segments = static_cast<double>(linearised_.size());
@@ -260,13 +260,13 @@ void GaussNewton::move_parameters(Eigen::VectorXd& delta, Step& result) const {
 /// Moves the initial states after the parameters, none further than makes sense.
 void GaussNewton::move_initial_states(const ReducedEquations& reduced, const Eigen::VectorXd& delta,
                                       Step& result) const {
-  constexpr double longest[states] = {0.01, 0.3, 0.5, 3.0, 0.01};
-  Eigen::VectorXd way(states + delta.size());
+  constexpr double longest[state_count] = {0.01, 0.3, 0.5, 3.0, 0.01};
+  Eigen::VectorXd way(state_count + delta.size());
   way.tail(delta.size()) = delta;
   for (std::size_t s = 0; s < linearised_.size(); ++s) {
     const auto values = as_array(result.point.starts[s]);
-    way.head(states) = reduced.base[s] - reduced.back[s] * delta;
-    for (int i = 0; i < states; ++i) {
+    way.head(state_count) = reduced.base[s] - reduced.back[s] * delta;
+    for (int i = 0; i < state_count; ++i) {
       result.cut_short = result.cut_short || std::abs(way[i]) > longest[i];
       way[i] = std::clamp(way[i], -longest[i], longest[i]);
       *values[static_cast<std::size_t>(i)] += way[i];

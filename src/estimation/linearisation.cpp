@@ -19,8 +19,6 @@ namespace upright {
 
 namespace {
 
-constexpr int states = state_count;
-
 EngineOptions engine_options() {
   EngineOptions options;
   options.max_step_s = 4e-3;
@@ -85,11 +83,11 @@ double weight_of(const Measurement& run, int channel, std::size_t k) {
 
 /// Adds a filter's correction to the state of an engine.
 template <class S>
-void correct_state(EventEngine<S>& engine, const double (&correction)[states]) {
-  if (std::all_of(correction, correction + states, [](double u) { return u == 0.0; })) return;
+void correct_state(EventEngine<S>& engine, const double (&correction)[state_count]) {
+  if (std::all_of(correction, correction + state_count, [](double u) { return u == 0.0; })) return;
   PlantState<S> state = engine.state();
   const auto values = as_array(state);
-  for (int i = 0; i < states; ++i) *values[static_cast<std::size_t>(i)] += S(correction[i]);
+  for (int i = 0; i < state_count; ++i) *values[static_cast<std::size_t>(i)] += S(correction[i]);
   engine.correct(state);
 }
 
@@ -167,7 +165,7 @@ class SegmentLineariser {
                     const PlantState<double>& start, const std::vector<FreeParameter>& free)
       : run_(run),
         segment_(segment),
-        columns_(states + static_cast<int>(free.size())),
+        columns_(state_count + static_cast<int>(free.size())),
         simulator_(model_of(run, point.plant, free), engine_options(), 64 + segment.last - segment.first),
         sensors_(sensor_gains(dynamics())),
         shown_of_speed_s_(shown_of_cart_speed_s(dynamics())),
@@ -217,7 +215,7 @@ class SegmentLineariser {
     PlantModel<Jet> model = make_model<Jet>(plant, run.cart_locked);
     for (std::size_t j = 0; j < free.size(); ++j)
       model.parameters[effect_parameter_offset(free[j].effect) + free[j].index]
-          .v[states + static_cast<int>(j)] = 1.0;
+          .v[state_count + static_cast<int>(j)] = 1.0;
     return model;
   }
 
@@ -227,13 +225,13 @@ class SegmentLineariser {
 
   const Dynamics<Jet>& dynamics() const { return simulator_.engine().dynamics(); }
 
-  std::array<const Jet*, states> reached_state() const {
+  std::array<const Jet*, state_count> reached_state() const {
     const PlantState<Jet>& reached = simulator_.engine().state();
     return {&reached.cart_m, &reached.theta_rad, &reached.cart_mps, &reached.theta_radps, &reached.bristle_m};
   }
 
   void start_sensitivity(const PlantState<double>& start) {
-    for (int i = 0; i < states; ++i) sensitivity_[static_cast<std::size_t>(i)] = Row::Unit(i);
+    for (int i = 0; i < state_count; ++i) sensitivity_[static_cast<std::size_t>(i)] = Row::Unit(i);
     // Parameters of the sensors change what is meant by what they show at the start, not what they show.
     const Outputs<Jet> shown = dynamics().measure(without_bristles(start));
     sensitivity_[0] -= shown.cart_m.v / sensors_[0].a;
@@ -253,9 +251,9 @@ class SegmentLineariser {
       simulator_.advance_to(run_.time_s[k]);
     }
     const PlantState<Jet>& reached = simulator_.engine().state();
-    const std::array<const Jet*, states> end = reached_state();
-    for (int i = 0; i < states; ++i)
-      for (int j = 0; j < states; ++j)
+    const std::array<const Jet*, state_count> end = reached_state();
+    for (int i = 0; i < state_count; ++i)
+      for (int j = 0; j < state_count; ++j)
         step.transition[i][j] = first ? (i == j ? 1.0 : 0.0) : end[static_cast<std::size_t>(i)]->v[j];
     set_holds(step);
     const Outputs<Jet> outputs = simulator_.engine().outputs();
@@ -282,12 +280,12 @@ class SegmentLineariser {
   }
 
   void carry_sensitivity(const LinearStep& step) {
-    const std::array<const Jet*, states> end = reached_state();
-    const std::array<Row, states> former = sensitivity_;
-    for (std::size_t i = 0; i < states; ++i) {
+    const std::array<const Jet*, state_count> end = reached_state();
+    const std::array<Row, state_count> former = sensitivity_;
+    for (std::size_t i = 0; i < state_count; ++i) {
       Row moved = end[i]->v;
-      moved.template head<states>().setZero();
-      for (std::size_t j = 0; j < states; ++j)
+      moved.template head<state_count>().setZero();
+      for (std::size_t j = 0; j < state_count; ++j)
         if (step.transition[i][j] != 0.0) moved += step.transition[i][j] * former[j];
       sensitivity_[i] = moved;
     }
@@ -295,15 +293,15 @@ class SegmentLineariser {
 
   /// Updates the filter with each channel in turn. False for a value that is not finite.
   bool update(LinearStep& step, const Outputs<Jet>& outputs, NormalEquations* normal) {
-    std::fill(step.correction, step.correction + states, 0.0);
+    std::fill(step.correction, step.correction + state_count, 0.0);
     for (int channel = 0; channel < 2; ++channel) {
       if (!covariance_.present(channel)) continue;
       covariance_.update(step, channel);
       step.variance[channel] = covariance_.variance();
-      std::copy(covariance_.gain(), covariance_.gain() + states, step.update[channel]);
+      std::copy(covariance_.gain(), covariance_.gain() + state_count, step.update[channel]);
       const double e = step.residual[channel] - step.gain[channel] * step.correction[channel];
       step.innovation[channel] = e;
-      for (int i = 0; i < states; ++i) step.correction[i] += covariance_.gain()[i] * e;
+      for (int i = 0; i < state_count; ++i) step.correction[i] += covariance_.gain()[i] * e;
       if (normal == nullptr) continue;
       normal->likelihood.add(e, covariance_.variance(), step.weight[channel]);
       if (!std::isfinite(e)) return false;
@@ -320,13 +318,13 @@ class SegmentLineariser {
     Row row = channel == 0 ? outputs.cart_m.v : outputs.theta_rad.v;
     row -= step.gain[channel] * reached_state()[static_cast<std::size_t>(channel)]->v;
     if (channel == 0) row -= shown_of_speed_s_ * reached.cart_mps.v;
-    row.template head<states>().setZero();
+    row.template head<state_count>().setZero();
     row += step.gain[channel] * sensitivity_[static_cast<std::size_t>(channel)];
     if (channel == 0) row += shown_of_speed_s_ * sensitivity_[2];
     const double weight = step.weight[channel] / covariance_.variance();
     add_square(row, weight, columns_, information_);
     score_ += (weight * e) * row;
-    for (std::size_t i = 0; i < states; ++i) {
+    for (std::size_t i = 0; i < state_count; ++i) {
       if (covariance_.gain()[i] == 0.0) continue;
       sensitivity_[i] -= covariance_.gain()[i] * row;
       const std::size_t sensor = i % 2 == 0 ? 0 : 1;  // x, v and the bristles; theta and omega
@@ -343,7 +341,7 @@ class SegmentLineariser {
   double shown_of_speed_s_;
   NoiseInput noise_input_;
   EkfCovariance covariance_;
-  std::array<Row, states> sensitivity_;  ///< of the state that the filter estimates
+  std::array<Row, state_count> sensitivity_;  ///< of the state that the filter estimates
   Eigen::Matrix<double, N, N> information_ = Eigen::Matrix<double, N, N>::Zero();
   Row score_ = Row::Zero();
 };
@@ -357,7 +355,7 @@ void linearise_segment(const FitData& data, std::size_t s, const FitPoint& point
   const auto with = [&]<int N>() {
     SegmentLineariser<N>((*data.runs)[segment.run], segment, point, point.starts[s], free).run(steps, normal);
   };
-  const std::size_t slots = free.size() + states;
+  const std::size_t slots = free.size() + state_count;
   if (slots <= 8) return with.template operator()<8>();
   if (slots <= 16) return with.template operator()<16>();
   if (slots <= 24) return with.template operator()<24>();

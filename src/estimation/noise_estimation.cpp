@@ -5,12 +5,11 @@
 
 #include "base/parallel.hpp"
 #include "extended_kalman_filter.hpp"
+#include "state_vector.hpp"
 
 namespace upright {
 
 namespace {
-
-constexpr int states = LinearStep::states;
 
 /// Likelihood of a segment that is linearised, had the noise been another: to first order the filtered
 /// trajectory moves by what the other gains would have corrected.
@@ -18,27 +17,27 @@ Likelihood likelihood_with_noise(const std::vector<LinearStep>& steps, const Mea
                                  const Plant& plant, const Noise& noise) {
   EkfCovariance covariance(run, plant, noise);
   Likelihood sum;
-  double shift[states] = {}, moved[states];
+  double shift[state_count] = {}, moved[state_count];
   for (std::size_t k = 0; k < steps.size(); ++k) {
     const LinearStep& step = steps[k];
     if (k > 0) {
       covariance.predict(step);
-      for (int i = 0; i < states; ++i) {
+      for (int i = 0; i < state_count; ++i) {
         moved[i] = 0.0;
-        for (int j = 0; j < states; ++j) moved[i] += step.transition[i][j] * shift[j];
+        for (int j = 0; j < state_count; ++j) moved[i] += step.transition[i][j] * shift[j];
       }
-      std::copy(moved, moved + states, shift);
+      std::copy(moved, moved + state_count, shift);
     }
-    double update[states] = {};
+    double update[state_count] = {};
     for (int channel = 0; channel < 2; ++channel) {
       if (!covariance.present(channel)) continue;
       covariance.update(step, channel);
       const double c = step.gain[channel];
       const double e = step.residual[channel] - c * (shift[channel] + update[channel]);
       sum.add(e, covariance.variance(), step.weight[channel]);
-      for (int i = 0; i < states; ++i) update[i] += covariance.gain()[i] * e;
+      for (int i = 0; i < state_count; ++i) update[i] += covariance.gain()[i] * e;
     }
-    for (int i = 0; i < states; ++i) shift[i] += update[i] - step.correction[i];
+    for (int i = 0; i < state_count; ++i) shift[i] += update[i] - step.correction[i];
   }
   return sum;
 }

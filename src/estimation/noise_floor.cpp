@@ -8,14 +8,14 @@
 #include <vector>
 
 #include "base/parallel.hpp"
+#include "state_vector.hpp"
 
 namespace upright {
 
 namespace {
 
-constexpr int states = LinearStep::states;
-using State = Eigen::Matrix<double, states, 1>;
-using Transition = Eigen::Matrix<double, states, states, Eigen::RowMajor>;
+using State = Eigen::Matrix<double, state_count, 1>;
+using Transition = Eigen::Matrix<double, state_count, state_count, Eigen::RowMajor>;
 
 /// Least squares of the initial state over residuals, to take out what a fit of it would.
 class InitialStateFit {

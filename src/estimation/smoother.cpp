@@ -5,13 +5,13 @@
 #include <cmath>
 
 #include "base/parallel.hpp"
+#include "state_vector.hpp"
 
 namespace upright {
 
 namespace {
 
-constexpr int states = LinearStep::states;
-constexpr int extended = states + 2;  // and the residual force and torque
+constexpr int extended = state_count + 2;  // and the residual force and torque
 using Vector = Eigen::Matrix<double, extended, 1>;
 using Matrix = Eigen::Matrix<double, extended, extended>;
 
@@ -22,13 +22,13 @@ struct Filtered {
 
 Matrix transition_of(const LinearStep& step) {
   Matrix a = Matrix::Identity();
-  for (int i = 0; i < states; ++i)
-    for (int j = 0; j < states; ++j) a(i, j) = step.transition[i][j];
+  for (int i = 0; i < state_count; ++i)
+    for (int j = 0; j < state_count; ++j) a(i, j) = step.transition[i][j];
   // A force that lasts over the period enters through the velocities, which the transition then carries on.
-  for (int i = 0; i < states; ++i) {
-    a(i, states) =
+  for (int i = 0; i < state_count; ++i) {
+    a(i, state_count) =
         (step.transition[i][2] * step.by_force[0] + step.transition[i][3] * step.by_force[1]) * step.period_s;
-    a(i, states + 1) =
+    a(i, state_count + 1) =
         (step.transition[i][2] * step.by_torque[0] + step.transition[i][3] * step.by_torque[1]) *
         step.period_s;
   }
@@ -55,12 +55,12 @@ std::vector<Filtered> filter(const std::vector<LinearStep>& steps, const Channel
     if (k > 0) {
       mean = f.transition * (mean - corrected);
       p = f.transition * p * f.transition.transpose();
-      p(states, states) += wander_force * wander_force * steps[k].period_s;
-      p(states + 1, states + 1) += wander_torque * wander_torque * steps[k].period_s;
+      p(state_count, state_count) += wander_force * wander_force * steps[k].period_s;
+      p(state_count + 1, state_count + 1) += wander_torque * wander_torque * steps[k].period_s;
     }
     // The trajectory that the steps are linearised along was itself corrected by a filter: errors are
     // counted from there.
-    for (int i = 0; i < states; ++i) corrected[i] = steps[k].correction[i];
+    for (int i = 0; i < state_count; ++i) corrected[i] = steps[k].correction[i];
     f.predicted_mean = mean;
     f.predicted_covariance = p;
     for (std::size_t channel = 0; channel < 2; ++channel) {
@@ -115,8 +115,8 @@ std::vector<ResidualTrace> smooth_residuals(const FitData& data, const FitPoint&
     trace.run = segment.run;
     for (std::size_t k = 0; k < steps.size(); ++k) {
       trace.time_s.push_back(run.time_s[segment.first + k]);
-      trace.force_n.push_back(smoothed[k][states]);
-      trace.torque_nm.push_back(smoothed[k][states + 1]);
+      trace.force_n.push_back(smoothed[k][state_count]);
+      trace.torque_nm.push_back(smoothed[k][state_count + 1]);
       trace.cart_m.push_back(present[0] ? run.cart_m[segment.first + k] : 0.0);
       trace.cart_mps.push_back(steps[k].rate[0] + smoothed[k][2]);
       trace.voltage_v.push_back(run.voltage_v[segment.first + k]);

@@ -16,7 +16,7 @@ namespace {
 constexpr double longest_trial_s = 7200.0;
 constexpr double zero_patience_s = 2.0;
 /// A swing-up that fails is tried again; one that fails so often has a cause that stays.
-constexpr int most_attempts = 3;
+constexpr int most_trial_attempts = 3;
 constexpr const char* again = "; start the same command again to repeat this piece";
 
 std::string section_of(const ExperimentSetup& setup, const Piece& piece, const ScriptContext& context) {
@@ -178,7 +178,7 @@ ExperimentResult run_experiment(const ExperimentSetup& setup, const std::vector<
     ++attempts;
     result.stop = attempt.stop;
     if (attempt.result.outcome.empty()) {
-      if (attempt.may_repeat && attempts < most_attempts && attempt.stop.done()) continue;
+      if (attempt.may_repeat && attempts < most_trial_attempts && attempt.stop.done()) continue;
       result.sentence = attempt.sentence;
       if (attempts > 1)
         result.sentence +=

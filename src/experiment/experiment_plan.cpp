@@ -179,13 +179,13 @@ class Planner {
 
   PlannedPiece plan_one(Piece piece) {
     if (!piece.fit_to_travel) refuse_unreachable(piece, setup_);
-    constexpr int most_attempts = 16;
+    constexpr int most_plan_attempts = 16;
     for (int attempt = 0;; ++attempt) {
       const Rehearsal r = rehearsed(piece);
       const bool within = stays_within(r);
       if (within && r.outcome.reason == StopReason::duration)
         return {piece, r.outcome.time_s, r.farthest_m, r.most_v};
-      if (within || !piece.fit_to_travel || attempt == most_attempts) refuse_for(piece, r);
+      if (within || !piece.fit_to_travel || attempt == most_plan_attempts) refuse_for(piece, r);
       scale_voltages(*piece.kind, 0.8);
     }
   }

@@ -4,14 +4,13 @@
 #include <cmath>
 #include <numbers>
 
+#include "base/angle_units.hpp"
 #include "upright/model/elementary.hpp"
 #include "upright/model/rigid_body.hpp"
 
 namespace upright {
 
 namespace {
-
-constexpr double pi = std::numbers::pi;
 
 // The way between stretches.
 constexpr double fastest_approach_mps = 0.3;
@@ -43,10 +42,6 @@ constexpr double lost_lean_rad = 0.5;
 constexpr double catch_glide_s = 0.1;
 constexpr double caught_lean_rad = 0.03, caught_within_m = 0.05;
 constexpr double recentring_s = 1.0;
-
-double sign(double value) {
-  return value < 0.0 ? -1.0 : 1.0;
-}
 
 }  // namespace
 
@@ -174,7 +169,7 @@ Demand ExperimentScript::wait(const ControlState& now) noexcept {
 Demand ExperimentScript::engage(const ControlState& now) noexcept {
   enter(ScriptPhase::acting);
   acted_s_ = 0.0;
-  upright_rad_ = 2.0 * pi * std::round(now.theta_rad / (2.0 * pi));
+  upright_rad_ = full_turn_rad * std::round(now.theta_rad / full_turn_rad);
   return balance(now);
 }
 
@@ -197,7 +192,7 @@ Demand ExperimentScript::swing_up(const ControlState& now) noexcept {
     phase_s_ = waited;
     caught_s_ = 0.0;
     caught_m_ = now.cart_m + catch_glide_s * now.cart_velocity_mps;
-    upright_rad_ = 2.0 * pi * std::round(now.theta_rad / (2.0 * pi));
+    upright_rad_ = full_turn_rad * std::round(now.theta_rad / full_turn_rad);
     former_rate_ = former_lean_ = 0.0;
     return catch_upright(now);
   }

@@ -4,13 +4,13 @@
 #include <cmath>
 #include <numbers>
 
+#include "base/angle_units.hpp"
 #include "piece.hpp"
 
 namespace upright {
 
 namespace {
 
-constexpr double radians_per_degree = std::numbers::pi / 180.0;
 constexpr std::size_t most_list = 1000;
 constexpr std::size_t most_controllers = 8, longest_controller_name = 20;  // a table that can be read
 

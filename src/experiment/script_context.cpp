@@ -4,11 +4,11 @@
 #include <cmath>
 #include <numbers>
 
+#include "base/angle_units.hpp"
+
 namespace upright {
 
 namespace {
-
-constexpr double pi = std::numbers::pi;
 
 constexpr double servo_bandwidth_radps = 15.0;
 constexpr double push_gain = 20.0;  // V/s per m/s that is missing
@@ -22,10 +22,6 @@ constexpr double braking_v = 6.0;
 constexpr double braking_share = 0.6;
 constexpr double reaction_s = 0.01;
 
-double sign(double value) {
-  return value < 0.0 ? -1.0 : 1.0;
-}
-
 }  // namespace
 
 double ScriptContext::side_m() const noexcept {
@@ -33,11 +29,11 @@ double ScriptContext::side_m() const noexcept {
 }
 
 double wrapped(double angle_rad) noexcept {
-  return angle_rad - 2.0 * pi * std::round(angle_rad / (2.0 * pi));
+  return angle_rad - full_turn_rad * std::round(angle_rad / full_turn_rad);
 }
 
 double hanging_lean(const ScriptContext& context, const ControlState& now) noexcept {
-  return context.servo.pendulum_m > 0.0 ? wrapped(now.theta_rad - pi) : 0.0;
+  return context.servo.pendulum_m > 0.0 ? wrapped(now.theta_rad - std::numbers::pi) : 0.0;
 }
 
 bool hangs_still(const ScriptContext& context, const ControlState& now) noexcept {

@@ -24,6 +24,11 @@ constexpr double rest_radps = 0.25;     ///< below it the pendulum is at rest
 /// Speed asked for per distance that is missing.
 constexpr double approach_per_s = 3.0;
 
+/// The direction of a velocity or force: -1 or 1, never 0.
+inline double sign(double value) noexcept {
+  return value < 0.0 ? -1.0 : 1.0;
+}
+
 /// An angle within half a turn of zero.
 double wrapped(double angle_rad) noexcept;
 

@@ -8,6 +8,7 @@
 #include <optional>
 #include <utility>
 
+#include "base/angle_units.hpp"
 #include "column_timing.hpp"
 #include "data_hypotheses.hpp"
 #include "dataset_file.hpp"
@@ -18,8 +19,6 @@
 namespace upright {
 
 namespace {
-
-constexpr double degree = std::numbers::pi / 180.0;
 
 /// Data as they are may contradict an equation that accounts for less than this share of them, with all
 /// freedom for what may differ from the plant file.
@@ -138,7 +137,7 @@ class Suspicion {
     reading.fold = *fold_;
     constexpr double more_than_any_in_rad = 10.0;
     if (*fold_ > more_than_any_in_rad) {
-      reading.factor[theta_channel] = degree;
+      reading.factor[theta_channel] = radians_per_degree;
       reading.mistakes.emplace_back("theta_rad is in degrees");
     }
     reading.mistakes.push_back(folded_words());
@@ -201,7 +200,7 @@ class Suspicion {
       list_cart_counts();
     }
     if (!theta) return;
-    add_factor(theta_unit, theta_channel, degree, "theta_rad is in degrees");
+    add_factor(theta_unit, theta_channel, radians_per_degree, "theta_rad is in degrees");
     add_factor(theta_unit, theta_channel, 2.0 * std::numbers::pi, "theta_rad is in turns");
     if (all_whole(judge_.raw(theta_channel)))
       for (const int counts : {4096, 2048, 1024, 8192, 16384, 1000, 2000, 4000, 5000, 10000})

@@ -5,6 +5,7 @@
 #include <numbers>
 #include <vector>
 
+#include "base/angle_units.hpp"
 #include "upright/base/yaml_reader.hpp"
 
 namespace upright {
@@ -17,8 +18,6 @@ struct Unit {
   std::string_view quantity, name;
   double factor;
 };
-
-constexpr double degree = std::numbers::pi / 180.0;
 
 constexpr std::array units = {
     Unit{"time_s", "s", 1.0},
@@ -42,10 +41,10 @@ constexpr std::array units = {
     Unit{"cart_m", "in", 0.0254},
     Unit{"theta_rad", "rad", 1.0},
     Unit{"theta_rad", "mrad", 1e-3},
-    Unit{"theta_rad", "deg", degree},
-    Unit{"theta_rad", "degree", degree},
-    Unit{"theta_rad", "degrees", degree},
-    Unit{"theta_rad", "\xc2\xb0", degree},
+    Unit{"theta_rad", "deg", radians_per_degree},
+    Unit{"theta_rad", "degree", radians_per_degree},
+    Unit{"theta_rad", "degrees", radians_per_degree},
+    Unit{"theta_rad", "\xc2\xb0", radians_per_degree},
     Unit{"theta_rad", "rev", 2.0 * std::numbers::pi},
     Unit{"theta_rad", "turn", 2.0 * std::numbers::pi},
 };

@@ -13,16 +13,16 @@ namespace {
 constexpr double piece_s = 8.5;
 
 /// Samples first..last-1.
-struct Piece {
+struct RowRange {
   std::size_t first, last;
 };
 
-std::vector<Piece> pieces_of(const Measurement& run, double part) {
+std::vector<RowRange> pieces_of(const Measurement& run, double part) {
   const double duration_s = run.time_s.back() - run.time_s.front();
   const auto count = std::max<std::size_t>(1, static_cast<std::size_t>(part * duration_s / piece_s));
   const double length_s = part * duration_s / static_cast<double>(count);
   const double every_s = duration_s / static_cast<double>(count);
-  std::vector<Piece> pieces;
+  std::vector<RowRange> pieces;
   for (std::size_t i = 0; i < count; ++i) {
     const double from_s = run.time_s.front() + (static_cast<double>(i) + 0.5) * every_s - 0.5 * length_s;
     const auto at = [&](double time_s) {
@@ -34,20 +34,20 @@ std::vector<Piece> pieces_of(const Measurement& run, double part) {
   return pieces;
 }
 
-void keep_pieces(std::vector<double>& values, const std::vector<Piece>& pieces) {
+void keep_pieces(std::vector<double>& values, const std::vector<RowRange>& pieces) {
   if (values.empty()) return;
   auto to = values.begin();
-  for (const Piece& piece : pieces)
+  for (const RowRange& piece : pieces)
     to = std::move(values.begin() + static_cast<std::ptrdiff_t>(piece.first),
                    values.begin() + static_cast<std::ptrdiff_t>(piece.last), to);
   values.erase(to, values.end());
   values.shrink_to_fit();
 }
 
-void keep_pieces(Measurement& run, const std::vector<Piece>& pieces) {
+void keep_pieces(Measurement& run, const std::vector<RowRange>& pieces) {
   std::vector<std::size_t> breaks;
   std::size_t kept = 0;
-  for (const Piece& piece : pieces) {
+  for (const RowRange& piece : pieces) {
     if (kept > 0) breaks.push_back(kept);
     for (const std::size_t at : run.breaks)
       if (at > piece.first && at < piece.last) breaks.push_back(kept + at - piece.first);

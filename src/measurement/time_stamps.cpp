@@ -10,11 +10,11 @@ namespace {
 
 /// Windows of so many rows, each followed by a polynomial of so many coefficients.
 constexpr Eigen::Index rows = 15, coefficients = 5;
-constexpr std::size_t fewest_windows = 24, most_windows = 4000;
+constexpr std::size_t fewest_stamp_windows = 24, most_stamp_windows = 4000;
 /// Steps of stamps differ by this share of their mean before anything is looked for.
 constexpr double least_scatter = 0.02;
 /// The motion leaves so many times as much with the stamps as with a steady clock.
-constexpr double far_better = 5.0;
+constexpr double better_with_stamps = 5.0;
 
 /// Periods that differ by less are the same one.
 constexpr double same_period = 0.01;
@@ -37,7 +37,7 @@ double left_of(const Window& time, const Window& values) {
 std::vector<std::size_t> windows_of(const Measurement& run) {
   const auto length = static_cast<std::size_t>(rows);
   std::vector<std::size_t> firsts;
-  const std::size_t step = std::max(length, run.size() / most_windows);
+  const std::size_t step = std::max(length, run.size() / most_stamp_windows);
   for (std::size_t first = 0; first + length <= run.size(); first += step) {
     const auto next = std::upper_bound(run.breaks.begin(), run.breaks.end(), first);
     if (next == run.breaks.end() || *next >= first + length) firsts.push_back(first);
@@ -55,7 +55,7 @@ double median(std::vector<double> values) {
 
 std::optional<ScatteredStamps> find_scatter(const Measurement& run) {
   const std::vector<std::size_t> firsts = windows_of(run);
-  if (firsts.size() < fewest_windows) return std::nullopt;
+  if (firsts.size() < fewest_stamp_windows) return std::nullopt;
   Window steady;
   for (Eigen::Index i = 0; i < rows; ++i) steady[i] = static_cast<double>(i);
   std::vector<double> periods, scatters;
@@ -81,7 +81,7 @@ std::optional<ScatteredStamps> find_scatter(const Measurement& run) {
       stamped += left_of(time, values);
       clocked += left_of(steady, values);
     }
-    if (stamped > far_better * clocked && clocked >= 0.0 && stamped > 0.0) return found;
+    if (stamped > better_with_stamps * clocked && clocked >= 0.0 && stamped > 0.0) return found;
   }
   return std::nullopt;
 }

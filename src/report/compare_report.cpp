@@ -4,6 +4,7 @@
 #include <cmath>
 #include <set>
 
+#include "base/angle_units.hpp"
 #include "base/number_text.hpp"
 #include "html.hpp"
 #include "plot.hpp"
@@ -13,7 +14,6 @@ namespace upright {
 
 namespace {
 
-constexpr double per_degree = 57.29577951308232;
 constexpr std::size_t most_drawn = 6;  // more curves in one plot are not distinguishable
 
 std::string in_units(double value, const Quantity& quantity) {
@@ -59,7 +59,7 @@ struct DrawnQuantity {
   double factor;
 };
 constexpr DrawnQuantity drawn_quantities[] = {
-    {"pendulum angle (0 is upright)", "theta [deg]", &LogRecord::theta_rad, per_degree},
+    {"pendulum angle (0 is upright)", "theta [deg]", &LogRecord::theta_rad, degrees_per_radian},
     {"cart position", "x [mm]", &LogRecord::cart_m, 1e3},
     {"voltage", "V", &LogRecord::voltage_v, 1.0}};
 

@@ -16,6 +16,7 @@
 #include "base/input_file.hpp"
 #include "html.hpp"
 #include "plot.hpp"
+#include "result_text.hpp"
 #include "upright/base/error.hpp"
 
 namespace upright {
@@ -28,12 +29,6 @@ constexpr double nan_value = std::numeric_limits<double>::quiet_NaN();
 
 double number(const json& value) {
   return value.is_number() ? value.get<double>() : nan_value;
-}
-
-std::string file_text(const std::filesystem::path& file) {
-  std::ostringstream text;
-  if (const auto in = InputFile::if_there(file)) text << in->rdbuf();
-  return text.str();
 }
 
 std::string joined(const json& names) {
@@ -118,10 +113,6 @@ std::vector<std::vector<std::string>> read_rows(const std::filesystem::path& fil
   return rows;
 }
 
-double number(const std::string& cell) {
-  return cell.empty() ? nan_value : std::strtod(cell.c_str(), nullptr);
-}
-
 /// One quantity of a held-out run: measured, and simulated with both models. The simulated lines have a gap
 /// between segments, since each segment starts from its own initial state.
 struct Trace {
@@ -136,11 +127,11 @@ Trace trace_of(const std::vector<std::vector<std::string>>& rows, const std::str
   double count = 0.0;
   for (const auto& row : rows) {
     if (row[1] != run || row[column].empty()) continue;
-    const double measured = number(row[column]), before = number(row[column + 1]),
-                 after = number(row[column + 2]);
+    const double measured = cell_number(row[column]), before = cell_number(row[column + 1]),
+                 after = cell_number(row[column + 2]);
     const bool breaks = !trace.time_s.empty() && row[0] != segment;
     segment = row[0];
-    trace.time_s.push_back(number(row[2]));
+    trace.time_s.push_back(cell_number(row[2]));
     trace.measured.push_back(measured);
     trace.before.push_back(breaks ? nan_value : before);
     trace.after.push_back(breaks ? nan_value : after);
@@ -235,7 +226,8 @@ std::string difference(const std::string& from, const std::string& to) {
 
 void add_model(HtmlPage& page, const std::filesystem::path& folder) {
   page.section("Changes to the plant file");
-  const std::string given = file_text(folder / "given.yaml"), model = file_text(folder / "model.yaml");
+  const std::string given = file_text_if_there(folder / "given.yaml"),
+                    model = file_text_if_there(folder / "model.yaml");
   if (!given.empty()) page.preformatted(difference(given, model));
   page.folded("model.yaml, complete", model);
 }
@@ -243,7 +235,7 @@ void add_model(HtmlPage& page, const std::filesystem::path& folder) {
 void add_residuals(HtmlPage& page, const std::filesystem::path& file) {
   std::vector<std::vector<double>> columns(10);
   for (const auto& row : read_rows(file, columns.size()))
-    for (std::size_t i = 0; i < columns.size(); ++i) columns[i].push_back(number(row[i]));
+    for (std::size_t i = 0; i < columns.size(); ++i) columns[i].push_back(cell_number(row[i]));
   if (columns[0].empty()) return;
   const auto against = [&](std::size_t column, const std::string& label, std::size_t value,
                            const std::string& name) {
@@ -345,7 +337,7 @@ std::filesystem::path write_diagnosis_report(const std::filesystem::path& folder
   const std::filesystem::path file = folder / "report.html";
   try {
     const std::filesystem::path diagnosis = folder / "diagnosis.json";
-    const json d = json::parse(file_text(diagnosis));
+    const json d = json::parse(file_text_if_there(diagnosis));
     HtmlPage page("Diagnosis", folder.string());
     add_answer(page, d, diagnosis);
     add_gap(page, d);

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "base/angle_units.hpp"
 #include "base/parallel.hpp"
 #include "comparison/paired_comparison.hpp"
 #include "design/delay_margin.hpp"
@@ -15,6 +16,7 @@
 #include "html.hpp"
 #include "paired_report.hpp"
 #include "plot.hpp"
+#include "result_text.hpp"
 #include "run_data.hpp"
 #include "run_report.hpp"
 #include "sweep/sweep.hpp"
@@ -27,9 +29,6 @@
 namespace upright {
 
 namespace {
-
-constexpr double per_degree = 180.0 / std::numbers::pi;
-const char* const outcomes[] = {"stable", "oscillating", "fell"};
 
 /// The pieces and trials of an experiment folder.
 struct Record {
@@ -47,10 +46,6 @@ Record read_record(const std::filesystem::path& folder) {
   for (const YamlMap& piece : document.maps("pieces")) record.pieces.push_back(read_piece(piece));
   record.trials = read_trials(folder, record.pieces);
   return record;
-}
-
-std::string milliseconds(double seconds) {
-  return std::isfinite(seconds) ? number_text(1e3 * seconds, 4) : "-";
 }
 
 /// The rig's loop in simulation, for the delays of the experiment and some between them.
@@ -140,19 +135,19 @@ void add_sweep(HtmlPage& page, const std::filesystem::path& folder, const std::s
   double simulated_oscillates = std::nan(""), simulated_falls = std::nan("");
   for (const SweepRun& r : simulated) {
     line.x.push_back(1e3 * r.start.delay_s);
-    line.y.push_back(std::max(r.theta_amplitude_rad * per_degree, least_degree));
+    line.y.push_back(std::max(r.theta_amplitude_rad * degrees_per_radian, least_degree));
     const Outcome outcome = r.outcome(sweep.stable_below_rad);
     if (outcome != Outcome::stable && std::isnan(simulated_oscillates))
       simulated_oscillates = r.start.delay_s;
     if (outcome == Outcome::fell && std::isnan(simulated_falls)) simulated_falls = r.start.delay_s;
   }
   plot.series.push_back(line);
-  for (const char* outcome : outcomes) {
+  for (const std::string& outcome : outcome_names) {
     Series points{std::string("rig, ") + outcome, {}, {}, Series::Style::points, color::of_outcome(outcome)};
     for (const TrialResult& r : trials)
       if (r.outcome == outcome) {
         points.x.push_back(1e3 * r.trial.delay_s);
-        points.y.push_back(std::max(r.theta_amplitude_rad * per_degree, least_degree));
+        points.y.push_back(std::max(r.theta_amplitude_rad * degrees_per_radian, least_degree));
       }
     if (!points.x.empty()) plot.series.push_back(points);
   }
@@ -178,7 +173,7 @@ void add_sweep(HtmlPage& page, const std::filesystem::path& folder, const std::s
                {"simulated", milliseconds(simulated_oscillates), milliseconds(simulated_falls)},
                {"linear, near rest", "-", milliseconds(margin.critical_delay_s)},
                {"linear, while the cart slides", "-", milliseconds(sliding_margin.critical_delay_s)}},
-              "An amplitude below " + number_text(sweep.stable_below_rad * per_degree, 3) +
+              "An amplitude below " + number_text(sweep.stable_below_rad * degrees_per_radian, 3) +
                   " degree counts as stable."});
 }
 
@@ -208,7 +203,7 @@ std::vector<Plot> small_plots(const RunData& run, const Piece& piece, const Tria
   for (const LogRecord& row : run.drawn) {
     const double time_s = 1e-9 * static_cast<double>(row.time_ns);
     for (Series* series : {&theta, &cart, &voltage}) series->x.push_back(time_s);
-    theta.y.push_back(per_degree * row.theta_rad);
+    theta.y.push_back(degrees_per_radian * row.theta_rad);
     cart.y.push_back(1e3 * row.cart_m);
     voltage.y.push_back(row.voltage_v);
   }
@@ -292,10 +287,11 @@ std::filesystem::path write_experiment_report(const std::filesystem::path& folde
                   {},
                   "Each name links to the report of the run."};
   for (const TrialResult& r : record.trials)
-    table.rows.push_back(
-        {r.run_directory, milliseconds(r.trial.delay_s), r.outcome, number_text(r.theta0_rad * per_degree, 3),
-         number_text(r.theta_amplitude_rad * per_degree, 3), number_text(1e3 * r.cart_amplitude_m, 3),
-         std::isfinite(r.frequency_hz) ? number_text(r.frequency_hz, 3) : "-"});
+    table.rows.push_back({r.run_directory, milliseconds(r.trial.delay_s), r.outcome,
+                          number_text(r.theta0_rad * degrees_per_radian, 3),
+                          number_text(r.theta_amplitude_rad * degrees_per_radian, 3),
+                          number_text(1e3 * r.cart_amplitude_m, 3),
+                          std::isfinite(r.frequency_hz) ? number_text(r.frequency_hz, 3) : "-"});
   table.links = record.links;
   page.table(table);
   for (const std::string& problem : record.problems) page.note(Tone::warning, problem + ".");

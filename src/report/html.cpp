@@ -16,7 +16,7 @@ namespace {
 constexpr int narrow_px = 380, tallest_narrow_px = 340;
 constexpr int widest_beside_px = 480;  // a drawing that is legible in a narrow window as it is
 
-constexpr std::string_view style = R"(
+constexpr std::string_view style_sheet = R"(
 *{box-sizing:border-box}
 body{font:16px/1.5 system-ui,sans-serif;color:var(--ink);background:#fff;max-width:60rem;margin:2rem auto;padding:0 1rem;overflow-wrap:break-word}
 h1{font-size:1.6rem;line-height:1.25;margin:0}h2{font-size:1.15rem;margin:2.2rem 0 .6rem;border-bottom:1px solid var(--line);padding-bottom:.2rem}
@@ -318,7 +318,7 @@ std::string HtmlPage::text() const {
          "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; style-src "
          "'unsafe-inline'\">\n"
          "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<title>" +
-         html_escaped(title_) + "</title>\n<style>" + color::css_variables() + std::string(style) +
+         html_escaped(title_) + "</title>\n<style>" + color::css_variables() + std::string(style_sheet) +
          "</style></head>\n<body>\n<h1>" + html_escaped(title_) + "</h1>\n<p class=\"sub\">" +
          html_escaped(subtitle_) + "</p>\n" + body_ + "</body></html>\n";
 }

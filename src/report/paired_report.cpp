@@ -16,16 +16,16 @@ const char* const paired_interval_words =
 
 namespace {
 
-std::string in_units(double value, const Quantity& quantity) {
+std::string scaled_text(double value, const Quantity& quantity) {
   return number_text(value * quantity.per_si_unit, 3);
 }
 
 std::string difference_words(const PairedDifference& d) {
   const Quantity& quantity = quantities[d.quantity];
-  std::string text = in_units(d.difference.value, quantity);
+  std::string text = scaled_text(d.difference.value, quantity);
   if (d.difference.ci95)
-    text += " (" + in_units((*d.difference.ci95)[0], quantity) + " to " +
-            in_units((*d.difference.ci95)[1], quantity) + ")";
+    text += " (" + scaled_text((*d.difference.ci95)[0], quantity) + " to " +
+            scaled_text((*d.difference.ci95)[1], quantity) + ")";
   return text;
 }
 
@@ -43,8 +43,9 @@ HtmlTable runs_table(const PieceComparison& piece) {
     std::vector<std::string> row = {run.behaviour.name, run.controller, std::to_string(run.round + 1),
                                     ending.empty() ? "stayed up" : ending};
     for (std::size_t k = 0; k < quantities.size(); ++k)
-      row.push_back(
-          run.behaviour.behaviour ? in_units(run.behaviour.behaviour->values[k].value, quantities[k]) : "-");
+      row.push_back(run.behaviour.behaviour
+                        ? scaled_text(run.behaviour.behaviour->values[k].value, quantities[k])
+                        : "-");
     table.rows.push_back(row);
   }
   return table;
@@ -65,8 +66,8 @@ std::vector<std::string> paired_sentences(const PieceComparison& piece) {
     if (other.rounds == 0) others.push_back(who + "no round in which both stayed up");
     for (const PairedDifference& d : other.differences) {
       const Quantity& quantity = quantities[d.quantity];
-      const std::string words = who + std::string(quantity.name) + " " + in_units(d.from, quantity) + " -> " +
-                                in_units(d.to, quantity) + " " + std::string(quantity.unit) +
+      const std::string words = who + std::string(quantity.name) + " " + scaled_text(d.from, quantity) +
+                                " -> " + scaled_text(d.to, quantity) + " " + std::string(quantity.unit) +
                                 ", difference " + difference_words(d);
       if (d.is_clear())
         clear.push_back(words);
@@ -87,8 +88,8 @@ void add_paired_tables(HtmlPage& page, const PieceComparison& piece) {
     for (const PairedDifference& d : other.differences) {
       const Quantity& quantity = quantities[d.quantity];
       table.rows.push_back({std::string(quantity.name) + " [" + std::string(quantity.unit) + "]",
-                            other.controller, std::to_string(other.rounds), in_units(d.from, quantity),
-                            in_units(d.to, quantity), difference_words(d), d.is_clear() ? "yes" : "no"});
+                            other.controller, std::to_string(other.rounds), scaled_text(d.from, quantity),
+                            scaled_text(d.to, quantity), difference_words(d), d.is_clear() ? "yes" : "no"});
     }
   if (!table.rows.empty()) page.table(table);
   page.table(runs_table(piece));

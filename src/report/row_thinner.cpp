@@ -8,9 +8,9 @@ namespace upright {
 
 namespace {
 
-using Quantity = double (*)(const LogRecord&);
+using DrawnValue = double (*)(const LogRecord&);
 
-constexpr std::array<Quantity, 8> drawn = {
+constexpr std::array<DrawnValue, 8> drawn = {
     [](const LogRecord& r) { return r.cart_m; },
     [](const LogRecord& r) { return r.theta_rad; },
     [](const LogRecord& r) { return r.voltage_requested_v; },
@@ -36,7 +36,7 @@ void RowThinner::add(const LogRecord& row) {
 /// The indices in kept_, from `begin` to before `end`, of the rows of a block that are kept.
 std::vector<std::size_t> RowThinner::chosen(std::size_t begin, std::size_t end) const {
   std::vector<std::size_t> places{begin, end - 1};
-  for (const Quantity quantity : drawn) {
+  for (const DrawnValue quantity : drawn) {
     std::size_t low = end, high = end, gap = end;
     for (std::size_t i = begin; i < end; ++i) {
       const double value = quantity(kept_[i].row);

@@ -5,6 +5,7 @@
 #include <utility>
 #include <vector>
 
+#include "base/angle_units.hpp"
 #include "html.hpp"
 #include "run_data.hpp"
 #include "statistics.hpp"
@@ -13,7 +14,6 @@ namespace upright {
 
 namespace {
 
-constexpr double degrees_per_radian = 180.0 / std::numbers::pi;
 constexpr double mm_per_m = 1000.0, us_per_ns = 1e-3, s_per_ns = 1e-9;
 
 std::vector<double> times_of(const std::vector<LogRecord>& rows) {

@@ -10,17 +10,16 @@
 #include <sstream>
 #include <vector>
 
+#include "base/angle_units.hpp"
 #include "base/input_file.hpp"
 #include "html.hpp"
 #include "plot.hpp"
+#include "result_text.hpp"
 #include "upright/base/error.hpp"
 
 namespace upright {
 
 namespace {
-
-constexpr double per_degree = 180.0 / std::numbers::pi;
-const std::array<std::string, 3> outcomes = {"stable", "oscillating", "fell"};
 
 using Row = std::vector<std::string>;
 
@@ -44,20 +43,6 @@ std::vector<Row> read_rows(const std::filesystem::path& file, const std::string&
   return rows;
 }
 
-double number(const std::string& cell) {
-  return std::strtod(cell.c_str(), nullptr);
-}
-
-std::string milliseconds(double value_s) {
-  return std::isnan(value_s) ? "-" : number_text(1e3 * value_s, 4);
-}
-
-std::string file_text(const std::filesystem::path& file) {
-  std::ostringstream text;
-  text << InputFile(file).rdbuf();
-  return text.str();
-}
-
 struct Map {
   std::vector<double> delays_s, angles_deg;
   std::map<std::pair<double, double>, int> outcome;  // by angle, delay
@@ -70,10 +55,10 @@ Map read_map(const std::filesystem::path& folder) {
   for (const Row& row :
        read_rows(folder / "sweep.csv",
                  "theta0_rad,delay_s,outcome,theta_amplitude_rad,cart_amplitude_m,fall_time_s", 6)) {
-    const double angle = number(row[0]) * per_degree, delay = number(row[1]);
+    const double angle = cell_number(row[0]) * degrees_per_radian, delay = cell_number(row[1]);
     std::size_t k = 0;
-    while (k < outcomes.size() && outcomes[k] != row[2]) ++k;
-    if (k == outcomes.size())
+    while (k < outcome_names.size() && outcome_names[k] != row[2]) ++k;
+    if (k == outcome_names.size())
       throw ConfigError((folder / "sweep.csv").string() + " has the unknown outcome " + row[2] +
                         ": repeat the sweep");
     ++map.counts[k];
@@ -105,20 +90,20 @@ Plot map_plot(const Map& map, const std::vector<Row>& transitions, const std::ve
       const auto it = map.outcome.find({angle, delay});
       heat.values.push_back(it == map.outcome.end() ? std::numeric_limits<double>::quiet_NaN() : it->second);
     }
-  heat.classes.assign(outcomes.begin(), outcomes.end());
+  heat.classes.assign(outcome_names.begin(), outcome_names.end());
   plot.heat_map = heat;
   for (const auto& [name, column] : {std::pair{"oscillates from (0.1 ms)", 1}, {"falls from (0.1 ms)", 2}}) {
     Series line;
     line.name = name;
     line.dashed = column == 1;
     for (const Row& row : transitions) {
-      line.x.push_back(number(row[static_cast<std::size_t>(column)]));
-      line.y.push_back(number(row[0]) * per_degree);
+      line.x.push_back(cell_number(row[static_cast<std::size_t>(column)]));
+      line.y.push_back(cell_number(row[0]) * degrees_per_radian);
     }
     plot.series.push_back(line);
   }
   for (const Row& row : margins) {
-    const double delay = number(row[1]);
+    const double delay = cell_number(row[1]);
     if (!(delay > 0.0) || std::isinf(delay)) continue;
     plot.vertical_marks.push_back({delay, "linear, " + row[0]});
     // The axis includes the line, so that its distance from the falls is visible.
@@ -129,14 +114,14 @@ Plot map_plot(const Map& map, const std::vector<Row>& transitions, const std::ve
 
 /// The result of the linear analysis in a sentence.
 std::string margin_sentence(const Row& row) {
-  const double delay = number(row[1]);
+  const double delay = cell_number(row[1]);
   const std::string which = row[0] == "near rest"
                                 ? "Linearised near rest with smoothed dry friction, the loop "
                                 : "Linearised while the cart slides (without dry friction), the loop ";
   if (delay <= 0.0) return which + "is unstable without delay.";
   if (std::isinf(delay)) return which + "is stable for any delay.";
   return which + "loses stability at " + milliseconds(delay) + " ms and oscillates at " +
-         number_text(number(row[2]), 4) + " rad/s.";
+         number_text(cell_number(row[2]), 4) + " rad/s.";
 }
 
 }  // namespace
@@ -165,7 +150,7 @@ std::filesystem::path write_sweep_report(const std::filesystem::path& folder) {
   HtmlPage page("Delay sweep", folder.string());
   double first_fall = std::numeric_limits<double>::infinity();
   for (const Row& row : transitions)
-    if (number(row[2]) < first_fall) first_fall = number(row[2]);
+    if (cell_number(row[2]) < first_fall) first_fall = cell_number(row[2]);
   const std::string counts = std::to_string(map.counts[0]) + " runs are stable, " +
                              std::to_string(map.counts[1]) + " oscillate, " + std::to_string(map.counts[2]) +
                              " fall.";
@@ -183,8 +168,8 @@ std::filesystem::path write_sweep_report(const std::filesystem::path& folder) {
   HtmlTable table;
   table.header = {"initial angle [degree]", "oscillates from [ms]", "falls from [ms]"};
   for (const Row& row : transitions)
-    table.rows.push_back({number_text(number(row[0]) * per_degree, 4), milliseconds(number(row[1])),
-                          milliseconds(number(row[2]))});
+    table.rows.push_back({number_text(cell_number(row[0]) * degrees_per_radian, 4),
+                          milliseconds(cell_number(row[1])), milliseconds(cell_number(row[2]))});
   table.caption = "Found by bisection to 0.1 ms. A dash means: not within the delays of the sweep.";
   page.table(table);
   page.folded("sweep.yaml: the sweep with its plant and gains", file_text(folder / "sweep.yaml"));

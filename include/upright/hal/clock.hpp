@@ -9,6 +9,13 @@ namespace upright {
 
 inline constexpr std::int64_t nanoseconds_per_second = 1'000'000'000;
 
+/// Time of CLOCK_MONOTONIC.
+inline std::int64_t monotonic_ns() noexcept {
+  timespec now{};
+  clock_gettime(CLOCK_MONOTONIC, &now);
+  return now.tv_sec * nanoseconds_per_second + now.tv_nsec;
+}
+
 class Clock {
  public:
   virtual ~Clock() = default;
@@ -22,11 +29,7 @@ class Clock {
 /// CLOCK_MONOTONIC, absolute sleeps.
 class MonotonicClock final : public Clock {
  public:
-  std::int64_t now_ns() noexcept override {
-    timespec now{};
-    clock_gettime(CLOCK_MONOTONIC, &now);
-    return now.tv_sec * nanoseconds_per_second + now.tv_nsec;
-  }
+  std::int64_t now_ns() noexcept override { return monotonic_ns(); }
   void sleep_until(std::int64_t time_ns) noexcept override {
     timespec until{};
     until.tv_sec = time_ns / nanoseconds_per_second;
