@@ -48,6 +48,11 @@ function(upright_compile_together name)
   endif()
 endfunction()
 
+# upright_optimise(NAME LEVEL): another level of optimisation than -O2 in a release build.
+function(upright_optimise name level)
+  target_compile_options(${name} PRIVATE $<$<CONFIG:Release>:-O${level}>)
+endfunction()
+
 # upright_library(NAME SOURCES... OFFERS HEADERS... LINK PUBLIC-TARGETS... PRIVATE PRIVATE-TARGETS...): the library of a
 # folder. Other folders may include its headers in include/upright and those it OFFERS (scripts/check_includes.py).
 function(upright_library name)
@@ -72,6 +77,7 @@ endfunction()
 function(upright_own_object name)
   cmake_parse_arguments(arg "" "INTO;ARCH" "SOURCES;OPTIONS;LINK;UNSANITIZED" ${ARGN})
   add_library(${name} OBJECT ${arg_SOURCES})
+  upright_optimise(${name} 3)
   target_include_directories(${name} PRIVATE ${PROJECT_SOURCE_DIR}/include ${PROJECT_SOURCE_DIR}/src ${PROJECT_SOURCE_DIR})
   # A target of its own, and the last one: then these options win over those before.
   add_library(${name}_options INTERFACE)
@@ -87,9 +93,10 @@ function(upright_own_object name)
     set_source_files_properties(${arg_UNSANITIZED} PROPERTIES COMPILE_OPTIONS -fno-sanitize=all)
   endif()
   target_link_libraries(${name} PRIVATE ${arg_LINK} upright_options ${name}_options)
+  upright_compile_together(${name})
   set(script ${PROJECT_SOURCE_DIR}/cmake/keep_inside.sh)
   set(object ${CMAKE_CURRENT_BINARY_DIR}/${name}.o)
-  set(objects $<FILTER:$<TARGET_OBJECTS:${name}>,EXCLUDE,[.]gch$>)  # CMake counts a precompiled header too
+  set(objects $<TARGET_OBJECTS:${name}>)
   add_custom_command(OUTPUT ${object}
     COMMAND ${script} ${CMAKE_LINKER} ${CMAKE_NM} ${CMAKE_OBJCOPY} ${object} ${objects}
     DEPENDS ${script} ${name} ${objects} COMMAND_EXPAND_LISTS VERBATIM)
