@@ -4,6 +4,7 @@
   scripts/check_docs.py [--root FOLDER]
 
 - A link to a file of the repository must lead to a file, and its anchor to a heading of that page.
+- After `<!-- quoted from PAGE -->` every line of the next listing must be in that page, whose listings tests compare.
 - `name.cpp` in code style must be a source of that name, and `src/folder/name.hpp` a file at that path.
 The exit code is 1, with a line for each finding. Links to the web are not followed.
 """
@@ -15,6 +16,7 @@ import sys
 
 LINK = re.compile(r"!?\[[^\]]*\]\(([^)\s]+)\)")
 SOURCE = re.compile(r"`([\w./-]+\.(?:cpp|hpp|py|sh))`")
+QUOTED = re.compile(r"^<!-- quoted from (\S+) -->\n+```\w*\n(.*?)^```", re.MULTILINE | re.DOTALL)
 FENCE = re.compile(r"^```.*?^```", re.MULTILINE | re.DOTALL)
 
 
@@ -48,6 +50,12 @@ def findings_of(page, root, files):
             yield f"{where(match)}: links to {target}, which does not exist: correct the link"
         elif anchor and file.suffix == ".md" and anchor not in anchors_of(file.read_text()):
             yield f"{where(match)}: links to {target}, but that page has no such heading: correct the anchor"
+    for match in QUOTED.finditer(text):
+        source = page.parent / match.group(1)
+        lines = source.read_text().splitlines() if source.exists() else []
+        for number, line in enumerate(match.group(2).splitlines(), text[: match.start(2)].count("\n") + 1):
+            if line not in lines:
+                yield f"{page.relative_to(root)}:{number}: is not a line of {match.group(1)}: copy the listing again"
     names = {pathlib.PurePosixPath(file).name for file in files}
     for match in SOURCE.finditer(prose):
         name = match.group(1)

@@ -12,6 +12,8 @@ import math
 import pathlib
 import sys
 
+from fixed_phrases import in_plain_words
+
 EMPS_PLANT = """plant:
   cart_mass_kg: 95.1089
   gravity_mps2: 9.81
@@ -169,7 +171,7 @@ def table(out):
     print("|---|---|---|---|")
     for name, said, found, _, _ in rows:
         named = "; ".join(in_words(effect) for effect in found["effects"]) or "nothing"
-        print(f"| {name} | {named} | {found['residual']} | {said} |")
+        print(f"| {name} | {named} | {in_plain_words(found['residual'])} | {said} |")
 
 
 def main():

@@ -11,6 +11,7 @@
 
 #include "commands.hpp"
 #include "diagnosis/diagnosis_json.hpp"
+#include "diagnosis/plain_words.hpp"
 #include "diagnosis/simulated_segments.hpp"
 #include "experiment_data.hpp"
 #include "measurement/data_check.hpp"
@@ -126,7 +127,7 @@ void print(const Diagnosis& d, const std::string& out) {
       std::printf(" gap %s -> %s", gap_text(effect.gap_before).c_str(), gap_text(effect.gap_after).c_str());
     std::printf("\n");
     for (const ParameterEstimate& p : effect.parameters) std::printf("      %s\n", in_words(p).c_str());
-    if (!effect.where.empty()) std::printf("      %s\n", effect.where.c_str());
+    if (!effect.where.empty()) std::printf("      %s\n", in_plain_words(effect.where).c_str());
     if (!effect.indistinguishable_from.empty()) {
       std::string names;
       for (const std::size_t other : effect.indistinguishable_from)
@@ -136,11 +137,11 @@ void print(const Diagnosis& d, const std::string& out) {
     print_next_best(next_best(d, effect));
   }
   print_steps(d);
-  std::printf("Residual: %s.\n", d.residual.c_str());
+  std::printf("Residual tests: %s.\n", in_plain_words(d.residual).c_str());
   if (d.next_experiment)
     std::printf("Next experiment, to distinguish them: upright experiment %s --rig RIG\n  %s\n",
                 d.next_experiment->file.c_str(), d.next_experiment->description.c_str());
-  for (const std::string& note : d.notes) std::printf("Note: %s.\n", note.c_str());
+  for (const std::string& note : d.notes) std::printf("Note: %s.\n", in_plain_words(note).c_str());
   if (!out.empty()) std::printf("Written: %s\n", out.c_str());
 }
 

@@ -91,7 +91,8 @@ void examine_signs(const DoctorArguments& arguments, const ExaminedRig& at, Page
     append(page.findings, examine_signs_by_hand(at.rig, at.clock, calibration_in_use(at.file),
                                                 arguments.hand_s, at.signal, ask_operator));
   else
-    page.findings.push_back({"encoder signs", Health::not_examined, "nobody moved cart and pendulum",
+    page.findings.push_back({"encoder signs", Health::not_examined,
+                             "cart and pendulum were not moved by hand",
                              "switch the amplifier off and run it with --by-hand"});
 }
 
@@ -115,7 +116,7 @@ void examine_simulated(const DoctorArguments& arguments, const RigFile& file, Pa
   try {
     rig->open();
   } catch (const DeviceError& error) {
-    page.findings.push_back({"digital lines", Health::bad, "they cannot be had", error.what()});
+    page.findings.push_back({"digital lines", Health::bad, "they are not available", error.what()});
     return;
   }
   std::fprintf(stderr, "upright: reading the digital lines for %.0f s, at zero volts\n", arguments.seconds);

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "commands.hpp"
+#include "diagnosis/plain_words.hpp"
 #include "experiment_data.hpp"
 #include "identification/identification.hpp"
 #include "measurement/data_check.hpp"
@@ -123,7 +124,7 @@ void print_verdict(const Identification& id, const IdentifyFlags& flags) {
       break;
     case Verdict::not_excited:
       std::printf("NOT EXCITED: the data do not determine the values (%s). Do not use the values below.\n",
-                  id.residual.c_str());
+                  in_plain_words(id.residual).c_str());
       break;
     default:
       std::printf(
@@ -137,7 +138,7 @@ void print_verdict(const Identification& id, const IdentifyFlags& flags) {
     std::printf(
         "Gap (open-loop error on held-out data / noise floor): %.2f with the plant file, %.2f identified.\n",
         id.gap_before, id.gap_after);
-  if (id.verdict != Verdict::not_excited) std::printf("Residual: %s.\n", id.residual.c_str());
+  if (id.verdict != Verdict::not_excited) std::printf("Residual tests: %s.\n", in_plain_words(id.residual).c_str());
 }
 
 void print(const Identification& id, const IdentifyFlags& flags) {
@@ -154,7 +155,7 @@ void print(const Identification& id, const IdentifyFlags& flags) {
         100.0 * id.balance->relative_error);
   std::printf("Measured directly: %zu breakaways, %zu steady speeds. RMS innovation: %.2f times the noise.\n",
               id.breakaways.size(), id.steady_points.size(), id.rms);
-  for (const std::string& note : id.notes) std::printf("Note: %s.\n", note.c_str());
+  for (const std::string& note : id.notes) std::printf("Note: %s.\n", in_plain_words(note).c_str());
 }
 
 void write_results(const Identification& id, const std::vector<Measurement>& runs,

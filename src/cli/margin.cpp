@@ -1,4 +1,4 @@
-// `upright margin`: how much delay a plant with its gains bears.
+// `upright margin`: how much delay a plant with its gains tolerates.
 #include <cmath>
 #include <cstdio>
 #include <iostream>
@@ -78,16 +78,16 @@ std::string milliseconds(double seconds) {
   return text;
 }
 
-/// What the loop bears on the rig, and how much of it is left.
+/// The delay that the loop tolerates on the rig, and how much of it remains.
 std::string verdict_for(const Margins& margins, const ControlConfig& config) {
   if (!margins.limit.warning.empty()) return margins.limit.warning;
   const OverrunTolerance& tolerance = *margins.limit.tolerance;
   const std::string how =
       std::string(" (sampled, while the cart slides") + (predicts(config) ? ", with its predictor)" : ")");
-  if (!std::isfinite(tolerance.critical_delay_s)) return "on the rig the loop bears any delay" + how;
-  return "on the rig the loop bears " + milliseconds(tolerance.critical_delay_s) + " of delay" + how +
+  if (!std::isfinite(tolerance.critical_delay_s)) return "on the rig the loop tolerates any delay" + how;
+  return "on the rig the loop tolerates " + milliseconds(tolerance.critical_delay_s) + " of delay" + how +
          "; it is configured with " + milliseconds(config.delay_s) + ", so that " +
-         milliseconds(tolerance.extra_delay_s) + " are left, " + std::to_string(tolerance.missed_periods) +
+         milliseconds(tolerance.extra_delay_s) + " remain, " + std::to_string(tolerance.missed_periods) +
          (tolerance.missed_periods == 1 ? " missed period" : " missed periods") + " in a row";
 }
 

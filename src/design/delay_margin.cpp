@@ -257,11 +257,11 @@ std::string sentence_for(const OverrunTolerance& tolerance, const ControlConfig&
     std::snprintf(text, sizeof text, "the gains do not stabilize the plant, even without delay");
   else if (tolerance.exceeded() && tolerance.critical_delay_s <= 0.0)
     std::snprintf(text, sizeof text,
-                  "none is left: the delay is %.4g ms, more than the gains bear while the cart slides",
+                  "none remains: the delay is %.4g ms, more than the gains tolerate while the cart slides",
                   delay_ms);
   else if (tolerance.exceeded())
     std::snprintf(text, sizeof text,
-                  "none is left: the delay is %.4g ms, and the gains bear %.3g ms while the cart slides",
+                  "none remains: the delay is %.4g ms, and the gains tolerate %.3g ms while the cart slides",
                   delay_ms, 1e3 * tolerance.critical_delay_s);
   else if (!std::isfinite(tolerance.extra_delay_s))
     std::snprintf(text, sizeof text,

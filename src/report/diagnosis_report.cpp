@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "base/input_file.hpp"
+#include "diagnosis/plain_words.hpp"
 #include "html.hpp"
 #include "plot.hpp"
 #include "result_text.hpp"
@@ -52,7 +53,8 @@ void add_answer(HtmlPage& page, const json& d, const std::filesystem::path& file
   page.answer(tone, headline,
               "Gap on held-out data: " + number_text(number(d.at("gap").at("before"))) + " before, " +
                   number_text(number(d.at("gap").at("after"))) +
-                  " after (1 is the noise floor). Residual: " + d.at("residual").get<std::string>() + ".");
+                  " after (1 is the noise floor). Residual tests: " +
+                  in_plain_words(d.at("residual").get<std::string>()) + ".");
 }
 
 void add_gap(HtmlPage& page, const json& d) {
@@ -82,7 +84,8 @@ void add_effects(HtmlPage& page, const json& d) {
   page.table(table);
   for (const json& effect : d.at("effects")) {
     const std::string kind = effect.at("kind"), where = effect.at("where");
-    if (!where.empty()) page.paragraph("Residual before " + kind + " was added: " + where + ".");
+    if (!where.empty())
+      page.paragraph("Residual before " + kind + " was added: " + in_plain_words(where) + ".");
     if (!effect.at("confusable_with").empty())
       page.note(Tone::warning, "These data do not distinguish " + kind + " from " +
                                    joined(effect.at("confusable_with")) + ".");
@@ -347,7 +350,8 @@ std::filesystem::path write_diagnosis_report(const std::filesystem::path& folder
     add_candidates(page, d);
     add_trials(page, d.value("trials", json::array()));
     add_model(page, folder);
-    for (const json& note : d.at("notes")) page.note(Tone::neutral, note.get<std::string>() + ".");
+    for (const json& note : d.at("notes"))
+      page.note(Tone::neutral, in_plain_words(note.get<std::string>()) + ".");
     page.write(file);
   } catch (const json::exception& problem) {
     throw ConfigError((folder / "diagnosis.json").string() + " cannot be read (" + problem.what() +

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <fstream>
 
+#include "diagnosis/plain_words.hpp"
 #include "html.hpp"
 #include "plot.hpp"
 #include "upright/base/error.hpp"
@@ -129,12 +130,12 @@ void answer(HtmlPage& page, const Identification& id) {
                 "The model with these parameters accounts for the data." + gap);
   } else if (id.verdict == Verdict::not_excited) {
     page.answer(Tone::neutral, "Not excited: these parameters are not valid for the rig",
-                "Reason: " + id.residual + "." + gap);
+                "Reason: " + in_plain_words(id.residual) + "." + gap);
   } else {
     page.answer(
         Tone::bad, "Unexplained: these parameters are not valid for the rig",
         "An effect that identify does not fit acts on the rig, and the parameters compensate for it: " +
-            id.residual + "." + gap + " Run upright diagnose to find the missing effect.");
+            in_plain_words(id.residual) + "." + gap + " Run upright diagnose to find the missing effect.");
   }
 }
 
@@ -157,7 +158,7 @@ void write_identification_report(const Identification& id, const std::vector<Mea
     page.figure(*sine, "A loop shows friction that depends on the previous motion (bristles).");
     save(*sine, folder / "slow-sine.svg");
   }
-  for (const std::string& note : id.notes) page.paragraph(note + ".");
+  for (const std::string& note : id.notes) page.paragraph(in_plain_words(note) + ".");
   page.write(file);
 }
 

@@ -111,7 +111,7 @@ TEST(Margin, GivesThePapersCriticalDelays) {
 
 TEST(Margin, VerdictComesFirst) {
   const CommandResult plain = run_upright("margin " + plant("exponential") + " " + gains("exponential"));
-  EXPECT_EQ(plain.out.find("Verdict: on the rig the loop bears 14.2 ms"), 0u) << plain.out;
+  EXPECT_EQ(plain.out.find("Verdict: on the rig the loop tolerates 14.2 ms"), 0u) << plain.out;
   const Json document = json_from("margin " + plant("exponential") + " " + gains("exponential") + " --json");
   EXPECT_NEAR(document["verdict"]["bears_delay_s"].get<double>(), 0.01415, 5e-5);
   EXPECT_EQ(document["verdict"]["bears_delay_s"], document["sampled_sliding"]["critical_delay_s"]);
@@ -119,7 +119,7 @@ TEST(Margin, VerdictComesFirst) {
 
 TEST(Margin, OfAPredictorDoesNotContradictItsVerdict) {
   const CommandResult late = run_upright("margin " + plant("exponential") + " " + gains("compensated"));
-  EXPECT_EQ(late.out.find("Verdict: on the rig the loop bears 121 ms"), 0u) << late.out;
+  EXPECT_EQ(late.out.find("Verdict: on the rig the loop tolerates 121 ms"), 0u) << late.out;
   EXPECT_EQ(late.out.find("continuous loop\n"), std::string::npos) << "of what, it must say";
   EXPECT_NE(late.out.find("without the predictor"), std::string::npos) << late.out;
   EXPECT_NE(late.out.find("it shows stick-slip"), std::string::npos) << late.out;

@@ -14,7 +14,7 @@ def check(page):
         (root / "docs").mkdir()
         (root / "src").mkdir()
         (root / "src" / "loop.cpp").write_text("")
-        (root / "docs" / "delay.md").write_text("# Delay\n\n## How it is `measured`, twice\n")
+        (root / "docs" / "delay.md").write_text("# Delay\n\n## How it is `measured`, twice\n\n```text\n14.2 ms\n```\n")
         (root / "README.md").write_text(page)
         done = subprocess.run([sys.executable, SCRIPT, "--root", root], capture_output=True, text=True)
         return done.returncode, done.stderr
@@ -36,6 +36,13 @@ class CheckDocs(unittest.TestCase):
             self.assertEqual(code, 1, wrong)
             self.assertIn("README.md:3: ", said)
             self.assertIn(words, said)
+
+    def test_names_a_line_that_a_quotation_has_and_its_source_has_not(self):
+        quoted = "<!-- quoted from docs/delay.md -->\n\n```\n14.2 ms\n"
+        self.assertEqual(check(quoted + "```\n"), (0, ""))
+        code, said = check(quoted + "15 ms\n```\n")
+        self.assertEqual(code, 1)
+        self.assertIn("README.md:5: is not a line of docs/delay.md", said)
 
 
 if __name__ == "__main__":

@@ -9,11 +9,12 @@ SCRIPT = pathlib.Path(__file__).resolve().parents[2] / "scripts" / "check_prose.
 LONG = " ".join(["word"] * 41)
 
 
-def check(text, name="README.md"):
+def check(text, name="README.md", others={}):
     with tempfile.TemporaryDirectory() as folder:
-        file = pathlib.Path(folder) / name
-        file.parent.mkdir(parents=True, exist_ok=True)
-        file.write_text(text)
+        for file, content in {name: text, **others}.items():
+            path = pathlib.Path(folder) / file
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text(content)
         done = subprocess.run([sys.executable, SCRIPT, "--root", folder], capture_output=True, text=True)
         return done.returncode, done.stderr
 
@@ -53,7 +54,14 @@ class CheckProse(unittest.TestCase):
         self.assertEqual(check(source, "src/cli/a.cpp"), (0, ""))
 
     def test_accepts_what_outputs_for_programs_say(self):
-        self.assertEqual(check('f("on the rig the loop bears any delay");', "src/cli/a.cpp"), (0, ""))
+        self.assertEqual(check('f("while the cart slides it bears %.3g ms more of delay");', "src/cli/a.cpp"), (0, ""))
+        self.assertEqual(check('f("the loop bears any delay");', "src/cli/a.cpp")[0], 1)
+
+    def test_accepts_the_fixed_phrases_of_diagnoses(self):
+        table = {"src/diagnosis/plain_words.hpp": '    {"what is left",\n     "the residual"},\n'}
+        source = 'f("what is left depends on x");'
+        self.assertEqual(check(source, "src/a.cpp", table), (0, ""))
+        self.assertEqual(check(source, "src/a.cpp")[0], 1)
 
     def test_names_a_word_in_a_comment_of_a_configuration(self):
         code, said = check("plant: a  # what is left\nname: what is left\n", "config/rigs/a.yaml")

@@ -7,6 +7,8 @@
 #include <limits>
 #include <set>
 
+#include "diagnosis/plain_words.hpp"
+
 namespace upright {
 namespace {
 
@@ -122,6 +124,24 @@ TEST(ResidualTestTable, NothingIsTestedWithinTheSensorsNoise) {
   conclude_tests(left, policy);
   EXPECT_TRUE(left.beyond_sensors);
   EXPECT_TRUE(left.structured);
+}
+
+TEST(PlainWords, ReplaceTheFixedPhrasesOfEveryTest) {
+  ResidualTests left = disturbed();
+  left.depends_on = "speed of the cart";
+  left.certainty = 4.5;
+  for (const ResidualTest& test : residual_test_table()) {
+    const std::string read = in_plain_words(test.sentence(left));
+    for (const FixedPhrase& phrase : fixed_phrases)
+      EXPECT_EQ(read.find(phrase.fixed), std::string::npos) << test.id << ": " << read;
+  }
+  EXPECT_EQ(in_plain_words("what is left goes with speed of the cart (4.5 standard errors)"),
+            "the residual depends on speed of the cart (4.5 standard errors)");
+  EXPECT_EQ(
+      in_plain_words("a plain simulation is 3 times as far off as noise like what is left makes it at most"),
+      "the error of an open-loop simulation is 3 times the largest error expected from noise like the "
+      "residual");
+  EXPECT_EQ(in_plain_words("nothing to replace"), "nothing to replace");
 }
 
 }  // namespace
