@@ -7,19 +7,17 @@
   of tests/**/CMakeLists.txt that gives its page to check_commands.py, or by what tests/pages/stages.py names.
 - Inline code without arguments is the name of a command: a test has to run some command of this name.
 - A command that is indented, or that is in a block of another kind, is not run by anything and is an error.
-- What no test runs is listed with its reason in tests/pages/stages.py. It is at least parsed.
 Ends with 1 and a line for each command that no test runs.
 """
 import argparse
 import pathlib
 import re
-import subprocess
 import sys
 
 from page_commands import ROOT, commands_of_page, hidden_commands, pages
 
 sys.path.insert(0, str(ROOT / "tests" / "pages"))
-from stages import ELSEWHERE, NOT_RUN, STAGES  # noqa: E402
+from stages import ELSEWHERE, STAGES  # noqa: E402
 
 
 def tests_of_pages():
@@ -44,10 +42,6 @@ def elsewhere(command):
     return None, None
 
 
-def parses(command):
-    return subprocess.run(["bash", "-n", "-c", command], capture_output=True).returncode == 0
-
-
 class Listing:
     def __init__(self):
         self.tests = tests_of_pages()
@@ -64,11 +58,7 @@ class Listing:
             test, problem = elsewhere(command.text)
             if problem:
                 self.findings.append(f"{where}: {problem}")
-            if command.text in NOT_RUN:
-                if not parses(command.text):
-                    self.findings.append(f"{where}: bash cannot parse '{command.text}': correct it")
-                self.rows.append((where, command.text, f"not run: {NOT_RUN[command.text]}"))
-            elif test:
+            if test:
                 self.rows.append((where, command.text, test))
             elif command.is_name():
                 self.names.append((where, command.text))
@@ -94,9 +84,6 @@ class Listing:
     def judge_entries(self):
         """Entries of stages.py that nothing needs any more."""
         shown = {command for _, command, _ in self.rows}
-        for command in NOT_RUN:
-            if command not in shown:
-                self.findings.append(f"tests/pages/stages.py: no page shows '{command}': remove it from NOT_RUN")
         for entry in ELSEWHERE:
             if not any(re.fullmatch(entry[0], command) for command in shown):
                 self.findings.append(f"tests/pages/stages.py: no page shows '{entry[0]}': remove it from ELSEWHERE")

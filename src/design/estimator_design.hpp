@@ -1,5 +1,5 @@
 // A gain file with a Kalman filter, stationary or extended: gains for the sliding plant, since the estimated
-// force takes the friction away, and a filter that bears an actuator slower than its model.
+// force takes the friction away, and a filter that tolerates an actuator slower than its model.
 #pragma once
 
 #include <filesystem>
@@ -13,11 +13,11 @@
 namespace upright {
 
 /// What `--estimator` designs with where `--q` and `--r` do not say otherwise. Half the weight on the
-/// position and a third on the angle of the paper's: lower gains bear a slower actuator, and the estimated
-/// force, not the gain, keeps the cart in its place.
+/// position and a third on the angle of the paper's: lower gains tolerate a slower actuator, and the
+/// estimated force, not the gain, keeps the cart in its place.
 inline constexpr DesignWeights quiet_weights{{2500.0, 1000.0, 20.0, 20.0}, 1.0};
 
-/// What the loop must bear of an actuator slower than its model [s], sampled and sliding: about what a servo
+/// How much slower an actuator may be than its model [s], sampled and sliding: about what a servo
 /// amplifier and its link add.
 inline constexpr double slow_actuator_s = 0.005;
 

@@ -102,7 +102,7 @@ struct ExperimentOptions {
   RealtimeRequest realtime;
   RowWatcher* watcher = nullptr;  ///< of every trial's rows; null: nobody
   /// Puts what is known of a loop that balances, with the trial's delay, into its limits: how many late
-  /// periods it bears, and whether its delay is beyond that. Empty: default_periods_late.
+  /// periods it tolerates, and whether its delay is beyond that. Empty: default_periods_late.
   std::function<void(const ControlConfig&, LoopLimits&)> know_loop;
   StopWatcher stop;  ///< of the end of every trial
   /// Before each trial. May wait for somebody, and may throw.

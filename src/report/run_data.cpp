@@ -52,7 +52,7 @@ void tell_outcome(const RunRecord& record, RunData& data) {
   data.reason = sentence(plain(record.outcome, "sentence"));
   if (result == "completed") {
     data.tone = Tone::good;
-    data.headline = "Stayed up for " + seconds(time_s);
+    data.headline = "Stayed upright for " + seconds(time_s);
   } else {
     data.tone = Tone::bad;
     const bool at_zero = plain(record.outcome, "zero_volts") == "confirmed";

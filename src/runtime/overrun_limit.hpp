@@ -15,16 +15,16 @@ namespace upright {
 struct OverrunLimit {
   std::uint64_t most_periods_late = 0;        ///< for LoopLimits
   std::optional<OverrunTolerance> tolerance;  ///< none: there is no model of a pendulum to find it from
-  std::string sentence;                       ///< what the loop bears, and the limit that follows
-  std::string warning;  ///< one sentence where the loop will oscillate or fall; else empty
+  std::string sentence;  ///< the delay that the loop tolerates, and the limit that follows
+  std::string warning;   ///< one sentence where the loop will oscillate or fall; else empty
 };
 
-/// From what the gains bear at the delay of `control` on `model`, which is none where the rig is unknown.
-/// Throws ConfigError.
+/// From the delay that the gains tolerate at the delay of `control` on `model`, which is none where the rig
+/// is unknown. Throws ConfigError.
 OverrunLimit overrun_limit(const std::optional<Plant>& model, const ControlConfig& control);
 
-/// Puts what is known of a loop into its limits: how many late periods it bears, and that its delay is beyond
-/// what the plant bears, which the sentence of its end then names.
+/// Puts what is known of a loop into its limits: how many late periods it tolerates, and that its delay is
+/// beyond what the plant tolerates, which the sentence of its end then names.
 void apply(const OverrunLimit& overrun, LoopLimits& limits);
 
 /// Throws ConfigError for gains that cannot hold the model's pendulum, even without delay. A delay that is

@@ -8,9 +8,9 @@ namespace {
 
 TEST(Paper, WritesEveryTableAndFigureAndDoesNotOverwrite) {
   const TemporaryFolder folder;
-  const std::string line = "paper --config " + shell_quoted(UPRIGHT_SOURCE_DIR "/config") + " --out " +
-                           shell_quoted(folder.path().string());
-  const CommandResult result = run_upright(line);
+  const CommandResult result = run_shell("UPRIGHT=" + shell_quoted(UPRIGHT_BINARY) + " " +
+                                         shell_quoted(UPRIGHT_SOURCE_DIR "/scripts/reproduce-paper.sh") +
+                                         " " + shell_quoted(folder.path().string()));
   ASSERT_EQ(result.exit_code, 0) << result.err;
   const std::string text = read_text(folder.path() / "paper.md");
   for (const char* wanted :
@@ -26,7 +26,8 @@ TEST(Paper, WritesEveryTableAndFigureAndDoesNotOverwrite) {
     // Without the name space a browser takes the file for text.
     EXPECT_EQ(read_text(folder.path() / name).find("<svg xmlns=\"http://www.w3.org/2000/svg\""), 0u) << name;
   }
-  const CommandResult again = run_upright(line);
+  const CommandResult again = run_upright("paper --config " + shell_quoted(UPRIGHT_SOURCE_DIR "/config") +
+                                          " --out " + shell_quoted(folder.path().string()));
   EXPECT_EQ(again.exit_code, 2);
   EXPECT_NE(again.err.find("--overwrite"), std::string::npos) << again.err;
 }

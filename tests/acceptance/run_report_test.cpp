@@ -42,7 +42,7 @@ void expect_stands_alone(const std::string& html) {
 TEST(Report, OfAWholeRunAnswersFirstAndStandsAlone) {
   const TemporaryFolder folder;
   const std::string html = report_of(fast_run(folder, "--duration 10"));
-  const std::size_t answer = html.find("Stayed up for 10 s");
+  const std::size_t answer = html.find("Stayed upright for 10 s");
   ASSERT_NE(answer, std::string::npos);
   for (const char* part : {"pendulum angle", "cart position", "voltage", "Timing", "run.yaml", "sample rate"})
     EXPECT_GT(html.find(part, answer), answer) << part;

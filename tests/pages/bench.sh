@@ -1,6 +1,8 @@
 # What stands in for a rig while the commands of a page run. Sourced by scripts/check_commands.py before each block; `bench`
 # is a folder that lasts as long as the page.
 
+export USER=${USER:-$(id -un)}
+
 # serve COMMAND...: starts a server and waits until it listens.
 serve() {
   "$@" >"$bench/server.out" 2>"$bench/server.err" </dev/null &
@@ -90,4 +92,13 @@ quanser_card() {
   end_servers
   rm -f "$bench/card"
   serve "${fake_card:?names the program fake_hil_card}" --rig "$bench/quanser.yaml" --socket "$bench/card" "$@"
+}
+
+# free_decay FILE: 8 s of a pendulum that swings out, as published: columns t_s and theta_rad, 0 is hanging.
+free_decay() {
+  mkdir -p "$(dirname "$1")"
+  awk 'BEGIN {
+    print "t_s,theta_rad"
+    for (k = 0; k <= 1600; ++k) { t = k / 200; printf "%.3f,%.5f\n", t, 0.3 * exp(-0.05 * t) * cos(5.2 * t) }
+  }' >"$1"
 }

@@ -9,7 +9,6 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 SCRIPT = ROOT / "scripts" / "list_commands.py"
 sys.path[:0] = [str(ROOT / "scripts"), str(ROOT / "tests" / "pages")]
 import list_commands  # noqa: E402
-from stages import NOT_RUN  # noqa: E402
 
 
 def listed(text):
@@ -48,12 +47,6 @@ class ListCommands(unittest.TestCase):
         code, said, _ = listed("```sh\nscripts/test.sh ci       # all tests\n```\n")
         self.assertEqual(code, 0)
         self.assertIn("page.md:2\tscripts/test.sh ci\t.ci/run, step 'tests'", said)
-
-    def test_gives_the_reason_of_a_command_that_is_not_run(self):
-        command, reason = next(iter(NOT_RUN.items()))
-        code, said, _ = listed(f"```sh\n{command}  # once\n```\n")
-        self.assertEqual(code, 0)
-        self.assertIn(f"not run: {reason}", said)
 
     def test_knows_the_tests_of_the_pages(self):
         tests = list_commands.tests_of_pages()
