@@ -4,7 +4,7 @@
 #   scripts/real-data.sh DATA [OUT] [NAME...]    DATA contains the folders emps, aau, uw and canterbury, which are not
 #                                                part of this repository; OUT keeps the results (default: a new temporary
 #                                                folder); NAMEs (as in the table) select some of the diagnoses
-# Diagnoses that OUT already contains are not repeated.
+# Diagnoses that OUT already contains are not repeated. The exit code is 1 if one was refused.
 set -euo pipefail
 data=$(realpath "${1:?the first argument is missing: name the folder that contains emps, aau, uw and canterbury}")
 cd "$(dirname "$0")/.."
@@ -13,6 +13,7 @@ upright=$(scripts/program.sh)
 out=${2:-$(mktemp -d)}
 shift "$(($# > 1 ? 2 : 1))"
 
+refused=0
 python3 scripts/real_data.py prepare "$data" "$out"
 for folder in "$out"/*/; do
   name=$(basename "$folder")
@@ -26,7 +27,9 @@ for folder in "$out"/*/; do
     "$upright" report "$folder/diagnosis" >/dev/null
   else
     cat "$folder/problem.txt" >&2
+    refused=1
   fi
   echo "$(($(date +%s) - start))" >"$folder/seconds.txt"
 done
 python3 scripts/real_data.py table "$out"
+exit "$refused"

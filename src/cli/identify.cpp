@@ -138,7 +138,8 @@ void print_verdict(const Identification& id, const IdentifyFlags& flags) {
     std::printf(
         "Gap (open-loop error on held-out data / noise floor): %.2f with the plant file, %.2f identified.\n",
         id.gap_before, id.gap_after);
-  if (id.verdict != Verdict::not_excited) std::printf("Residual tests: %s.\n", in_plain_words(id.residual).c_str());
+  if (id.verdict != Verdict::not_excited)
+    std::printf("Residual tests: %s.\n", in_plain_words(id.residual).c_str());
 }
 
 void print(const Identification& id, const IdentifyFlags& flags) {

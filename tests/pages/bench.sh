@@ -94,11 +94,11 @@ quanser_card() {
   serve "${fake_card:?names the program fake_hil_card}" --rig "$bench/quanser.yaml" --socket "$bench/card" "$@"
 }
 
-# free_decay FILE: 8 s of a pendulum that swings out, as published: columns t_s and theta_rad, 0 is hanging.
+# free_decay FILE: 8 s of a pendulum that swings out, as published: columns t_s and theta_rad, 0 is upright.
 free_decay() {
   mkdir -p "$(dirname "$1")"
   awk 'BEGIN {
     print "t_s,theta_rad"
-    for (k = 0; k <= 1600; ++k) { t = k / 200; printf "%.3f,%.5f\n", t, 0.3 * exp(-0.05 * t) * cos(5.2 * t) }
+    for (k = 0; k <= 1600; ++k) { t = k / 200; printf "%.3f,%.5f\n", t, 3.14159 + 0.3 * exp(-0.05 * t) * cos(5.2 * t) }
   }' >"$1"
 }
