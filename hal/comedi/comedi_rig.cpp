@@ -3,6 +3,7 @@
 #include <time.h>
 
 #include <algorithm>
+#include <bit>
 #include <cerrno>
 #include <cmath>
 
@@ -129,7 +130,7 @@ void ComediTransport::open_counter(ComediCard& on, const ComediChannel& at, cons
   if (range != std::ldexp(1.0, encoder.width_bits))
     on.refuse(at, "its data range is 0 to " + std::to_string(encoder.maxdata),
               "set calibration." + std::string(at.key) + ".width_bits to " +
-                  std::to_string(static_cast<int>(std::lround(std::log2(range)))));
+                  std::to_string(std::bit_width(encoder.maxdata)));
   if (wiring.kind == ComediEncoderKind::plain_counter) return;
   const CounterSetup* setup = counter_setup(on.driver());
   if (setup == nullptr)

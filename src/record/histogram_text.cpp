@@ -5,6 +5,8 @@
 #include <cmath>
 #include <cstdio>
 
+#include "upright/model/elementary.hpp"
+
 namespace upright {
 
 namespace {
@@ -60,7 +62,7 @@ std::string left(const std::string& text, std::size_t width) {
 std::string bar_of(std::uint64_t count, std::uint64_t largest, std::size_t width) {
   if (count == 0) return "";
   const double share =
-      std::log2(1.0 + static_cast<double>(count)) / std::log2(1.0 + static_cast<double>(largest));
+      elementary::log(1.0 + static_cast<double>(count)) / elementary::log(1.0 + static_cast<double>(largest));
   return std::string(
       std::max<std::size_t>(1, static_cast<std::size_t>(std::lround(share * static_cast<double>(width)))),
       '#');
