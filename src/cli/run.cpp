@@ -214,7 +214,7 @@ void print_link(const LoopOutcome& o) {
 void print_device_clock(const DeviceTiming& timing) {
   std::printf("Clock: the device's; its period was %+.0f ppm off, %llu of %llu samples were lost.\n",
               timing.drift_ppm, static_cast<unsigned long long>(timing.lost),
-              static_cast<unsigned long long>(timing.lost + timing.samples));
+              static_cast<unsigned long long>(timing.lost) + timing.samples);
 }
 
 void print_timing(const SessionResult& result) {

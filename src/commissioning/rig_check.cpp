@@ -162,7 +162,7 @@ Finding judge_device_clock(const LinkProbe& probe, const DeviceTiming& timing) {
       what, sizeof what,
       "the device is the clock: a sample every %.2f us (%+.0f ppm); of %llu samples %llu were lost, "
       "and %llu readings failed",
-      1e6 * timing.period_s, timing.drift_ppm, static_cast<unsigned long long>(timing.lost + timing.samples),
+      1e6 * timing.period_s, timing.drift_ppm, static_cast<unsigned long long>(timing.lost) + timing.samples,
       static_cast<unsigned long long>(timing.lost), static_cast<unsigned long long>(probe.failed));
   if (lost_share <= poor_share) return {"link", Health::good, what, ""};
   return {"link", lost_share > bad_share ? Health::bad : Health::poor, what,

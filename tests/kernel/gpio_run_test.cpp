@@ -58,7 +58,7 @@ TEST(GpioRehearsal, TheDoctorLooksAtTheLinesOfASimulatedRig) {
   const std::string at_rest = doctor_of(files);
   for (const char* part :
        {"digital lines: read ", "emergency stop: wired, not pressed", "limit switches: 2 wired, none tripped",
-        "amplifier enable: line 3 of rig is held", "heartbeat: line 4 of rig is held"})
+        "amplifier enable: line 3 of rig is reserved", "heartbeat: line 4 of rig is reserved"})
     EXPECT_NE(at_rest.find(part), std::string::npos) << part << "\n" << at_rest;
   sim.pull(LineNumbers::stop, true);
   const std::string pressed = doctor_of(files);
