@@ -8,13 +8,13 @@
 #include <cmath>
 
 #include "counter_setups.hpp"
+#include "hal/reading_patience.hpp"
 #include "upright/hal/clock.hpp"
 
 namespace upright {
 
 namespace {
 
-constexpr double share_of_period = 0.75;  // the rest is for computing and writing
 constexpr int attempts_to_stop = 3;
 constexpr std::array driver_references = {AREF_GROUND, AREF_COMMON, AREF_DIFF, AREF_OTHER};
 
@@ -35,7 +35,7 @@ comedi_range as_comedi(const ComediRange& range) {
 }  // namespace
 
 ComediTransport::ComediTransport(const RigFile& rig, double period_s)
-    : rig_(rig), patience_ns_(static_cast<std::int64_t>(1e9 * share_of_period * period_s)) {}
+    : rig_(rig), patience_ns_(static_cast<std::int64_t>(1e9 * reading_share_of_period * period_s)) {}
 
 ComediTransport::~ComediTransport() {
   stop();

@@ -6,6 +6,7 @@
 
 #include "../backends.hpp"
 #include "../gpio_rig.hpp"
+#include "hal/level_words.hpp"
 
 namespace upright {
 
@@ -13,7 +14,6 @@ namespace {
 
 constexpr int highest_line = 1023;
 constexpr std::size_t most_limit_switches = 8;
-constexpr Words<2> level_words = {"low", "high"};
 constexpr Words<3> biases = {"as_is", "pull_up", "pull_down"};
 constexpr Words<2> ends = {"plus_x", "minus_x"};
 

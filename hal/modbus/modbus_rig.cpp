@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "hal/modbus_exception.hpp"
+#include "hal/reading_patience.hpp"
 #include "hal/voltage_freshness.hpp"
 #include "hal/word_wait.hpp"
 #include "upright/base/error.hpp"
@@ -21,7 +22,6 @@ constexpr std::int64_t first_connect_pause_ns = 2'000'000;
 constexpr std::int64_t longest_connect_pause_ns = 100'000'000;
 constexpr double connect_patience_s = 0.02;
 constexpr double open_patience_s = 1.0;
-constexpr double share_of_period = 0.75;  // the rest is for computing and writing
 constexpr int replies_until_certain = 3;  // a single one may have a wrong bit that nothing betrays
 constexpr int io_priority = 70;
 
@@ -45,7 +45,7 @@ ModbusTransport::ModbusTransport(const RigFile& rig, double period_s)
       roles_(roles_of(rig, rig.modbus->device.empty() ? Backend::modbus_tcp : Backend::modbus_rtu)),
       writes_(roles_.output || rig.modbus->exchange == ModbusExchange::read_write),
       patience_ns_(static_cast<std::int64_t>(
-          1e9 * std::max(rig.modbus->response_timeout_s, share_of_period * period_s))),
+          1e9 * std::max(rig.modbus->response_timeout_s, reading_share_of_period * period_s))),
       freshness_ns_(static_cast<std::int64_t>(1e9 * freshness_periods * period_s)),
       link_(rig),
       stop_sequence_(link_, *rig_.modbus) {}

@@ -2,13 +2,13 @@
 
 #include <cmath>
 
+#include "hal/reading_patience.hpp"
 #include "upright/hal/clock.hpp"
 
 namespace upright {
 
 namespace {
 
-constexpr double share_of_period = 0.75;  // the rest is for computing and writing
 constexpr int attempts_at_the_end = 3;
 
 }  // namespace
@@ -16,7 +16,7 @@ constexpr int attempts_at_the_end = 3;
 QuanserTransport::QuanserTransport(const RigFile& rig, double period_s)
     : rig_(rig),
       period_s_(period_s),
-      patience_ns_(static_cast<std::int64_t>(1e9 * share_of_period * period_s)) {}
+      patience_ns_(static_cast<std::int64_t>(1e9 * reading_share_of_period * period_s)) {}
 
 QuanserTransport::~QuanserTransport() {
   for (int i = 0; i < attempts_at_the_end && !stop().done(); ++i) {

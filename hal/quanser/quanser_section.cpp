@@ -9,6 +9,7 @@
 #include "../backends.hpp"
 #include "base/yaml_keys.hpp"
 #include "card_kinds.hpp"
+#include "hal/level_words.hpp"
 #include "quanser_rig.hpp"
 
 namespace upright {
@@ -18,7 +19,6 @@ namespace {
 constexpr int last_channel = 255;
 constexpr std::size_t longest_board_type = 64;
 constexpr std::size_t longest_text = 1000;
-constexpr Words<2> level_words = {"low", "high"};
 constexpr Words<2> clocks = {"computer", "card"};
 
 /// A name of the loader's or the card's.

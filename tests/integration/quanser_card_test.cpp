@@ -53,6 +53,25 @@ std::string refusal_of(Rig& rig) {
   return "";
 }
 
+/// A whole run on a card: its run.yaml, and what it printed with --json.
+struct CardRun {
+  std::string text;
+  nlohmann::json document;
+  int exit_code;
+};
+
+CardRun run_at_200_hz(Folder& folder, const CardProcess& card, const char* duration_s) {
+  std::ofstream(folder / "rig.yaml") << card.rig_text();
+  std::ofstream(folder / "gains.yaml")
+      << replaced(text_of(UPRIGHT_SOURCE_DIR "/config/gains/exponential.yaml"), "sample_rate_hz: 1000",
+                  "sample_rate_hz: 200");
+  Process run({UPRIGHT_BINARY, "run", "--rig", folder / "rig.yaml", "--gains", folder / "gains.yaml",
+               "--duration", duration_s, "--out", folder / "runs", "--json", "--unchecked"});
+  nlohmann::json document = nlohmann::json::parse(run.rest());
+  const int exit_code = run.wait();
+  return {text_of(only_entry(folder / "runs") / "run.yaml"), std::move(document), exit_code};
+}
+
 TEST(QuanserCard, OpensAtZeroVoltsAndReadsItsCounts) {
   Bench bench;
   bench.rig->open();
@@ -192,23 +211,16 @@ TEST(QuanserCard, ARunFollowsTheCardsClockAndReportsDriftAndLoss) {
     Folder folder;
     const CardProcess card(folder, on_the_cards_clock(fake_card_rig()),
                            {"--drift-ppm", "2000", "--drop-every", "20"});
-    std::ofstream(folder / "rig.yaml") << card.rig_text();
-    std::ofstream(folder / "gains.yaml")
-        << replaced(text_of(UPRIGHT_SOURCE_DIR "/config/gains/exponential.yaml"), "sample_rate_hz: 1000",
-                    "sample_rate_hz: 200");
-    Process run({UPRIGHT_BINARY, "run", "--rig", folder / "rig.yaml", "--gains", folder / "gains.yaml",
-                 "--duration", "2", "--out", folder / "runs", "--json", "--unchecked"});
-    const nlohmann::json document = nlohmann::json::parse(run.rest());
-    const int exit_code = run.wait();
-    const RunEnd end = run_end(text_of(only_entry(folder / "runs") / "run.yaml")).value();
-    EXPECT_END(end, exit_code == 0);
-    const nlohmann::json& clock = document.at("device_clock");
+    const CardRun run = run_at_200_hz(folder, card, "2");
+    const RunEnd end = run_end(run.text).value();
+    EXPECT_END(end, run.exit_code == 0);
+    const nlohmann::json& clock = run.document.at("device_clock");
     // A sample that comes half a millisecond late at either end is 250 ppm of 2 s.
     EXPECT_TIMING(end.before(), std::abs(clock.at("drift_ppm").get<double>() - 2000.0) < 500.0,
                   "drift " + clock.dump());
     EXPECT_TIMING(end.before(), std::abs(clock.at("lost").get<double>() - 20.0) <= 3.0,
                   "loss " + clock.dump());
-    EXPECT_NE(document.at("scheduling").get<std::string>().find("on the clock of the rig's device"),
+    EXPECT_NE(run.document.at("scheduling").get<std::string>().find("on the clock of the rig's device"),
               std::string::npos);
   });
 }
@@ -217,18 +229,10 @@ TEST(QuanserCard, ARunRecordsWhichCardAndLibraryItWas) {
   in_real_time([] {
     Folder folder;
     const CardProcess card(folder, fake_card_rig());
-    std::ofstream(folder / "rig.yaml") << card.rig_text();
-    std::ofstream(folder / "gains.yaml")
-        << replaced(text_of(UPRIGHT_SOURCE_DIR "/config/gains/exponential.yaml"), "sample_rate_hz: 1000",
-                    "sample_rate_hz: 200");
-    Process run({UPRIGHT_BINARY, "run", "--rig", folder / "rig.yaml", "--gains", folder / "gains.yaml",
-                 "--duration", "0.5", "--out", folder / "runs", "--json", "--unchecked"});
-    const nlohmann::json document = nlohmann::json::parse(run.rest());
-    const int exit_code = run.wait();
-    const std::string text = text_of(only_entry(folder / "runs") / "run.yaml");
-    EXPECT_END(run_end(text).value(), exit_code == 0);
+    const CardRun run = run_at_200_hz(folder, card, "0.5");
+    EXPECT_END(run_end(run.text).value(), run.exit_code == 0);
     for (const char* fact : {"serial_number: '12345'", "library_version: '9.8.7'", "product: 'Fake Q2-USB'"})
-      EXPECT_NE(text.find(fact), std::string::npos) << fact;
+      EXPECT_NE(run.text.find(fact), std::string::npos) << fact;
     EXPECT_TRUE(read_run(only_entry(folder / "runs")).outcome.has_value());
   });
 }
