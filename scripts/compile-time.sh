@@ -14,6 +14,7 @@ fi
 
 folder=$PWD/build/compile-time
 mkdir -p "$folder"
+trap 'rm -rf "$folder"; git worktree prune' EXIT
 TIMEFORMAT='%U s user, %S s system, %R s elapsed'
 for _ in $(seq "$rounds"); do
   for commit in "$@"; do
@@ -25,4 +26,3 @@ for _ in $(seq "$rounds"); do
     time cmake --build "$tree/build/ci" --target upright >/dev/null
   done
 done
-for commit in "$@"; do git worktree remove --force "$folder/$(git rev-parse --short "$commit")"; done

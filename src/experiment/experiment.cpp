@@ -1,7 +1,6 @@
 #include "experiment.hpp"
 
 #include <fstream>
-#include <numbers>
 
 #include "experiment_trials.hpp"
 #include "record/provenance.hpp"

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <functional>
 #include <limits>
-#include <numbers>
 
+#include "base/angle_units.hpp"
 #include "bounded_fit.hpp"
 #include "dataset_file.hpp"
 #include "folded_angle.hpp"
@@ -14,7 +14,6 @@ namespace upright {
 
 namespace {
 
-constexpr double turn = 2.0 * std::numbers::pi;
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
 /// Window lengths, the shortest first in which accelerations stand out from the sensors' noise.
@@ -78,9 +77,9 @@ ReadingJudge::ReadingJudge(const Measurement& run, const Plant& plant)
 double folded_every_rad(const DataReading& reading) {
   constexpr double near = 0.05;
   const double every = reading.fold * std::abs(reading.factor[theta_channel]);
-  for (const double whole : {turn, 0.5 * turn, 0.25 * turn})
+  for (const double whole : {full_turn_rad, 0.5 * full_turn_rad, 0.25 * full_turn_rad})
     if (std::abs(every - whole) < near * whole) return whole;
-  return every > 0.0 ? every : turn;
+  return every > 0.0 ? every : full_turn_rad;
 }
 
 std::optional<double> ReadingJudge::fold() const {
@@ -95,7 +94,7 @@ std::optional<double> ReadingJudge::fold() const {
   };
   const auto every = find_fold(raw_[theta_channel], gap_before);
   if (!every) return std::nullopt;
-  for (const double whole : {0.5 * turn, 0.25 * turn, 180.0, 90.0})
+  for (const double whole : {0.5 * full_turn_rad, 0.25 * full_turn_rad, 180.0, 90.0})
     if (std::abs(*every - whole) < 0.05 * whole) return whole;
   return std::nullopt;
 }

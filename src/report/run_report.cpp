@@ -1,7 +1,6 @@
 #include "run_report.hpp"
 
 #include <cstdint>
-#include <numbers>
 #include <utility>
 #include <vector>
 

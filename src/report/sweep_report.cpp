@@ -5,7 +5,6 @@
 #include <cstdlib>
 #include <limits>
 #include <map>
-#include <numbers>
 #include <set>
 #include <sstream>
 #include <vector>

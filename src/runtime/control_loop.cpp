@@ -4,7 +4,6 @@
 #include <cmath>
 #include <csignal>
 #include <cstdio>
-#include <numbers>
 
 #include "hal/modbus_exception.hpp"
 #include "hal/voltage_freshness.hpp"

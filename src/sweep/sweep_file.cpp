@@ -4,6 +4,7 @@
 #include <memory>
 #include <numbers>
 
+#include "base/angle_units.hpp"
 #include "control/filter_model.hpp"
 #include "sweep.hpp"
 #include "upright/base/error.hpp"
@@ -68,7 +69,7 @@ std::vector<double> read_angles(const YamlMap& map, double fell_above_rad) {
   std::vector<double> angles = read_grid(map, "theta0_deg", Range::within(-180.0, 180.0));
   for (double& angle : angles) {
     const double degrees = angle;
-    angle *= std::numbers::pi / 180.0;
+    angle *= radians_per_degree;
     if (std::abs(angle) >= fell_above_rad)
       map.fail("theta0_deg", "contains " + exact_text(degrees) + " degrees, which counts as fallen",
                "keep every angle below outcome.fell_above_rad = " + exact_text(fell_above_rad));
