@@ -25,6 +25,7 @@ AddCommand add_effects,
            add_margin,
            add_diagnose,
            add_identify,
+           add_simulate,
            add_virtual_rig,
            add_doctor;
 
@@ -41,6 +42,7 @@ inline constexpr std::array all_commands = {add_effects,
                                             add_margin,
                                             add_diagnose,
                                             add_identify,
+                                            add_simulate,
                                             add_virtual_rig,
                                             add_doctor};
 // clang-format on

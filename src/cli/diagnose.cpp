@@ -3,7 +3,6 @@
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
-#include <fstream>
 #include <iostream>
 #include <memory>
 #include <string>
@@ -18,6 +17,7 @@
 #include "measurement/long_records.hpp"
 #include "options.hpp"
 #include "progress.hpp"
+#include "result_folder.hpp"
 #include "signals.hpp"
 #include "upright/base/error.hpp"
 #include "upright/diagnosis/diagnosis.hpp"
@@ -171,12 +171,11 @@ std::vector<std::string> provenance(const Diagnosis& d, const DiagnoseFlags& fla
 }
 
 /// The residual force and torque on held-out data, before and after, thinned to what a plot can show.
-void write_residuals(const Diagnosis& d, const fs::path& file) {
+void write_residuals(const Diagnosis& d, std::ostream& out) {
   constexpr std::size_t most_rows = 6000;
   std::size_t count = 0;
   for (const ResidualTrace& trace : d.residual_before) count += trace.time_s.size();
   const std::size_t stride = 1 + count / most_rows;
-  std::ofstream out(file);
   out << "segment,run,time_s,cart_m,cart_velocity_mps,voltage_v,force_before_n,force_after_n,torque_before_"
          "nm,torque_after_nm\n";
   for (std::size_t s = 0; s < d.residual_before.size(); ++s) {
@@ -191,16 +190,12 @@ void write_residuals(const Diagnosis& d, const fs::path& file) {
       out << '\n';
     }
   }
-  out.close();
-  if (!out)
-    throw ConfigError("cannot write " + file.string() +
-                      ": free some space, or choose another folder with --out");
 }
 
 /// Measured and simulated on held-out segments, with the plant file as given and with the model that was
 /// found. A cell is empty where there is nothing measured.
 void write_traces(const Diagnosis& d, const Plant& given, const std::vector<Measurement>& runs,
-                  const fs::path& file) {
+                  std::ostream& out) {
   constexpr std::size_t most_rows = 20000;
   const std::vector<Segment> segments = held_out_segments(d, runs);
   const std::vector<SimulatedSegment> before = simulate_segments(given, runs, segments);
@@ -208,7 +203,6 @@ void write_traces(const Diagnosis& d, const Plant& given, const std::vector<Meas
   std::size_t count = 0;
   for (const SimulatedSegment& trace : before) count += trace.time_s.size();
   const std::size_t stride = 1 + count / most_rows;
-  std::ofstream out(file);
   out << "segment,run,time_s,voltage_v,cart_m,cart_before_m,cart_after_m,theta_rad,theta_before_rad,theta_"
          "after_rad\n";
   const auto cell = [&](const std::vector<double>& values, std::size_t k) {
@@ -228,30 +222,18 @@ void write_traces(const Diagnosis& d, const Plant& given, const std::vector<Meas
       out << '\n';
     }
   }
-  out.close();
-  if (!out)
-    throw ConfigError("cannot write " + file.string() +
-                      ": free some space, or choose another folder with --out");
 }
 
 void write_results(const Diagnosis& d, const Plant& given, const std::vector<Measurement>& runs,
                    const DiagnoseFlags& flags) {
-  std::error_code problem;
-  fs::create_directories(flags.out, problem);
-  if (problem)
-    throw ConfigError("cannot create " + flags.out + " (" + problem.message() +
-                      "): choose another folder with --out");
+  create_result_folder(flags.out);
   write_plant_file(d.model, fs::path(flags.out) / "model.yaml", provenance(d, flags));
   write_plant_file(given, fs::path(flags.out) / "given.yaml", {"The plant file as given: " + flags.model});
-  write_residuals(d, fs::path(flags.out) / "residuals.csv");
-  write_traces(d, given, runs, fs::path(flags.out) / "traces.csv");
-  const fs::path file = fs::path(flags.out) / "diagnosis.json";
-  std::ofstream json(file);
-  json << diagnosis_json(d).dump(2) << "\n";
-  json.close();
-  if (!json)
-    throw ConfigError("cannot write " + file.string() +
-                      ": free some space, or choose another folder with --out");
+  const fs::path folder = flags.out;
+  write_result(folder / "residuals.csv", [&](std::ostream& out) { write_residuals(d, out); });
+  write_result(folder / "traces.csv", [&](std::ostream& out) { write_traces(d, given, runs, out); });
+  write_result(folder / "diagnosis.json",
+               [&](std::ostream& out) { out << diagnosis_json(d).dump(2) << "\n"; });
 }
 
 ExitCode run_diagnose(const DiagnoseFlags& flags) {

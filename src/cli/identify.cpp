@@ -3,7 +3,6 @@
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
-#include <fstream>
 #include <iostream>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -19,6 +18,7 @@
 #include "options.hpp"
 #include "progress.hpp"
 #include "report/identification_report.hpp"
+#include "result_folder.hpp"
 #include "signals.hpp"
 #include "upright/base/error.hpp"
 #include "upright/model/plant_file.hpp"
@@ -161,24 +161,16 @@ void print(const Identification& id, const IdentifyFlags& flags) {
 
 void write_results(const Identification& id, const std::vector<Measurement>& runs,
                    const IdentifyFlags& flags) {
-  std::error_code problem;
-  fs::create_directories(flags.out, problem);
-  if (problem)
-    throw ConfigError("cannot create " + flags.out + " (" + problem.message() +
-                      "): choose another folder with --out");
+  create_result_folder(flags.out);
   // A plant file says that these are the rig's numbers.
   if (id.is_trustworthy()) {
     std::vector<std::string> comments = {"Identified by upright " UPRIGHT_VERSION "."};
     for (const std::string& data : flags.data) comments.push_back("data: " + data);
     write_plant_file(id.plant, fs::path(flags.out) / "plant.yaml", comments);
   }
-  const fs::path file = fs::path(flags.out) / "identification.json";
-  std::ofstream json(file);
-  json << json_of(id, flags).dump(2, ' ', false, Json::error_handler_t::replace) << "\n";
-  json.close();
-  if (!json)
-    throw ConfigError("cannot write " + file.string() +
-                      ": free some space, or choose another folder with --out");
+  write_result(fs::path(flags.out) / "identification.json", [&](std::ostream& out) {
+    out << json_of(id, flags).dump(2, ' ', false, Json::error_handler_t::replace) << "\n";
+  });
   // Drawing takes longer than whoever interrupts wants to wait.
   if (!id.interrupted) write_identification_report(id, runs, fs::path(flags.out) / "report.html");
 }

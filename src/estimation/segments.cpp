@@ -18,19 +18,18 @@ std::size_t resume_after_gap(const Measurement& run, std::size_t k) {
 }
 
 void cut_run(const Measurement& run, std::size_t number, double longest_s, std::vector<Segment>& segments) {
-  const double period = run.median_period_s();
   constexpr double largest_growth = 2.5;  // of the logarithm of an error
   constexpr double upright_rate = 5.0;    // 1/s, of a pendulum of arm's length
   double growth = 0.0;
   std::size_t first = 0;
-  auto next_break = run.breaks.begin();
+  const std::vector<std::size_t> gaps = gaps_in(run);
+  auto next_gap = gaps.begin();
   const auto close = [&](std::size_t last) {
     if (last >= first + 8) segments.push_back({number, first, last});
   };
   for (std::size_t k = 1; k < run.size(); ++k) {
-    while (next_break != run.breaks.end() && *next_break < k) ++next_break;
-    const bool gap = run.time_s[k] - run.time_s[k - 1] > 5.0 * period ||
-                     (next_break != run.breaks.end() && *next_break == k);
+    while (next_gap != gaps.end() && *next_gap < k) ++next_gap;
+    const bool gap = next_gap != gaps.end() && *next_gap == k;
     if (run.has_theta())
       growth +=
           upright_rate * std::max(0.0, std::cos(run.theta_rad[k])) * (run.time_s[k] - run.time_s[k - 1]);
@@ -48,6 +47,19 @@ void cut_run(const Measurement& run, std::size_t number, double longest_s, std::
 }
 
 }  // namespace
+
+std::vector<std::size_t> gaps_in(const Measurement& run) {
+  constexpr double longest_periods = 5.0;
+  const double longest_s = longest_periods * run.median_period_s();
+  std::vector<std::size_t> gaps;
+  auto next_break = run.breaks.begin();
+  for (std::size_t k = 1; k < run.size(); ++k) {
+    while (next_break != run.breaks.end() && *next_break < k) ++next_break;
+    if (run.time_s[k] - run.time_s[k - 1] > longest_s || (next_break != run.breaks.end() && *next_break == k))
+      gaps.push_back(k);
+  }
+  return gaps;
+}
 
 std::vector<Segment> cut_segments(const std::vector<Measurement>& runs, double longest_s) {
   std::vector<Segment> segments;

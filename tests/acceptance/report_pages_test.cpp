@@ -10,6 +10,7 @@
 #include "browser.hpp"
 #include "command.hpp"
 #include "report/identification_report.hpp"
+#include "report/simulation_report.hpp"
 
 namespace upright::testing {
 namespace {
@@ -204,6 +205,30 @@ TEST_F(ReportPages, OfAnIdentificationAreReadableOnATelephone) {
   const fs::path page = folder_.path() / "report.html";
   write_identification_report(id, {}, page);
   expect_readable(page, "identification");
+}
+
+TEST_F(ReportPages, OfASimulationAreReadableOnATelephone) {
+  Measurement run;
+  run.name = "20261123T090248Z-a-record-with-a-long-name";
+  RunSimulation simulation;
+  simulation.pieces = {{0, 0, 999}, {0, 1000, 1999}};
+  simulation.samples = 2000;
+  for (int k = 0; k < 2000; ++k) {
+    const double t = 1e-3 * k;
+    run.time_s.push_back(t);
+    run.voltage_v.push_back(std::sin(40.0 * t));
+    run.cart_m.push_back(0.05 * std::sin(3.0 * t));
+    run.theta_rad.push_back(3.14 + 0.5 * std::cos(5.0 * t));
+    simulation.voltage_v.push_back(run.voltage_v.back());
+    simulation.cart_m.push_back(0.05 * std::sin(3.1 * t));
+    simulation.theta_rad.push_back(3.14 + 0.5 * std::cos(5.1 * t));
+  }
+  simulation.cart_error_m = {0.0031, 8.7, 0.0052, 1.999};
+  simulation.theta_error_rad = {0.0123, 3.1, 0.0421, 1.999};
+  const fs::path page = folder_.path() / "report.html";
+  write_simulation_report({"config/plants/with-a-long-name.yaml", "config/gains/exponential.yaml"}, {run},
+                          {simulation}, page);
+  expect_readable(page, "simulation");
 }
 
 }  // namespace

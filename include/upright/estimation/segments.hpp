@@ -16,6 +16,10 @@ struct Segment {
   std::size_t last = 0;
 };
 
+/// The samples before which rows are missing: those of `breaks`, and those after more than five periods
+/// without a row. What was commanded in a gap is not known.
+std::vector<std::size_t> gaps_in(const Measurement& run);
+
 /// Cuts runs into segments: at gaps in the record, and short enough that the instability of the upright
 /// pendulum does not amplify a small error excessively.
 std::vector<Segment> cut_segments(const std::vector<Measurement>& runs, double longest_s = 2.0);

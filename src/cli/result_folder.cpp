@@ -1,0 +1,28 @@
+#include "result_folder.hpp"
+
+#include <fstream>
+
+#include "upright/base/error.hpp"
+
+namespace upright::cli {
+
+namespace fs = std::filesystem;
+
+void create_result_folder(const fs::path& folder) {
+  std::error_code problem;
+  fs::create_directories(folder, problem);
+  if (problem)
+    throw ConfigError("cannot create " + folder.string() + " (" + problem.message() +
+                      "): choose another folder with --out");
+}
+
+void write_result(const fs::path& file, const std::function<void(std::ostream&)>& write) {
+  std::ofstream out(file);
+  write(out);
+  out.close();
+  if (!out)
+    throw ConfigError("cannot write " + file.string() +
+                      ": free some space, or choose another folder with --out");
+}
+
+}  // namespace upright::cli
