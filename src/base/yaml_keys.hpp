@@ -77,6 +77,10 @@ class YamlKeys {
   void optional_integer(const char* key, std::optional<int>& value, std::int64_t low, std::int64_t high) {
     if (given(key, value.has_value())) integer(key, made(value), low, high);
   }
+  /// An optional number.
+  void optional_number(const char* key, std::optional<double>& value, const Range& range) {
+    if (given(key, value.has_value())) number(key, made(value), range);
+  }
   /// An optional map. `visit` receives the visitor and the value.
   template <class T, class VisitValue>
   void optional_map(const char* key, std::optional<T>& value, const VisitValue& visit) {

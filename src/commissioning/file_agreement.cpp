@@ -159,6 +159,9 @@ Agreement agreement_of(const RunFiles& files) {
     }
     compare_watchdogs(*files.rig, *files.control, agreement.warnings);
   }
+  if (files.rig && !files.plant && !is_simulated(*files.rig))
+    if (const std::string gap = gap_of_encoder_watch(*files.rig); !gap.empty())
+      agreement.warnings.push_back(gap);
   if (files.rig && files.plant) compare_rig_and_plant(*files.rig, *files.plant, agreement.warnings);
   if (files.control && files.plant) judge_gains(*files.control, *files.plant, agreement);
   return agreement;

@@ -14,6 +14,13 @@ namespace {
 /// A hold period, jitter and what a file leaves out: most plant files do not name the actuator's delay and
 /// lag, and amplifiers, cards and links are up to so late.
 constexpr double unnamed_lag_s = 0.010;
+/// The largest delay and lag of an actuator of which nothing is known: a slow serial link and its amplifier.
+constexpr double usual_lag_s = 0.030;
+/// Few plant files name the friction of the pivot: a hundredth of gravity, that is 0.6 degrees off the
+/// vertical, holds no pendulum on ball bearings.
+constexpr double usual_pivot_friction_mps2 = 0.1;
+/// Machines give way in proportion to their size: 50 um on a track of twice 0.4 m.
+constexpr double track_limits_of_unseen_travel = 8000.0;
 
 /// Smallest voltage in a direction that overcomes what holds the cart at rest there; the limit where none
 /// does.
@@ -55,6 +62,7 @@ EncoderAssumptions encoder_assumptions(const Plant& plant, double track_limit_m,
   const Dynamics<double> dynamics(make_model<double>(plant));
   const BaseParameters<double> base = make_model<double>(plant).corrected();
   EncoderAssumptions a;
+  a.unseen_travel_m = track_limit_m / track_limits_of_unseen_travel;
   const Bounds breakaway = breakaway_over_track(dynamics, track_limit_m, amplifier_limit_v);
   a.breakaway_v = {breakaway.low * less, breakaway.high * more};
   const double lag_s = dynamics.input_delay_s() + dynamics.motor_time_constant_s();
@@ -69,7 +77,8 @@ EncoderAssumptions encoder_assumptions(const Plant& plant, double track_limit_m,
     const double moment_kgm = base.pendulum_mass_kg * base.length_to_com_m;
     mass_kg += base.pendulum_mass_kg;
     a.longest_pendulum_m = more * base.inertia_about_pivot_kgm2 / moment_kgm;
-    a.pivot_friction_mps2 = std::max(a.pivot_friction_mps2, more * dynamics.pivot_dry_level() / moment_kgm);
+    a.pivot_friction_mps2 =
+        std::max(usual_pivot_friction_mps2, more * dynamics.pivot_dry_level() / moment_kgm);
   }
   a.acceleration_mps2_per_v = less * force_per_volt_n / mass_kg;
   constexpr double usual_mps = 0.5;
@@ -80,36 +89,66 @@ EncoderAssumptions encoder_assumptions(const Plant& plant, double track_limit_m,
   return a;
 }
 
-EncoderAssumptions either(const EncoderAssumptions& a, const EncoderAssumptions& b) {
-  const auto around = [](const Bounds& p, const Bounds& q) {
-    return Bounds{std::min(p.low, q.low), std::max(p.high, q.high)};
+EncoderAssumptions encoder_assumptions(const StatedAssumptions& stated, double track_limit_m) {
+  EncoderAssumptions a;
+  a.breakaway_v = stated.breakaway_v.value_or(a.breakaway_v);
+  a.largest_lag_s = stated.largest_lag_s.value_or(usual_lag_s);
+  a.acceleration_mps2_per_v = stated.acceleration_mps2_per_v.value_or(a.acceleration_mps2_per_v);
+  a.damping_v_per_mps = stated.damping_v_per_mps.value_or(a.damping_v_per_mps);
+  a.unseen_travel_m = stated.unseen_travel_m.value_or(track_limit_m / track_limits_of_unseen_travel);
+  a.longest_pendulum_m = stated.longest_pendulum_m.value_or(a.longest_pendulum_m);
+  a.pivot_friction_mps2 = stated.pivot_friction_mps2.value_or(usual_pivot_friction_mps2);
+  return a;
+}
+
+std::vector<std::string> missing_assumptions(const StatedAssumptions& stated) {
+  std::vector<std::string> missing;
+  if (!stated.breakaway_v) missing.emplace_back("breakaway_v");
+  if (!stated.acceleration_mps2_per_v) missing.emplace_back("acceleration_mps2_per_v");
+  if (!stated.damping_v_per_mps) missing.emplace_back("damping_v_per_mps");
+  if (!stated.longest_pendulum_m) missing.emplace_back("longest_pendulum_m");
+  return missing;
+}
+
+EncoderAssumptions widened(EncoderAssumptions a, const StatedAssumptions& stated) {
+  const auto up_to = [](double& bound, const std::optional<double>& other) {
+    bound = std::max(bound, other.value_or(bound));
   };
-  return {around(a.breakaway_v, b.breakaway_v),
-          std::max(a.largest_lag_s, b.largest_lag_s),
-          std::min(a.acceleration_mps2_per_v, b.acceleration_mps2_per_v),
-          std::max(a.damping_v_per_mps, b.damping_v_per_mps),
-          std::max(a.unseen_travel_m, b.unseen_travel_m),
-          std::max(a.longest_pendulum_m, b.longest_pendulum_m),
-          std::max(a.pivot_friction_mps2, b.pivot_friction_mps2)};
+  const auto down_to = [](double& bound, const std::optional<double>& other) {
+    bound = std::min(bound, other.value_or(bound));
+  };
+  if (stated.breakaway_v) {
+    down_to(a.breakaway_v.low, stated.breakaway_v->low);
+    up_to(a.breakaway_v.high, stated.breakaway_v->high);
+  }
+  up_to(a.largest_lag_s, stated.largest_lag_s);
+  down_to(a.acceleration_mps2_per_v, stated.acceleration_mps2_per_v);
+  up_to(a.damping_v_per_mps, stated.damping_v_per_mps);
+  up_to(a.unseen_travel_m, stated.unseen_travel_m);
+  up_to(a.longest_pendulum_m, stated.longest_pendulum_m);
+  up_to(a.pivot_friction_mps2, stated.pivot_friction_mps2);
+  return a;
 }
 
-void encoder_assumption_keys(YamlKeys& keys, EncoderAssumptions& a) {
-  keys.usual_map("breakaway_v", [&](YamlKeys& breakaway) {
-    breakaway.number("from", a.breakaway_v.low, Range::within(0.0, 100.0));
-    breakaway.number("to", a.breakaway_v.high, Range::within(a.breakaway_v.low, 100.0));
+void encoder_assumption_keys(YamlKeys& keys, StatedAssumptions& a) {
+  keys.optional_map("breakaway_v", a.breakaway_v, [](YamlKeys& breakaway, Bounds& bounds) {
+    breakaway.number("from", bounds.low, Range::within(0.0, 100.0));
+    breakaway.number("to", bounds.high, Range::within(bounds.low, 100.0));
   });
-  keys.number("largest_lag_s", a.largest_lag_s, Range::within(0.0, 1.0), a.largest_lag_s);
-  keys.number("acceleration_mps2_per_v", a.acceleration_mps2_per_v, Range{0.0, 1e4, true},
-              a.acceleration_mps2_per_v);
-  keys.number("damping_v_per_mps", a.damping_v_per_mps, Range::within(0.0, 1e4), a.damping_v_per_mps);
-  keys.number("unseen_travel_m", a.unseen_travel_m, Range::within(0.0, 0.1), a.unseen_travel_m);
-  keys.number("longest_pendulum_m", a.longest_pendulum_m, Range{0.0, 100.0, true}, a.longest_pendulum_m);
-  keys.number("pivot_friction_mps2", a.pivot_friction_mps2, Range::within(0.0, 100.0), a.pivot_friction_mps2);
+  keys.optional_number("largest_lag_s", a.largest_lag_s, Range::within(0.0, 1.0));
+  keys.optional_number("acceleration_mps2_per_v", a.acceleration_mps2_per_v, Range{0.0, 1e4, true});
+  keys.optional_number("damping_v_per_mps", a.damping_v_per_mps, Range::within(0.0, 1e4));
+  keys.optional_number("unseen_travel_m", a.unseen_travel_m, Range::within(0.0, 0.1));
+  keys.optional_number("longest_pendulum_m", a.longest_pendulum_m, Range{0.0, 100.0, true});
+  keys.optional_number("pivot_friction_mps2", a.pivot_friction_mps2, Range::within(0.0, 100.0));
 }
 
-std::string encoder_assumptions_text(EncoderAssumptions assumptions) {
+std::string encoder_assumptions_text(const EncoderAssumptions& a) {
+  StatedAssumptions all{a.breakaway_v,        a.largest_lag_s,   a.acceleration_mps2_per_v,
+                        a.damping_v_per_mps,  a.unseen_travel_m, a.longest_pendulum_m,
+                        a.pivot_friction_mps2};
   YamlKeyWriter writer(YamlKeyWriter::Layout::one_line);
-  encoder_assumption_keys(writer, assumptions);
+  encoder_assumption_keys(writer, all);
   return "{" + writer.written() + "}";
 }
 

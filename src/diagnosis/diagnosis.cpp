@@ -12,6 +12,7 @@
 #include "estimation/smoother.hpp"
 #include "indistinguishable.hpp"
 #include "next_experiment.hpp"
+#include "plant_scale.hpp"
 #include "plausibility.hpp"
 #include "search.hpp"
 #include "stepwise_selection.hpp"
@@ -25,7 +26,8 @@ class Diagnostician {
  public:
   Diagnostician(const Plant& plant, const std::vector<Measurement>& runs, const DiagnosisOptions& options,
                 HeldOut which)
-      : plant_(plant),
+      : policy_(policy_for(plant)),
+        plant_(plant),
         runs_(runs),
         options_(options),
         data_(checked(split(runs, which, policy_.excitation.arm_m, policy_.excitation.speed_window_s))),
@@ -415,7 +417,7 @@ class Diagnostician {
     listed(effect).indistinguishable_from.push_back(other);
   }
 
-  const SelectionPolicy policy_{};
+  const SelectionPolicy policy_;
   const SearchBudget budget_{};
   const Plant plant_;
   const std::vector<Measurement>& runs_;

@@ -7,6 +7,9 @@
 // "Chosen" means that the value was not measured by itself; docs/results/diagnosis-matrix.md measures all of
 // them together.
 //
+// Some limits are speeds, voltages, forces or lengths. They hold for a small cart, and policy_for()
+// (plant_scale.hpp) scales them to a plant of another size.
+//
 // scripts/write_reference.py copies the comments and values into docs/reference/diagnosis-rules.md, so each
 // member needs a comment of its own that begins with its unit.
 #pragma once
@@ -124,9 +127,8 @@ struct DistinctionPolicy {
   double next_best_share = 1.0 / 3.0;
 };
 
-/// Which motion counts as motion, and what an unmodelled force may depend on. The scales are absolute, for a
-/// small cart. Scales relative to the plant would change the measured results, so they are not used. All are
-/// chosen.
+/// Which motion counts as motion, and what an unmodelled force may depend on. Speeds, rates and voltages hold
+/// for a small cart and are scaled to other plants (plant_scale.hpp). All are chosen.
 struct MotionPolicy {
   /// [m/s] Below this speed the direction of the cart is not known.
   double still_cart_mps = 2e-3;
@@ -214,8 +216,8 @@ struct ResidualPolicy {
 /// How the residual is located: the regression of the residual force on measured quantities. Its result is
 /// the sentence beside an effect. It decides nothing.
 struct LocationPolicy {
-  /// [m/s] A faster cart moves, so its position indicates the pitch of a periodic force. For a small cart, as
-  /// all scales below. Chosen.
+  /// [m/s] A faster cart moves, so its position indicates the pitch of a periodic force. For a small cart,
+  /// and scaled to other plants. Chosen.
   double moving_cart_mps = 1e-3;
   /// [s] The length of the blocks over which means are taken: shorter than an effect acts, longer than the
   /// smoother's memory. Chosen.
@@ -255,12 +257,12 @@ struct PriorPolicy {
   double least_shape = 0.5;
   /// [1] The largest exponent. Chosen.
   double most_shape = 4.0;
-  /// [m/s] The slowest Stribeck velocity. Chosen.
+  /// [m/s] The slowest Stribeck velocity. For a small cart, and scaled to other plants. Chosen.
   double least_stribeck_mps = 1e-3;
   /// [1] The fastest Stribeck velocity, as a share of the largest speed: the data do not show a faster one.
   /// Chosen.
   double most_stribeck_share = 0.5;
-  /// [m/s] The fastest Stribeck velocity is at least this. Chosen.
+  /// [m/s] The fastest Stribeck velocity is at least this. Scaled as the slowest. Chosen.
   double fastest_stribeck_mps = 0.02;
   /// [m] The shortest pitch of a periodic force along the track. Chosen.
   double least_pitch_m = 5e-4;
@@ -268,12 +270,14 @@ struct PriorPolicy {
   double crests_of_pitch = 3.0;
   /// [m] Pitches up to this are always searched. Chosen.
   double least_longest_pitch_m = 0.002;
-  /// [m] The standard deviation of the centre of a spring about the mean position of the cart, for a track of
-  /// a metre. Chosen.
+  /// [m] The standard deviation of the centre of a spring about the mean position of the cart. For the track
+  /// of a small cart, a metre, and scaled to other plants. Chosen.
   double spring_center_m = 0.5;
-  /// [N/m] The softest bristles. Softer ones act as a spring. Chosen.
+  /// [N/m] The softest bristles. Softer ones act as a spring. For a small cart, and scaled to other plants.
+  /// Chosen.
   double least_bristle_stiffness_n_per_m = 5.0;
-  /// [N/m] The stiffest bristles. Stiffer ones are indistinguishable from a rigid contact. Chosen.
+  /// [N/m] The stiffest bristles. Stiffer ones are indistinguishable from a rigid contact. Scaled as the
+  /// softest. Chosen.
   double most_bristle_stiffness_n_per_m = 3e4;
   /// [s] The longest delay of the input. Chosen.
   double most_delay_s = 0.2;
@@ -293,7 +297,8 @@ struct ExcitationPolicy {
   /// [sensor steps] A signal that moves by no more contains no information. Chosen.
   double least_steps = 30.0;
   /// [m] The length of the pendulum when runs are sorted by the speed of the cart and of the pendulum's tip,
-  /// to hold out a third of them. Typical of a small rig; it only weighs the two speeds. Chosen.
+  /// to hold out a third of them. For a small cart, and scaled to other plants; it only weighs the two
+  /// speeds. Chosen.
   double arm_m = 0.3;
   /// [s] Speeds are differences over this time. Over one sample they would be encoder steps. Chosen.
   double speed_window_s = 0.02;

@@ -9,6 +9,7 @@
 #include "base/parallel.hpp"
 #include "diagnosis/adequacy.hpp"
 #include "diagnosis/candidates.hpp"
+#include "diagnosis/plant_scale.hpp"
 #include "diagnosis/score_test.hpp"
 #include "estimation/held_out.hpp"
 #include "estimation/thinning.hpp"
@@ -61,7 +62,8 @@ struct Model {
 class Identifier {
  public:
   Identifier(const Plant& base, const std::vector<Measurement>& runs, const IdentificationOptions& options)
-      : base_(base),
+      : policy_(policy_for(base)),
+        base_(base),
         order_(canonical_order(runs)),
         runs_(arranged(runs, order_)),
         options_(options),
@@ -540,7 +542,7 @@ class Identifier {
       result_.plant.remove(effect);
   }
 
-  const SelectionPolicy policy_{};
+  const SelectionPolicy policy_;
   const SearchBudget budget_{};
   Plant base_;
   std::vector<std::size_t> order_;  ///< place among the runs as given, for each of `runs_`

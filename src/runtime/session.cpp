@@ -71,6 +71,17 @@ void require_spin_fits(double spin_us, double period_s) {
                     "sample_rate_hz in the gain file");
 }
 
+std::string gap_of_encoder_watch(const RigFile& rig) {
+  const std::vector<std::string> missing =
+      missing_assumptions(rig.encoder_watch.value_or(StatedAssumptions{}));
+  if (missing.empty()) return "";
+  std::string keys;
+  for (const std::string& key : missing) keys += (keys.empty() ? "" : ", ") + key;
+  return rig.file.string() + ": encoder_watch does not state " + keys +
+         ", and no plant is known from which the watch could take them: add them to the rig file, or name a "
+         "plant with --plant";
+}
+
 LoopLimits rig_limits(const RigFile& rig, const std::optional<Plant>& plant) {
   LoopLimits limits;
   limits.track_limit_m = rig.track_limit_m;
@@ -78,10 +89,12 @@ LoopLimits rig_limits(const RigFile& rig, const std::optional<Plant>& plant) {
   limits.watchdog_s = rig.watchdog_s;
   limits.coast_s = rig.coast_s;
   limits.signs_unproven = !is_simulated(rig) && !signs_are_checked(rig);
-  if (rig.encoder_watch) limits.encoders = *rig.encoder_watch;
+  const StatedAssumptions stated = rig.encoder_watch.value_or(StatedAssumptions{});
   if (plant) {
-    const EncoderAssumptions implied = encoder_assumptions(*plant, rig.track_limit_m, rig.amplifier.limit_v);
-    limits.encoders = rig.encoder_watch ? either(implied, *rig.encoder_watch) : implied;
+    limits.encoders = widened(encoder_assumptions(*plant, rig.track_limit_m, rig.amplifier.limit_v), stated);
+  } else {
+    if (const std::string what = gap_of_encoder_watch(rig); !what.empty()) throw ConfigError(what);
+    limits.encoders = encoder_assumptions(stated, rig.track_limit_m);
   }
   return limits;
 }

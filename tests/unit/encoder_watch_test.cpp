@@ -30,12 +30,16 @@ double found_after_s(EncoderWatch& watch, double until_s, StuckEncoder expected,
 
 constexpr double m_per_count = 2.27485e-5, rad_per_count = 1.5339808e-3;
 
-EncoderWatch default_watch() {
-  return EncoderWatch(EncoderAssumptions{}, m_per_count, rad_per_count);
+/// An IP02 with up to 2 N of dry friction, an actuator that is up to 30 ms late, and each of Quanser's
+/// pendulums.
+const EncoderAssumptions ip02{{0.1, 1.4}, 0.03, 1.1, 8.0, 5e-5, 0.7, 0.1};
+
+EncoderWatch ip02_watch() {
+  return EncoderWatch(ip02, m_per_count, rad_per_count);
 }
 
 TEST(EncoderWatch, FindsACartThatDoesNotCountUnderAStrongVoltage) {
-  EncoderWatch watch = default_watch();
+  EncoderWatch watch = ip02_watch();
   const double found_s = found_after_s(watch, 5.0, StuckEncoder::cart, [](std::uint64_t tick) {
     return WatchedPeriod{0, 0.0, 7, static_cast<std::int64_t>(tick), 0.0, 5.0};
   });
@@ -44,8 +48,8 @@ TEST(EncoderWatch, FindsACartThatDoesNotCountUnderAStrongVoltage) {
 }
 
 TEST(EncoderWatch, LetsACartRestBelowItsBreakaway) {
-  EncoderWatch watch = default_watch();
-  const double breakaway_v = EncoderAssumptions{}.breakaway_v.high;
+  EncoderWatch watch = ip02_watch();
+  const double breakaway_v = ip02.breakaway_v.high;
   const double found_s = found_after_s(watch, 60.0, StuckEncoder::none, [&](std::uint64_t) {
     return WatchedPeriod{0, 0.0, 7, 3, 0.0, breakaway_v};
   });
@@ -53,7 +57,7 @@ TEST(EncoderWatch, LetsACartRestBelowItsBreakaway) {
 }
 
 TEST(EncoderWatch, TakesABriefPulseOfAStrongVoltageForNoProof) {
-  EncoderWatch watch = default_watch();
+  EncoderWatch watch = ip02_watch();
   const double found_s = found_after_s(watch, 0.5, StuckEncoder::none, [](std::uint64_t tick) {
     return WatchedPeriod{0, 0.0, 7, 3, 0.0, tick == 10 ? 15.0 : 0.0};
   });
@@ -61,7 +65,7 @@ TEST(EncoderWatch, TakesABriefPulseOfAStrongVoltageForNoProof) {
 }
 
 TEST(EncoderWatch, FindsAPendulumThatDoesNotCountWhileTheCartIsShaken) {
-  EncoderWatch watch = default_watch();
+  EncoderWatch watch = ip02_watch();
   const double found_s = found_after_s(watch, 5.0, StuckEncoder::pendulum, [](std::uint64_t tick) {
     const double cart_m = 0.02 * std::sin(0.05 * static_cast<double>(tick));
     return WatchedPeriod{0, 0.0, static_cast<std::int64_t>(tick), 3, cart_m, 0.0};
@@ -70,7 +74,7 @@ TEST(EncoderWatch, FindsAPendulumThatDoesNotCountWhileTheCartIsShaken) {
 }
 
 TEST(EncoderWatch, LetsACartAccelerateEvenlyUnderAPendulumThatLeans) {
-  EncoderWatch watch = default_watch();
+  EncoderWatch watch = ip02_watch();
   const double found_s = found_after_s(watch, 2.0, StuckEncoder::none, [](std::uint64_t tick) {
     const double t = static_cast<double>(tick) * period_s;
     return WatchedPeriod{0, 0.0, static_cast<std::int64_t>(tick), 3, 0.3 * t + 0.25 * t * t, 0.0};
@@ -79,7 +83,7 @@ TEST(EncoderWatch, LetsACartAccelerateEvenlyUnderAPendulumThatLeans) {
 }
 
 TEST(EncoderWatch, ForgetsOnReset) {
-  EncoderWatch watch = default_watch();
+  EncoderWatch watch = ip02_watch();
   for (std::uint64_t tick = 0; tick < 5000; ++tick) {
     if (tick % 20 == 0) watch.reset();
     ASSERT_EQ(watch.step({tick, static_cast<double>(tick) * period_s, 7, 3, 0.0, 10.0}), StuckEncoder::none);
@@ -101,15 +105,51 @@ TEST(EncoderWatch, AssumesOfAPlantWhatItsEffectsImply) {
   EXPECT_GE(a.largest_lag_s, 1.5 * 0.010);
 }
 
+StatedAssumptions stated_in(const std::string& section) {
+  const YamlMap document = YamlMap::from_text("encoder_watch: " + section, "rig.yaml");
+  YamlKeyReader reader(document.map("encoder_watch"));
+  StatedAssumptions stated;
+  encoder_assumption_keys(reader, stated);
+  return stated;
+}
+
 TEST(EncoderWatch, ReadsBackItsAssumptions) {
-  EncoderAssumptions a;
+  EncoderAssumptions a = ip02;
   a.breakaway_v = {0.125, 0.75};
   a.largest_lag_s = 0.01;
-  const YamlMap document = YamlMap::from_text("encoder_watch: " + encoder_assumptions_text(a), "rig.yaml");
-  YamlKeyReader reader(document.map("encoder_watch"));
-  EncoderAssumptions again;
-  encoder_assumption_keys(reader, again);
+  const EncoderAssumptions again = encoder_assumptions(stated_in(encoder_assumptions_text(a)), 0.4);
   EXPECT_EQ(encoder_assumptions_text(again), encoder_assumptions_text(a));
+}
+
+TEST(EncoderWatch, NeedsBoundsOfCartAndPendulumWithoutAPlant) {
+  EXPECT_EQ(missing_assumptions({}), (std::vector<std::string>{"breakaway_v", "acceleration_mps2_per_v",
+                                                               "damping_v_per_mps", "longest_pendulum_m"}));
+  EXPECT_EQ(missing_assumptions(stated_in("{breakaway_v: {from: 1, to: 2}, damping_v_per_mps: 9}")),
+            (std::vector<std::string>{"acceleration_mps2_per_v", "longest_pendulum_m"}));
+  const StatedAssumptions enough = stated_in(
+      "{breakaway_v: {from: 1, to: 2}, acceleration_mps2_per_v: 3, damping_v_per_mps: 4, "
+      "longest_pendulum_m: 5}");
+  EXPECT_TRUE(missing_assumptions(enough).empty());
+  EXPECT_EQ(encoder_assumptions_text(encoder_assumptions(enough, 4.0)),
+            "{breakaway_v: {from: 1.0, to: 2.0}, largest_lag_s: 0.03, acceleration_mps2_per_v: 3.0, "
+            "damping_v_per_mps: 4.0, unseen_travel_m: 5e-04, longest_pendulum_m: 5.0, "
+            "pivot_friction_mps2: 0.1}");
+}
+
+TEST(EncoderWatch, WidensOnlyWhatAFileStates) {
+  const EncoderAssumptions wide = widened(ip02, stated_in("{largest_lag_s: 0.06, damping_v_per_mps: 2}"));
+  EncoderAssumptions expected = ip02;
+  expected.largest_lag_s = 0.06;
+  EXPECT_EQ(encoder_assumptions_text(wide), encoder_assumptions_text(expected));
+}
+
+TEST(EncoderWatch, AccusesNobodyWithoutAssumptions) {
+  EncoderWatch watch(EncoderAssumptions{}, m_per_count, rad_per_count);
+  const double found_s = found_after_s(watch, 20.0, StuckEncoder::none, [](std::uint64_t tick) {
+    const double cart_m = 0.02 * std::sin(0.05 * static_cast<double>(tick));
+    return WatchedPeriod{0, 0.0, 7, 3, cart_m, 15.0};
+  });
+  EXPECT_EQ(found_s, 20.0);
 }
 
 /// A cart and a pendulum that follow what the watch takes for granted: however the voltage goes, nobody is
@@ -118,7 +158,7 @@ TEST(EncoderWatch, NeverAccusesEncodersThatCount) {
   std::mt19937_64 random(5);
   std::normal_distribution<double> noise;
   for (int run = 0; run < 20; ++run) {
-    EncoderWatch watch = default_watch();
+    EncoderWatch watch = ip02_watch();
     double voltage = 0.0, velocity = 0.0, cart_m = 0.0, theta = 0.01, rate = 0.0;
     for (std::uint64_t tick = 0; tick < 20'000; ++tick) {
       constexpr double breakaway_v = 0.5, v_per_mps = 6.2, mps2_per_v = 1.58, length_m = 0.407;

@@ -125,7 +125,7 @@ RigFile rig_of(Backend backend) {
   rig.quanser.emplace().folder = "libraries";
   rig.gpio.emplace();
   rig.gpio->limit_switches.emplace_back();
-  rig.encoder_watch.emplace().breakaway_v.low = 0.0;
+  rig.encoder_watch.emplace();
   return rig;
 }
 

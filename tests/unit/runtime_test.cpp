@@ -212,9 +212,24 @@ TEST(SentenceOfAnEnd, SuspectsSignsOnlyOnARealRigThatNobodyChecked) {
 }
 
 TEST(RigLimits, KnowWhetherSomebodyCheckedTheSigns) {
-  EXPECT_FALSE(rig_limits(simulated_file(), std::nullopt).signs_unproven);
+  const RigFile simulated = simulated_file();
+  EXPECT_FALSE(rig_limits(simulated, read_plant_file(simulated.simulated->plant)).signs_unproven);
   const RigFile unchecked = read_rig_file(UPRIGHT_SOURCE_DIR "/config/rigs/modbus-tcp.yaml");
   EXPECT_TRUE(rig_limits(unchecked, std::nullopt).signs_unproven);
+}
+
+TEST(RigLimits, NeedBoundsForTheEncoderWatch) {
+  RigFile rig = read_rig_file(UPRIGHT_SOURCE_DIR "/config/rigs/modbus-tcp.yaml");
+  const Plant plant = read_plant_file(UPRIGHT_SOURCE_DIR "/config/plants/exponential.yaml");
+  rig.encoder_watch->longest_pendulum_m.reset();
+  EXPECT_GT(rig_limits(rig, plant).encoders.longest_pendulum_m, 0.3);
+  try {
+    rig_limits(rig, std::nullopt);
+    FAIL() << "accepted";
+  } catch (const ConfigError& error) {
+    EXPECT_TRUE(says(error.what(), "modbus-tcp.yaml: encoder_watch does not state longest_pendulum_m"))
+        << error.what();
+  }
 }
 
 TEST(SentenceOfAnEnd, AsksForRealTimeSchedulingOnlyWhereItWasNotGranted) {

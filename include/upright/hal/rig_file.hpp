@@ -124,7 +124,7 @@ struct RigFile {
   std::optional<QuanserRig> quanser;
   std::optional<GpioRig> gpio;
   std::shared_ptr<const BackendWiring> wiring;  ///< of any other backend; a rig has one at most
-  std::optional<EncoderAssumptions> encoder_watch;
+  std::optional<StatedAssumptions> encoder_watch;
 };
 
 /// Reads a rig file. Throws ConfigError with remedy, file, line and key.

@@ -22,10 +22,13 @@ std::uint64_t default_periods_late(double period_s);
 /// Throws ConfigError where the loop would poll the clock for too large a share of each period.
 void require_spin_fits(double spin_us, double period_s);
 
+/// Which bounds of the encoder watch a rig file lacks where no plant is known, in a sentence; empty: none.
+std::string gap_of_encoder_watch(const RigFile& rig);
+
 /// The limits of a run from a rig file: track, coast, fall, watchdog, the assumptions of the encoder
-/// watch (the union of the file's section `encoder_watch` and of what the rig's plant implies, where it
-/// is known), and whether the signs have been checked. The caller sets `periods`, `most_periods_late` and
-/// `delay_exceeded`.
+/// watch (what the rig's plant implies, where it is known, and the file's section `encoder_watch`), and
+/// whether the signs have been checked. The caller sets `periods`, `most_periods_late` and
+/// `delay_exceeded`. Throws ConfigError where the encoder watch lacks a bound.
 LoopLimits rig_limits(const RigFile& rig, const std::optional<Plant>& plant);
 
 struct SessionOptions {
