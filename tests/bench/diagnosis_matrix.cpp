@@ -172,8 +172,9 @@ void describe_diagnosis(const Diagnosis& d, json& record) {
                   {"confusable_with", effect.at("confusable_with")},
                   {"parameters", json::object()}};
     for (const auto& [name, p] : effect.at("parameters").items())
-      found["parameters"][name] = {
-          {"value", p.at("value")}, {"low", p.at("ci95").at(0)}, {"high", p.at("ci95").at(1)}};
+      if (p.contains("ci95"))
+        found["parameters"][name] = {
+            {"value", p.at("value")}, {"low", p.at("ci95").at(0)}, {"high", p.at("ci95").at(1)}};
     record["found"].push_back(found);
   }
   if (document.contains("helps_here_only")) record["helps_here_only"] = document.at("helps_here_only");
@@ -331,7 +332,8 @@ struct Going {
 
 Going start_case(const Flags& flags, std::size_t number, pid_t& child) {
   int ends[2];
-  if (pipe(ends) != 0) throw std::runtime_error("cannot make a pipe: close programs that have many files open");
+  if (pipe(ends) != 0)
+    throw std::runtime_error("cannot make a pipe: close programs that have many files open");
   child = fork();
   if (child < 0) throw std::runtime_error("cannot start a process: close other programs");
   if (child == 0) {

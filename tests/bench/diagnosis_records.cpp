@@ -32,6 +32,11 @@ bool is_in_declared_set(const json& r, const std::string& hidden) {
   return false;
 }
 
+/// A shape of the force in place of a name: it describes and names nothing.
+bool is_shape(const json& found) {
+  return found.at("kind") == "force_table";
+}
+
 /// A base parameter, or the number of an effect that the plant file has: both are a few percent off in every
 /// case.
 bool is_correction(const json& r, const json& found) {
@@ -133,8 +138,9 @@ bool names_both(const json& r) {
 
 std::size_t structural_effects(const json& r) {
   const json& found = found_in(r);
-  return static_cast<std::size_t>(std::count_if(
-      found.begin(), found.end(), [&](const json& effect) { return !is_correction(r, effect); }));
+  return static_cast<std::size_t>(std::count_if(found.begin(), found.end(), [&](const json& effect) {
+    return !is_correction(r, effect) && !is_shape(effect);
+  }));
 }
 
 bool names_a_structure(const json& r) {

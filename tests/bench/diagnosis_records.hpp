@@ -41,6 +41,7 @@ bool is_right_first(const nlohmann::json& record);
 /// The hidden effect is the first one named or declared not to be told from it.
 bool is_right_set(const nlohmann::json& record);
 bool names_both(const nlohmann::json& record);
+/// Effects that are named and are not corrections of a number of the plant file.
 std::size_t structural_effects(const nlohmann::json& record);
 bool names_a_structure(const nlohmann::json& record);
 /// The verdict says that something is there that no effect explains.

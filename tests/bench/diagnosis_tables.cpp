@@ -271,6 +271,8 @@ std::vector<Count> counts_of_effects() {
       {"a structural effect in addition to the right one",
        [](const json& r) { return shown_single(r) && is_right_first(r); }, structure(1)},
       {"unknown effect: a structural effect named", shown_unknown, structure(0)},
+      {"verdict described, with a known or no hidden effect", [](const json& r) { return !is_unknown(r); },
+       is_described},
       {"verdict explained or no_discrepancy (known or no hidden effect)",
        [](const json& r) { return !is_unknown(r); },
        [](const json& r) { return !is_failed(r) && !is_recognised(r); }},

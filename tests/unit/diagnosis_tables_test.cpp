@@ -73,6 +73,13 @@ TEST(MatrixTables, WhatHelpsInPlacesIsNotNamed) {
   EXPECT_NE(row(records, "false effect in cases").find("0.0 % (0 of 1)"), std::string::npos);
 }
 
+TEST(MatrixTables, AShapeIsNoName) {
+  Records records = {record(0, {}, "described")};
+  records[0]["found"].push_back(found("force_table"));
+  EXPECT_NE(row(records, "false effect in cases").find("0.0 % (0 of 1)"), std::string::npos);
+  EXPECT_NE(row(records, "verdict described").find("100.0 % (1 of 1)"), std::string::npos);
+}
+
 TEST(MatrixTables, DescribedCountsAsRecognised) {
   const Records records = {unknown(0, "described", 1.0), unknown(1, "described", 3.0),
                            unknown(2, "unexplained", 6.0), unknown(3, "explained", 1.0)};
