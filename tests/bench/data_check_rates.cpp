@@ -176,13 +176,13 @@ fs::path write(const Table& table, const fs::path& folder, const std::string& na
 Case case_of(std::uint64_t seed, std::size_t number) {
   std::vector<std::vector<std::string>> hidden = {{}, {}, {}};
   for (const EffectInfo& info : effect_registry()) hidden.push_back({std::string(info.kind)});
-  for (const std::string& kind : unknown_kinds()) hidden.push_back({kind});
+  for (const std::string& kind : unknown_kinds(Condition::quantized)) hidden.push_back({kind});
   Request request;
   request.seed = seed * 1000003 + number;
   for (int i = 0; i < 4; ++i) hidden.push_back(random_pair(request.seed + static_cast<std::uint64_t>(i)));
   request.hidden = hidden[number % hidden.size()];
   request.size = static_cast<Size>((number + number / hidden.size()) % 3);
-  request.disturbed = number % 4 == 3;
+  request.condition = number % 4 == 3 ? Condition::disturbed : Condition::quantized;
   request.runs = 2;
   return make_case(request);
 }

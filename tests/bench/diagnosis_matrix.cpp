@@ -1,46 +1,52 @@
 // The matrix: how often the diagnosis names the effect that is hidden in data from a rig that is not its
 // model.
 //
-//   diagnosis_matrix --cases N --out FILE.jsonl [--seed N] [--disturbed] [--only KIND] [--size
-//   weak|typical|strong]
-//                    [--runs N] [--jobs J] [--markdown FILE.md] [--keep DIR] [--case K]
+//   diagnosis_matrix --out FILE.jsonl --first N --count M [--seed N] [--disturbed | --laboratory]
+//                    [--only KIND] [--size weak|typical|strong] [--runs N] [--samples N] [--jobs J]
+//                    [--seconds S] [--timing]
+//   diagnosis_matrix --markdown FILE.md --records FILE.jsonl [--records FILE.jsonl ...]
+//   diagnosis_matrix --case K [--keep DIR] [...]
 //
-// Cases are numbered from 0 and follow from the seed and the number. Each runs in a process of its own and
-// appends one line to FILE.jsonl; what is there already is not run again, so that a matrix can be stopped and
+// Cases are numbered from 0 and follow from the seed and the number, so that pieces of a matrix can be run
+// anywhere: --first and --count choose them (--cases N: the first N). Each runs in a process of its own and
+// adds one line to FILE.jsonl; what is there already is not run again, so that a matrix can be stopped and
 // continued.
-// --markdown writes the tables of everything that is in FILE.jsonl (and, with it alone, runs nothing).
+// --seconds is the processor time that a diagnosis may take. A case that takes longer, or fails otherwise, is
+// a line too, and counts as missed. The judgement of the data may take ten times as long.
+// --markdown writes the tables of all records; a case that is in several files counts once.
 // --timing makes every case six runs of ten seconds at 500 Hz; with --jobs 1 their wall time is the figure of
-// the table.
+// the table. UPRIGHT_THREADS=1 keeps a case on one processor.
 // --case K with --keep DIR writes the plant file, the runs and the truth of one case, for `upright diagnose`.
 //
 // The diagnosis works as the command does: the runs are written as CSV and read again, and it sees nothing
-// else. What the data can show at all is measured here, apart from it, with fits that begin at the truth:
-// - visible: the true structure saves at least 25 of minus twice the log likelihood on all runs, compared
-// with
-//   the plant file with its own numbers refitted. Of effects that the registry lacks: the runs are at least
-//   20 percent further off (plain simulation) than the same runs without it.
-// - distinguishable: the effect is not the same force as the one named (docs/reference/effects.md), and the
-//   structure that was named instead fits worse than the true one by 16 or more.
+// else. diagnosis_judge.hpp says what "visible" and "distinguishable" mean; tests/blind says how cases are
+// made.
 #include <fcntl.h>
 #include <sys/resource.h>
+#include <sys/time.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <chrono>
-#include <cmath>
+#include <csignal>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <functional>
 #include <iostream>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <set>
 #include <sstream>
+#include <stdexcept>
+#include <string>
+#include <vector>
 
 #include "blind_case.hpp"
-#include "diagnosis/candidates.hpp"
+#include "diagnosis/diagnosis_json.hpp"
+#include "diagnosis_judge.hpp"
 #include "diagnosis_tables.hpp"
 #include "upright/base/error.hpp"
 #include "upright/diagnosis/diagnosis.hpp"
@@ -53,31 +59,31 @@ using namespace upright::blind;
 using nlohmann::json;
 namespace fs = std::filesystem;
 
-constexpr double shown_evidence = 25.0;
-constexpr double shown_ratio = 1.2;
+/// Processor time of the judgement of a case, relative to what its diagnosis may take.
+constexpr double judgement_share = 10.0;
 
 struct Flags {
   std::uint64_t seed = 1;
-  std::size_t cases = 0;
-  std::optional<std::size_t> one_case;
+  std::size_t first = 0, count = 0;
   std::string only, out, markdown, keep;
+  std::vector<std::string> records;
   std::optional<Size> size;
-  bool disturbed = false;
+  Condition condition = Condition::quantized;
   int runs = 0, jobs = 1;
   double most_samples = 12000.0;
   bool timing = false;
   double most_seconds = 900.0;
 };
 
-/// One round: every effect of the registry once, six rigs with nothing hidden, eight pairs, each unknown
-/// twice.
-std::vector<std::string> round_of_labels() {
-  std::vector<std::string> labels;
-  for (const EffectInfo& info : effect_registry()) labels.emplace_back(info.kind);
-  for (int i = 0; i < 6; ++i) labels.emplace_back("none");
-  for (int i = 0; i < 8; ++i) labels.emplace_back("pair");
+/// One round: every effect of the registry once, rigs with nothing hidden, eight pairs, each unknown twice.
+/// Of 1000 cases of a laboratory, more than 300 have nothing hidden.
+std::vector<std::string> round_of_labels(Condition condition) {
+  std::vector<std::string> labels = hidden_kinds();
+  const std::size_t nulls = condition == Condition::laboratory ? 28 : 6;
+  labels.insert(labels.end(), nulls, "none");
+  labels.insert(labels.end(), 8, "pair");
   for (int i = 0; i < 2; ++i)
-    for (const std::string& kind : unknown_kinds()) labels.push_back(kind);
+    for (const std::string& kind : unknown_kinds(condition)) labels.push_back(kind);
   // Spread over the round, so that the first cases are as varied as all.
   std::vector<std::string> spread;
   constexpr std::size_t stride = 13;
@@ -87,13 +93,13 @@ std::vector<std::string> round_of_labels() {
 }
 
 Request request_of(const Flags& flags, std::size_t number, std::string& label) {
-  static const std::vector<std::string> labels = round_of_labels();
+  static const std::vector<std::string> labels = round_of_labels(flags.condition);
   const std::size_t round = number / labels.size();
   label = flags.only.empty() ? labels[number % labels.size()] : flags.only;
   Request request;
   request.seed = flags.seed * 1000003 + number;
   request.size = flags.size.value_or(static_cast<Size>((number + round) % 3));
-  request.disturbed = flags.disturbed;
+  request.condition = flags.condition;
   request.runs = flags.runs;
   request.most_samples = flags.most_samples;
   if (flags.timing) {
@@ -141,107 +147,6 @@ std::vector<Measurement> through_files(const std::vector<Measurement>& runs, con
   return read_measurements(written);
 }
 
-/// How much larger a base parameter of `start` is than the believed one, as the effect that corrects it says
-/// it.
-double base_scale(const Plant& believed, const Plant& start, const std::string& kind) {
-  if (kind == "cart_mass") return start.cart_mass_kg / believed.cart_mass_kg;
-  if (kind == "back_emf" && believed.motor.back_emf_n_per_mps > 0.0)
-    return start.motor.back_emf_n_per_mps / believed.motor.back_emf_n_per_mps;
-  if (kind == "pendulum_mass" && believed.pendulum)
-    return start.pendulum->mass_kg / believed.pendulum->mass_kg;
-  if (kind == "pendulum_length" && believed.pendulum)
-    return start.pendulum->length_to_com_m / believed.pendulum->length_to_com_m;
-  return effect_registry()[effect_number(kind)].parameters[0].neutral;
-}
-
-/// From what the sensors show to what is.
-void unscale(const Plant& plant, PlantState<double>& state) {
-  const auto value = [&](const char* kind, double neutral) {
-    const PlantEffect* effect = plant.find(kind);
-    return effect != nullptr ? effect->values[0] : neutral;
-  };
-  const double cart = value("cart_scale", 1.0), angle = value("angle_scale", 1.0);
-  state.cart_m /= cart;
-  state.cart_mps /= cart;
-  state.theta_rad = (state.theta_rad - value("angle_offset", 0.0)) / angle;
-  state.theta_radps /= angle;
-}
-
-/// A structure fitted to all runs, from the numbers of `start`: everything the plant file has within what is
-/// believed of it, these effects free.
-FitResult fit_structure(const std::vector<Measurement>& runs, const Plant& believed, const Plant& start,
-                        const std::vector<std::size_t>& effects, const Noise& noise) {
-  const SelectionPolicy policy;
-  const DataRange range = range_of(runs, believed, policy.excitation);
-  FitData data{&runs, cut_segments(runs)};
-  FitPoint point{believed, {}, noise};
-  std::vector<FreeParameter> free;
-  const auto include = [&](const std::vector<FreeParameter>& more) {
-    free.insert(free.end(), more.begin(), more.end());
-  };
-  const auto added = [&](std::size_t effect) {
-    return std::find(effects.begin(), effects.end(), effect) != effects.end();
-  };
-  for (const PlantEffect& effect : believed.effects) {
-    if (added(effect.number)) continue;
-    if (const PlantEffect* from = start.find(effect.number)) point.plant.set(effect.number, from->values);
-    include(correction_parameters(believed, effect.number, range, policy.prior));
-  }
-  for (const std::size_t effect : base_corrections(believed, range)) {
-    point.plant.set(effect, std::vector<double>{base_scale(believed, start, kind_of(effect))});
-    if (!added(effect)) include(correction_parameters(believed, effect, range, policy.prior));
-  }
-  for (const std::size_t effect : effects) {
-    if (const PlantEffect* from = start.find(effect)) point.plant.set(effect, from->values);
-    include(free_parameters(effect, range, policy.prior));
-  }
-  point.starts = estimate_initial_states(runs, data.segments, point.plant);
-  for (PlantState<double>& state : point.starts) unscale(point.plant, state);
-  // To convergence: a fit that stops early would pass for a structure that fits worse.
-  FitOptions options;
-  options.max_iterations = 40;
-  options.noise_rounds = 8;
-  options.tolerance = 1e-6;
-  FitResult best = fit(data, point, free, options);
-  // A wrong start and much noise can hold each other up; from little noise the way is another.
-  point = best.point;
-  point.noise.force *= 0.1;
-  point.noise.torque *= 0.1;
-  const FitResult again = fit(data, point, free, options);
-  return again.objective < best.objective ? again : best;
-}
-
-/// Root mean square of a plain simulation of these runs, in units of the sensors' noise.
-double plain_rms(const std::vector<Measurement>& runs, const Plant& plant,
-                 const std::vector<std::size_t>& which) {
-  FitData data{&runs, {}};
-  for (const Segment& segment : cut_segments(runs))
-    if (std::find(which.begin(), which.end(), segment.run) != which.end()) data.segments.push_back(segment);
-  if (data.segments.empty()) return 0.0;
-  return whitened_rms(
-      fit_initial_states(data, {plant, estimate_initial_states(runs, data.segments, plant), {}}));
-}
-
-std::vector<std::size_t> all_runs(const std::vector<Measurement>& runs) {
-  std::vector<std::size_t> which;
-  for (std::size_t r = 0; r < runs.size(); ++r) which.push_back(r);
-  return which;
-}
-
-/// Effects that are exactly the same force as this one in the true plant (docs/reference/effects.md).
-std::vector<std::string> same_force(const std::string& kind, const Plant& truth) {
-  if (kind == "viscous_friction") return {"back_emf"};
-  if (kind == "back_emf") return {"viscous_friction"};
-  if (kind == "constant_force") return {"voltage_offset", "friction_asymmetry"};
-  if (kind == "voltage_offset") return {"constant_force", "friction_asymmetry"};
-  if (kind == "friction_asymmetry") {
-    const PlantEffect* coulomb = truth.find("coulomb_friction");
-    const double d = truth.find(kind)->values[0];
-    if (coulomb != nullptr && coulomb->values[0] > std::abs(d)) return {"constant_force", "voltage_offset"};
-  }
-  return {};
-}
-
 json values_json(std::size_t effect, const std::vector<double>& values) {
   json result = json::object();
   const EffectInfo& info = effect_registry()[effect];
@@ -250,85 +155,79 @@ json values_json(std::size_t effect, const std::vector<double>& values) {
   return result;
 }
 
+/// From the document that the program writes, so that it counts what a user reads: an effect that is listed
+/// as helping at some places only is not named.
 void describe_diagnosis(const Diagnosis& d, json& record) {
-  record["verdict"] = std::string(name_of(d.verdict));
-  record["gap_before"] = d.gap_before;
-  record["gap_after"] = d.gap_after;
-  record["residual"] = d.residual;
+  const json document = diagnosis_json(d);
+  record["verdict"] = document.at("verdict");
+  record["gap_before"] = document.at("gap").at("before");
+  record["gap_after"] = document.at("gap").at("after");
+  record["residual"] = document.at("residual");
+  record["bound_reached"] = document.value("bound_reached", false);
   record["found"] = json::array();
-  for (const FoundEffect& effect : d.effects) {
-    json found = {{"kind", kind_of(effect.effect)},
-                  {"enters", std::string(name_of(effect_registry()[effect.effect].enters))},
-                  {"gap_after", effect.gap_after},
-                  {"confusable_with", json::array()},
+  for (const json& effect : document.at("effects")) {
+    json found = {{"kind", effect.at("kind")},
+                  {"enters", effect.at("enters")},
+                  {"gap_after", effect.at("gap_after")},
+                  {"confusable_with", effect.at("confusable_with")},
                   {"parameters", json::object()}};
-    for (const std::size_t other : effect.indistinguishable_from)
-      found["confusable_with"].push_back(kind_of(other));
-    for (const ParameterEstimate& p : effect.parameters)
-      found["parameters"][p.name] = {{"value", p.value}, {"low", p.low}, {"high", p.high}};
+    for (const auto& [name, p] : effect.at("parameters").items())
+      if (p.contains("ci95"))
+        found["parameters"][name] = {
+            {"value", p.at("value")}, {"low", p.at("ci95").at(0)}, {"high", p.at("ci95").at(1)}};
     record["found"].push_back(found);
   }
+  if (document.contains("helps_here_only")) record["helps_here_only"] = document.at("helps_here_only");
   record["candidates"] = json::array();
-  for (std::size_t i = 0; i < std::min<std::size_t>(5, d.candidates.size()); ++i)
-    record["candidates"].push_back({kind_of(d.candidates[i].effect), d.candidates[i].evidence});
-}
-
-/// What the data can show, by fits that begin at the truth.
-void judge_data(const Case& blind, const std::vector<Measurement>& runs, const Diagnosis& d, json& record) {
-  const Noise noise = {.force = 0.05, .torque = 0.002};
-  const FitResult base = fit_structure(runs, blind.believed, blind.believed, {}, noise);
-  std::vector<std::size_t> hidden;
-  for (const HiddenEffect& effect : blind.hidden) hidden.push_back(effect.effect);
-  if (blind.rig.unknown != Unknown::none) {
-    Case without = blind;
-    without.rig.unknown = Unknown::none;
-    const double quiet = plain_rms(measure_all(without), blind.rig.plant, all_runs(runs));
-    const double with = plain_rms(runs, blind.rig.plant, all_runs(runs));
-    record["further_off"] = with / quiet;
-    record["shown"] = with / quiet > shown_ratio;
-    return;
+  for (const json& candidate : document.at("candidates")) {
+    if (record["candidates"].size() == 5) break;
+    record["candidates"].push_back({candidate.at("kind"), candidate.at("evidence")});
   }
-  if (hidden.empty()) return;
-  const FitResult truth = fit_structure(runs, blind.believed, blind.rig.plant, hidden, base.point.noise);
-  double evidence = base.objective - truth.objective;
-  record["evidence"] = evidence;
-  if (hidden.size() == 2)
-    for (const std::size_t effect : hidden)
-      evidence = std::min(
-          evidence,
-          fit_structure(runs, blind.believed, blind.rig.plant, {effect}, base.point.noise).objective -
-              truth.objective);
-  record["least_evidence"] = evidence;
-  record["shown"] = evidence > shown_evidence;
-  if (hidden.size() != 1) return;
-  record["same_force"] = same_force(kind_of(hidden[0]), blind.rig.plant);
-  if (d.effects.empty() || d.effects[0].effect == hidden[0]) return;
-  const FitResult named =
-      fit_structure(runs, blind.believed, d.model, {d.effects[0].effect}, base.point.noise);
-  record["worse_if_named"] = named.objective - truth.objective;
 }
 
-void judge_gap(const Case& blind, const std::vector<Measurement>& runs, const Diagnosis& d, json& record) {
-  const std::vector<std::size_t> held = d.held_out_runs.empty() ? all_runs(runs) : d.held_out_runs;
-  const double truth = plain_rms(runs, blind.rig.plant, held);
-  record["plain_truth"] = truth;
-  record["plain_before"] = plain_rms(runs, blind.believed, held);
-  record["plain_after"] = plain_rms(runs, d.model, held);
-  record["over_floor"] = record["plain_after"].get<double>() / truth;
-}
-
-json describe_case(const Case& blind, const std::string& label, std::size_t number, const Flags& flags) {
+/// What a record says of a case without making it.
+json describe_request(const Flags& flags, std::size_t number) {
+  std::string label;
+  const Request request = request_of(flags, number, label);
   json record = {{"case", number},
                  {"seed", flags.seed},
                  {"label", label},
-                 {"size", std::string(name_of(blind.request.size))},
-                 {"disturbed", blind.request.disturbed},
-                 {"campaign", blind.campaign},
-                 {"rate_hz", blind.plans.front().rate_hz},
-                 {"hidden", json::array()},
-                 {"truth", json::object()},
-                 {"experiments", json::array()}};
-  for (const std::string& kind : blind.request.hidden) record["hidden"].push_back(kind);
+                 {"size", std::string(name_of(request.size))},
+                 {"condition", std::string(name_of(request.condition))},
+                 {"disturbed", request.condition == Condition::disturbed},
+                 {"hidden", request.hidden}};
+  if (!flags.only.empty()) record["only"] = flags.only;
+  if (flags.timing) record["timing"] = true;
+  return record;
+}
+
+void describe_rig(const Case& blind, json& record) {
+  record["cart_mass_kg"] = blind.believed.cart_mass_kg;
+  record["cart_step_m"] = blind.rig.cart_step_m;
+  record["jitter_s"] = blind.rig.jitter_s;
+  record["actual_times"] = blind.rig.actual_times;
+  if (blind.request.condition != Condition::laboratory) return;
+  const ColouredDisturbance& coloured = blind.rig.coloured;
+  record["coloured"] = {{"force_n", coloured.force_n},
+                        {"force_time_s", coloured.force_time_s},
+                        {"torque_nm", coloured.torque_nm},
+                        {"torque_time_s", coloured.torque_time_s},
+                        {"speed_mps", coloured.speed_mps}};
+  record["rough_n"] = blind.rig.rough_n;
+  record["rough_length_m"] = blind.rig.rough_length_m;
+  record["cart_noise_m"] = blind.rig.cart_noise_m;
+  record["theta_noise_rad"] = blind.rig.theta_noise_rad;
+  record["noise_colour"] = blind.rig.noise_colour;
+  record["unknown_size"] = blind.rig.unknown_size;
+  record["unknown_period"] = blind.rig.unknown_period;
+}
+
+void describe_case(const Case& blind, json& record) {
+  record["campaign"] = blind.campaign;
+  record["rate_hz"] = blind.plans.front().rate_hz;
+  record["unknown"] = blind.rig.unknown != Unknown::none;
+  record["truth"] = json::object();
+  record["experiments"] = json::array();
   for (const HiddenEffect& effect : blind.hidden)
     record["truth"][kind_of(effect.effect)] = values_json(effect.effect, effect.values);
   double seconds = 0.0;
@@ -342,12 +241,10 @@ json describe_case(const Case& blind, const std::string& label, std::size_t numb
   record["seconds_of_data"] = seconds;
   record["gaps"] = gaps;
   record["falls"] = falls;
-  record["actual_times"] = blind.rig.actual_times;
-  record["jitter_s"] = blind.rig.jitter_s;
   record["known_effects"] = json::array();
   for (const PlantEffect& effect : blind.believed.effects)
     record["known_effects"].push_back(kind_of(effect.number));
-  return record;
+  describe_rig(blind, record);
 }
 
 double cpu_seconds() {
@@ -359,11 +256,26 @@ double cpu_seconds() {
   return seconds(usage.ru_utime) + seconds(usage.ru_stime);
 }
 
-json run_case(const Flags& flags, std::size_t number) {
+/// From here on the process may take this much processor time.
+void limit_processor_time(double seconds) {
+  const auto whole = static_cast<time_t>(seconds);
+  const itimerval timer{{}, {whole, static_cast<suseconds_t>(1e6 * (seconds - static_cast<double>(whole)))}};
+  setitimer(ITIMER_PROF, &timer, nullptr);
+}
+
+/// Sends what is known of a case to the process that waits for it.
+void send(int to, json record, const char* stage) {
+  if (stage != nullptr) record["stage"] = stage;
+  const std::string line = record.dump() + "\n";
+  if (write(to, line.data(), line.size()) != static_cast<ssize_t>(line.size())) _exit(1);
+}
+
+void run_case(const Flags& flags, std::size_t number, int to) {
   std::string label;
-  const Request request = request_of(flags, number, label);
-  const Case blind = make_case(request);
-  json record = describe_case(blind, label, number, flags);
+  json record = describe_request(flags, number);
+  send(to, record, "simulation");
+  const Case blind = make_case(request_of(flags, number, label));
+  describe_case(blind, record);
   const fs::path folder = flags.keep.empty()
                               ? fs::temp_directory_path() / ("diagnosis-matrix-" + std::to_string(getpid()))
                               : fs::path(flags.keep);
@@ -375,15 +287,21 @@ json run_case(const Flags& flags, std::size_t number) {
   } else {
     fs::remove_all(folder);
   }
+  send(to, record, "judgement of the data");
+  const DataJudgement data = judge_data(blind, runs, record);
+  send(to, record, "diagnosis");
+  limit_processor_time(flags.most_seconds);
   const double cpu_before = cpu_seconds();
   const auto begin = std::chrono::steady_clock::now();
   const Diagnosis d = diagnose(blind.believed, runs);
   record["wall_s"] = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   record["cpu_s"] = cpu_seconds() - cpu_before;
+  limit_processor_time(judgement_share * flags.most_seconds);
   describe_diagnosis(d, record);
-  judge_data(blind, runs, d, record);
+  send(to, record, "judgement of the diagnosis");
+  judge_name(blind, runs, data, d, record);
   judge_gap(blind, runs, d, record);
-  return record;
+  send(to, record, nullptr);
 }
 
 void append_line(const std::string& file, const std::string& line) {
@@ -394,60 +312,86 @@ void append_line(const std::string& file, const std::string& line) {
   close(out);
 }
 
-std::string key_of(const json& record) {
-  return record.at("seed").dump() + "/" + record.at("case").dump() + "/" + record.at("disturbed").dump() +
-         "/" + record.value("only", "");
+void run_in_child(const Flags& flags, std::size_t number, int to) {
+  limit_processor_time(judgement_share * flags.most_seconds);
+  try {
+    run_case(flags, number, to);
+  } catch (const std::exception& problem) {
+    json record = describe_request(flags, number);
+    record["failed"] = problem.what();
+    send(to, record, nullptr);
+  }
+  _exit(0);
 }
 
-void run_in_child(const Flags& flags, std::size_t number) {
-  alarm(static_cast<unsigned>(flags.most_seconds));
-  json record;
-  try {
-    record = run_case(flags, number);
-  } catch (const std::exception& problem) {
-    std::string label;
-    request_of(flags, number, label);
-    record = {{"case", number},
-              {"seed", flags.seed},
-              {"label", label},
-              {"disturbed", flags.disturbed},
-              {"failed", problem.what()}};
+/// A process that works on a case, and what it sends.
+struct Going {
+  std::size_t number = 0;
+  int from = -1;
+};
+
+Going start_case(const Flags& flags, std::size_t number, pid_t& child) {
+  int ends[2];
+  if (pipe(ends) != 0)
+    throw std::runtime_error("cannot make a pipe: close programs that have many files open");
+  child = fork();
+  if (child < 0) throw std::runtime_error("cannot start a process: close other programs");
+  if (child == 0) {
+    close(ends[0]);
+    run_in_child(flags, number, ends[1]);
   }
-  if (!flags.only.empty()) record["only"] = flags.only;
-  if (flags.timing) record["timing"] = true;
+  close(ends[1]);
+  return {number, ends[0]};
+}
+
+/// The last whole line that a case sent: complete, or with the reason why it is not. All of it fits into the
+/// buffer of a pipe.
+json result_of(const Flags& flags, const Going& going, int status) {
+  std::string text;
+  char buffer[4096];
+  for (ssize_t n = 0; (n = read(going.from, buffer, sizeof buffer)) > 0;)
+    text.append(buffer, static_cast<std::size_t>(n));
+  close(going.from);
+  json record = describe_request(flags, going.number);
+  std::istringstream lines(text);
+  for (std::string line; std::getline(lines, line);) {
+    json sent = json::parse(line, nullptr, false);
+    if (!sent.is_discarded()) record = std::move(sent);
+  }
+  if (status == 0 && !record.contains("stage")) return record;
+  const std::string stage = record.value("stage", "start");
+  const bool late = WIFSIGNALED(status) && WTERMSIG(status) == SIGPROF;
+  record["failed"] = stage + (late ? " took too long" : " ended with status " + std::to_string(status));
+  record["out_of_time"] = late;
+  return record;
+}
+
+void report(const Flags& flags, const json& record) {
   if (flags.out.empty()) {
     std::cout << record.dump(2) << std::endl;
   } else {
     append_line(flags.out, record.dump());
   }
-  _exit(0);
 }
 
 void run_matrix(const Flags& flags) {
   std::set<std::string> done;
-  for (const json& record : read_records(flags.out)) done.insert(key_of(record));
-  std::vector<std::size_t> open_cases;
-  for (std::size_t k = flags.one_case.value_or(0); k < (flags.one_case ? *flags.one_case + 1 : flags.cases);
-       ++k) {
-    const json key = {
-        {"seed", flags.seed}, {"case", k}, {"disturbed", flags.disturbed}, {"only", flags.only}};
-    if (flags.out.empty() || !done.contains(key_of(key))) open_cases.push_back(k);
-  }
-  std::map<pid_t, std::size_t> going;
+  for (const json& record : read_records({flags.out})) done.insert(key_of(record));
+  std::map<pid_t, Going> working;
   const auto wait_for_one = [&] {
     int status = 0;
-    const pid_t child = wait(&status);
-    if (status != 0)
-      std::fprintf(stderr, "case %zu ended with status %d (a signal or out of time)\n", going[child], status);
-    going.erase(child);
+    const auto ended = working.find(wait(&status));
+    report(flags, result_of(flags, ended->second, status));
+    working.erase(ended);
   };
-  for (const std::size_t number : open_cases) {
-    if (going.size() >= static_cast<std::size_t>(flags.jobs)) wait_for_one();
-    const pid_t child = fork();
-    if (child == 0) run_in_child(flags, number);
-    going[child] = number;
+  for (std::size_t number = flags.first; number < flags.first + flags.count; ++number) {
+    if (!flags.out.empty() && done.contains(key_of(describe_request(flags, number)))) continue;
+    if (working.size() >= static_cast<std::size_t>(flags.jobs)) wait_for_one();
+    pid_t child = 0;
+    const Going going = start_case(flags, number, child);
+    working[child] = going;
   }
-  while (!going.empty()) wait_for_one();
+  while (!working.empty()) wait_for_one();
 }
 
 Size size_named(const std::string& text) {
@@ -456,44 +400,53 @@ Size size_named(const std::string& text) {
   throw ConfigError("give --size weak, typical or strong");
 }
 
+/// A flag without a value.
+bool is_switch(const std::string& name, Flags& flags) {
+  if (name == "--timing") {
+    flags.timing = true;
+  } else if (name == "--disturbed") {
+    flags.condition = Condition::disturbed;
+  } else if (name == "--laboratory") {
+    flags.condition = Condition::laboratory;
+  } else {
+    return false;
+  }
+  return true;
+}
+
 Flags parse(int argc, char** argv) {
   Flags flags;
+  const std::map<std::string, std::function<void(const std::string&)>> options = {
+      {"--seed", [&](const std::string& value) { flags.seed = std::stoull(value); }},
+      {"--first", [&](const std::string& value) { flags.first = std::stoull(value); }},
+      {"--count", [&](const std::string& value) { flags.count = std::stoull(value); }},
+      {"--cases", [&](const std::string& value) { flags.count = std::stoull(value); }},
+      {"--case",
+       [&](const std::string& value) {
+         flags.first = std::stoull(value);
+         flags.count = 1;
+       }},
+      {"--only", [&](const std::string& value) { flags.only = value; }},
+      {"--size", [&](const std::string& value) { flags.size = size_named(value); }},
+      {"--runs", [&](const std::string& value) { flags.runs = std::stoi(value); }},
+      {"--jobs", [&](const std::string& value) { flags.jobs = std::max(1, std::stoi(value)); }},
+      {"--samples", [&](const std::string& value) { flags.most_samples = std::stod(value); }},
+      {"--seconds", [&](const std::string& value) { flags.most_seconds = std::stod(value); }},
+      {"--out", [&](const std::string& value) { flags.out = value; }},
+      {"--records", [&](const std::string& value) { flags.records.push_back(value); }},
+      {"--markdown", [&](const std::string& value) { flags.markdown = value; }},
+      {"--keep", [&](const std::string& value) { flags.keep = value; }},
+  };
   for (int i = 1; i < argc; ++i) {
     const std::string name = argv[i];
-    if (name == "--disturbed" || name == "--timing") {
-      (name == "--timing" ? flags.timing : flags.disturbed) = true;
-      continue;
-    }
-    if (i + 1 >= argc) throw ConfigError("give a value after " + name);
-    const std::string value = argv[++i];
-    if (name == "--seed") {
-      flags.seed = std::stoull(value);
-    } else if (name == "--cases") {
-      flags.cases = std::stoull(value);
-    } else if (name == "--case") {
-      flags.one_case = std::stoull(value);
-    } else if (name == "--only") {
-      flags.only = value;
-    } else if (name == "--size") {
-      flags.size = size_named(value);
-    } else if (name == "--runs") {
-      flags.runs = std::stoi(value);
-    } else if (name == "--jobs") {
-      flags.jobs = std::max(1, std::stoi(value));
-    } else if (name == "--samples") {
-      flags.most_samples = std::stod(value);
-    } else if (name == "--seconds") {
-      flags.most_seconds = std::stod(value);
-    } else if (name == "--out") {
-      flags.out = value;
-    } else if (name == "--markdown") {
-      flags.markdown = value;
-    } else if (name == "--keep") {
-      flags.keep = value;
-    } else {
+    if (is_switch(name, flags)) continue;
+    const auto option = options.find(name);
+    if (option == options.end())
       throw ConfigError("read the top of tests/bench/diagnosis_matrix.cpp: there is no option " + name);
-    }
+    if (i + 1 >= argc) throw ConfigError("give a value after " + name);
+    option->second(argv[++i]);
   }
+  if (!flags.out.empty()) flags.records.push_back(flags.out);
   return flags;
 }
 
@@ -502,8 +455,8 @@ Flags parse(int argc, char** argv) {
 int main(int argc, char** argv) {
   try {
     const Flags flags = parse(argc, argv);
-    if (flags.cases > 0 || flags.one_case) run_matrix(flags);
-    if (!flags.markdown.empty()) std::ofstream(flags.markdown) << tables_of(read_records(flags.out));
+    run_matrix(flags);
+    if (!flags.markdown.empty()) std::ofstream(flags.markdown) << tables_of(read_records(flags.records));
     return 0;
   } catch (const std::exception& problem) {
     std::fprintf(stderr, "%s\n", problem.what());

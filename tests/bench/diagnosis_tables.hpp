@@ -1,16 +1,17 @@
 // The figures of a diagnosis matrix as Markdown, from the records that diagnosis_matrix appends.
 #pragma once
 
-#include <nlohmann/json.hpp>
 #include <string>
-#include <vector>
+
+#include "diagnosis_records.hpp"
 
 namespace upright::blind {
 
-/// Every whole line of a file of JSON lines; a last line that was cut off is left out.
-std::vector<nlohmann::json> read_records(const std::string& file);
+/// One-sided 95 percent bounds of a share (Clopper and Pearson).
+double share_upper_bound(double hits, double count);
+double share_lower_bound(double hits, double count);
 
 /// The table of figures beside what must hold, what was missed, and the confusion matrix.
-std::string tables_of(const std::vector<nlohmann::json>& records);
+std::string tables_of(const Records& records);
 
 }  // namespace upright::blind

@@ -5,8 +5,9 @@
 #include <numbers>
 #include <random>
 
+#include "coloured_noise.hpp"
+#include "extra_forces.hpp"
 #include "upright/control/controller.hpp"
-#include "upright/sim/cvode_engine.hpp"
 #include "upright/sim/simulator.hpp"
 
 namespace upright::blind {
@@ -15,112 +16,29 @@ namespace {
 
 constexpr double pi = std::numbers::pi;
 constexpr double amplifier_limit_v = 10.0;
-/// How often forces that vary with time are given a new value.
-constexpr double force_step_s = 1e-3;
 
+/// A step of 0: a sensor without quantisation.
 double quantised(double value, double step) {
-  return step * std::round(value / step);
+  return step > 0.0 ? step * std::round(value / step) : value;
 }
 
-/// Forces on the cart that no plant file has, every `force_step_s`.
-class Extra {
+/// Noise of one sensor, white and coloured.
+class SensorNoise {
  public:
-  Extra(const Rig& rig, const Plan& plan) : rig_(rig) {
-    const auto steps = static_cast<std::size_t>(plan.duration_s / force_step_s) + 16;
-    force_.assign(steps, 0.0);
-    std::mt19937_64 random(plan.seed * 7919 + 1);
-    add_disturbance(random);
-    if (rig.unknown == Unknown::gusts) add_gusts(random);
-  }
+  SensorNoise(double white, double coloured, double kept, std::uint64_t seed)
+      : white_(white), random_(seed), coloured_(coloured, kept, random_) {}
 
-  bool varies() const { return rig_.disturbance_n > 0.0 || rig_.unknown == Unknown::gusts || warms(); }
-
-  Plant plant_at(double time_s) const {
-    Plant plant = rig_.plant;
-    const auto k =
-        std::min(static_cast<std::size_t>(std::max(time_s, 0.0) / force_step_s + 0.5), force_.size() - 1);
-    if (force_[k] != 0.0) add(plant, "constant_force", force_[k]);
-    if (warms())
-      add(plant, "coulomb_friction", rig_.warming_force_n * std::exp(-time_s / rig_.warming_time_s));
-    return plant;
+  double next() {
+    const double value = coloured_.value() + white_ * normal_(random_);
+    coloured_.step(random_);
+    return value;
   }
 
  private:
-  bool warms() const { return rig_.unknown == Unknown::warming_friction; }
-
-  static void add(Plant& plant, std::string_view kind, double force_n) {
-    const PlantEffect* have = plant.find(kind);
-    plant.set(kind, {force_n + (have != nullptr ? have->values[0] : 0.0)});
-  }
-
-  void add_disturbance(std::mt19937_64& random) {
-    std::normal_distribution<double> normal;
-    constexpr double bandwidth_radps = 2.0 * pi * 10.0;
-    const double kept = std::exp(-bandwidth_radps * force_step_s);
-    double force = rig_.disturbance_n * normal(random);
-    for (double& f : force_) {
-      f = force;
-      force = kept * force + rig_.disturbance_n * std::sqrt(1.0 - kept * kept) * normal(random);
-    }
-  }
-
-  /// About one every two seconds, 0.1 to 0.4 s long, either way.
-  void add_gusts(std::mt19937_64& random) {
-    std::exponential_distribution<double> wait(0.5);
-    std::uniform_real_distribution<double> length(0.1, 0.4), size(0.5, 1.5);
-    std::bernoulli_distribution forward(0.5);
-    for (double t = wait(random); t < force_step_s * static_cast<double>(force_.size()); t += wait(random)) {
-      const double duration = length(random);
-      const double peak = (forward(random) ? 1.0 : -1.0) * size(random) * rig_.gust_force_n;
-      for (double u = 0.0; u < duration; u += force_step_s) {
-        const auto k = static_cast<std::size_t>((t + u) / force_step_s);
-        if (k < force_.size()) force_[k] += peak * std::pow(std::sin(pi * u / duration), 2);
-      }
-    }
-  }
-
-  const Rig& rig_;
-  std::vector<double> force_;
-};
-
-/// The reference engine on a plant that changes from millisecond to millisecond.
-class VaryingEngine {
- public:
-  VaryingEngine(const PlantModel<double>& model, const EngineOptions& options)
-      : locked_(model.cart_locked), options_(options), engine_(model, options) {}
-
-  void vary(const Extra* extra) { extra_ = extra; }
-
-  void start(const PlantState<double>& state, double time_s, double volts) {
-    engine_.start(state, time_s, volts);
-  }
-
-  void advance(double duration_s, double volts) {
-    if (extra_ == nullptr) return engine_.advance(duration_s, volts);
-    const double end_s = engine_.time_s() + duration_s;
-    while (end_s - engine_.time_s() > 1e-12) {
-      const double now_s = engine_.time_s();
-      const double cell = std::floor(now_s / force_step_s + 1e-6);
-      if (cell != cell_) {
-        cell_ = cell;
-        const PlantState<double> state = engine_.state();
-        engine_ = CvodeEngine(make_model<double>(extra_->plant_at(now_s), locked_), options_);
-        engine_.start(state, now_s, volts);
-      }
-      engine_.advance(std::min(end_s, (cell + 1.0) * force_step_s) - now_s, volts);
-    }
-  }
-
-  const Dynamics<double>& dynamics() const { return engine_.dynamics(); }
-  const PlantState<double>& state() const { return engine_.state(); }
-  Outputs<double> outputs() const { return engine_.outputs(); }
-
- private:
-  bool locked_;
-  EngineOptions options_;
-  CvodeEngine engine_;
-  const Extra* extra_ = nullptr;
-  double cell_ = -1.0;
+  double white_;
+  std::mt19937_64 random_;
+  std::normal_distribution<double> normal_;
+  GaussMarkov coloured_;
 };
 
 /// The voltages of a plan, from what the encoders show.
@@ -134,7 +52,7 @@ class Driver {
       frequencies_hz_[i] = 0.2 * std::pow(1.87, static_cast<double>(i)) * stretch(random_);
     }
     period_s_ = std::uniform_real_distribution<double>(0.7, 1.5)(random_);
-    set_point_m_ = std::uniform_real_distribution<double>(0.03, 0.08)(random_);
+    set_point_m_ = plan.reach * std::uniform_real_distribution<double>(0.03, 0.08)(random_);
   }
 
   double volts(std::size_t k, double t, double cart_m, double theta_rad) {
@@ -186,10 +104,11 @@ class Driver {
 
   /// A voltage for a while, then none, then the other way; earlier where the track would end.
   double constant(double t, double cart_m) {
-    constexpr double track_m = 0.3;
+    const double track_m = 0.3 * plan_.reach;
     if (t >= until_s_ || (level_ != 0.0 && level_ * cart_m > 0.0 && std::abs(cart_m) > track_m)) {
       const bool pause = level_ != 0.0;
-      if (!pause) direction_ = std::abs(cart_m) > 0.05 ? (cart_m > 0.0 ? -1.0 : 1.0) : -direction_;
+      if (!pause)
+        direction_ = std::abs(cart_m) > 0.05 * plan_.reach ? (cart_m > 0.0 ? -1.0 : 1.0) : -direction_;
       std::uniform_real_distribution<double> size(0.4, 1.2), length(0.5, 1.5);
       level_ = pause ? 0.0 : direction_ * size(random_) * plan_.amplitude_v;
       until_s_ = t + (pause ? 0.5 : length(random_));
@@ -223,6 +142,14 @@ std::string_view name_of(Unknown unknown) {
       return "warming_friction";
     case Unknown::gusts:
       return "gusts";
+    case Unknown::torque_ripple:
+      return "torque_ripple";
+    case Unknown::rough_track:
+      return "rough_track";
+    case Unknown::velocity_ripple:
+      return "velocity_ripple";
+    case Unknown::force_drift:
+      return "force_drift";
   }
   return "";
 }
@@ -248,11 +175,11 @@ std::string_view name_of(Experiment experiment) {
 Measurement measure(const Rig& rig, const Plan& plan, const std::string& name) {
   const bool locked = plan.experiment == Experiment::locked_swing;
   const bool pendulum = rig.plant.pendulum.has_value();
-  const Extra extra(rig, plan);
+  const ExtraForces extra(rig, plan);
   EngineOptions options;
   options.relative_tolerance = 1e-9;
   BasicSimulator<VaryingEngine, double> simulator(make_model<double>(rig.plant, locked), options);
-  if (extra.varies() && !locked) simulator.engine().vary(&extra);
+  if (extra.varies() && (!locked || rig.coloured.torque_nm > 0.0)) simulator.engine().vary(&extra);
   PlantState<double> start;
   if (pendulum)
     start.theta_rad = plan.experiment == Experiment::balance ? plan.swing_rad : pi + plan.swing_rad;
@@ -267,6 +194,11 @@ Measurement measure(const Rig& rig, const Plan& plan, const std::string& name) {
   std::mt19937_64 random(plan.seed * 104729 + 3);
   std::normal_distribution<double> normal;
   const double period_s = 1.0 / plan.rate_hz;
+  const double kept = kept_over(period_s, rig.noise_time_s);
+  SensorNoise cart_noise(rig.cart_noise_m, rig.noise_colour * rig.cart_noise_m, kept,
+                         plan.seed * 32452843 + 5);
+  SensorNoise theta_noise(rig.theta_noise_rad, rig.noise_colour * rig.theta_noise_rad, kept,
+                          plan.seed * 49979687 + 7);
   double shown_m = 0.0;
   for (std::size_t k = 0; static_cast<double>(k) * period_s < plan.duration_s; ++k) {
     const double nominal_s = static_cast<double>(k) * period_s;
@@ -278,8 +210,8 @@ Measurement measure(const Rig& rig, const Plan& plan, const std::string& name) {
     double cart = y.cart_m;
     if (rig.unknown == Unknown::backlash)
       cart = shown_m = std::clamp(shown_m, cart - 0.5 * rig.backlash_m, cart + 0.5 * rig.backlash_m);
-    const double cart_m = quantised(cart, rig.cart_step_m);
-    const double theta_rad = quantised(y.theta_rad, rig.theta_step_rad);
+    const double cart_m = quantised(cart + cart_noise.next(), rig.cart_step_m);
+    const double theta_rad = quantised(y.theta_rad + theta_noise.next(), rig.theta_step_rad);
     const double volts = driver.volts(k, nominal_s, cart_m, theta_rad);
     simulator.command(read_s, volts);
     if (in_gap(plan, nominal_s)) continue;

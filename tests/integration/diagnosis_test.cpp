@@ -186,11 +186,12 @@ class Blind : public testing::TestWithParam<BlindCase> {
  protected:
   void SetUp() override {
     const BlindCase& c = GetParam();
-    case_ = blind::make_case({.hidden = c.hidden,
-                              .size = c.size,
-                              .seed = c.seed,
-                              .disturbed = c.disturbed,
-                              .most_samples = 4000.0});
+    case_ = blind::make_case(
+        {.hidden = c.hidden,
+         .size = c.size,
+         .seed = c.seed,
+         .condition = c.disturbed ? blind::Condition::disturbed : blind::Condition::quantized,
+         .most_samples = 4000.0});
     diagnosis_ = diagnose(case_.believed, measure_all(case_));
   }
 
