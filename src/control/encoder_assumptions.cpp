@@ -22,6 +22,20 @@ constexpr double usual_pivot_friction_mps2 = 0.1;
 /// Machines give way in proportion to their size: 50 um on a track of twice 0.4 m.
 constexpr double track_limits_of_unseen_travel = 8000.0;
 
+/// An IP02 with up to 2 N of dry friction and each of Quanser's pendulums: what a rig is taken for whose file
+/// states nothing else and whose plant is not known.
+EncoderAssumptions ip02_assumptions(double track_limit_m) {
+  EncoderAssumptions a;
+  a.breakaway_v = {0.1, 1.4};
+  a.largest_lag_s = usual_lag_s;
+  a.acceleration_mps2_per_v = 1.1;
+  a.damping_v_per_mps = 8.0;
+  a.unseen_travel_m = track_limit_m / track_limits_of_unseen_travel;
+  a.longest_pendulum_m = 0.7;
+  a.pivot_friction_mps2 = usual_pivot_friction_mps2;
+  return a;
+}
+
 /// Smallest voltage in a direction that overcomes what holds the cart at rest there; the limit where none
 /// does.
 double breakaway_v(const Dynamics<double>& dynamics, double cart_m, double direction, double limit_v) {
@@ -90,15 +104,14 @@ EncoderAssumptions encoder_assumptions(const Plant& plant, double track_limit_m,
 }
 
 EncoderAssumptions encoder_assumptions(const StatedAssumptions& stated, double track_limit_m) {
-  EncoderAssumptions a;
-  a.breakaway_v = stated.breakaway_v.value_or(a.breakaway_v);
-  a.largest_lag_s = stated.largest_lag_s.value_or(usual_lag_s);
-  a.acceleration_mps2_per_v = stated.acceleration_mps2_per_v.value_or(a.acceleration_mps2_per_v);
-  a.damping_v_per_mps = stated.damping_v_per_mps.value_or(a.damping_v_per_mps);
-  a.unseen_travel_m = stated.unseen_travel_m.value_or(track_limit_m / track_limits_of_unseen_travel);
-  a.longest_pendulum_m = stated.longest_pendulum_m.value_or(a.longest_pendulum_m);
-  a.pivot_friction_mps2 = stated.pivot_friction_mps2.value_or(usual_pivot_friction_mps2);
-  return a;
+  const EncoderAssumptions ip02 = ip02_assumptions(track_limit_m);
+  return {stated.breakaway_v.value_or(ip02.breakaway_v),
+          stated.largest_lag_s.value_or(ip02.largest_lag_s),
+          stated.acceleration_mps2_per_v.value_or(ip02.acceleration_mps2_per_v),
+          stated.damping_v_per_mps.value_or(ip02.damping_v_per_mps),
+          stated.unseen_travel_m.value_or(ip02.unseen_travel_m),
+          stated.longest_pendulum_m.value_or(ip02.longest_pendulum_m),
+          stated.pivot_friction_mps2.value_or(ip02.pivot_friction_mps2)};
 }
 
 std::vector<std::string> missing_assumptions(const StatedAssumptions& stated) {

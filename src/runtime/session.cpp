@@ -78,8 +78,8 @@ std::string gap_of_encoder_watch(const RigFile& rig) {
   std::string keys;
   for (const std::string& key : missing) keys += (keys.empty() ? "" : ", ") + key;
   return rig.file.string() + ": encoder_watch does not state " + keys +
-         ", and no plant is known from which the watch could take them: add them to the rig file, or name a "
-         "plant with --plant";
+         ", so the watch assumes an IP02: for another plant add them to the rig file, or name its plant file "
+         "with --plant";
 }
 
 LoopLimits rig_limits(const RigFile& rig, const std::optional<Plant>& plant) {
@@ -93,7 +93,6 @@ LoopLimits rig_limits(const RigFile& rig, const std::optional<Plant>& plant) {
   if (plant) {
     limits.encoders = widened(encoder_assumptions(*plant, rig.track_limit_m, rig.amplifier.limit_v), stated);
   } else {
-    if (const std::string what = gap_of_encoder_watch(rig); !what.empty()) throw ConfigError(what);
     limits.encoders = encoder_assumptions(stated, rig.track_limit_m);
   }
   return limits;

@@ -121,7 +121,12 @@ TEST(EncoderWatch, ReadsBackItsAssumptions) {
   EXPECT_EQ(encoder_assumptions_text(again), encoder_assumptions_text(a));
 }
 
-TEST(EncoderWatch, NeedsBoundsOfCartAndPendulumWithoutAPlant) {
+TEST(EncoderWatch, AssumesAnIp02WithoutAPlantAndBounds) {
+  EXPECT_EQ(encoder_assumptions_text(encoder_assumptions(StatedAssumptions{}, 0.4)),
+            encoder_assumptions_text(ip02));
+}
+
+TEST(EncoderWatch, NamesTheBoundsThatAreNotStated) {
   EXPECT_EQ(missing_assumptions({}), (std::vector<std::string>{"breakaway_v", "acceleration_mps2_per_v",
                                                                "damping_v_per_mps", "longest_pendulum_m"}));
   EXPECT_EQ(missing_assumptions(stated_in("{breakaway_v: {from: 1, to: 2}, damping_v_per_mps: 9}")),

@@ -47,9 +47,10 @@ struct StatedAssumptions {
 /// 1 +- `uncertainty`. Without a pendulum its bounds keep their defaults.
 EncoderAssumptions encoder_assumptions(const Plant& plant, double track_limit_m, double amplifier_limit_v,
                                        double uncertainty = 0.5);
-/// The stated bounds, and the usual ones of what does not depend on the plant, for a rig without a plant.
+/// The stated bounds for a rig without a plant. What is not stated is taken from an IP02 with up to 2 N of dry
+/// friction, an actuator that is up to 30 ms late, and each of Quanser's pendulums.
 EncoderAssumptions encoder_assumptions(const StatedAssumptions& stated, double track_limit_m);
-/// The keys that a rig without a plant must state and does not.
+/// The keys that only a plant could replace, and that are not stated.
 std::vector<std::string> missing_assumptions(const StatedAssumptions& stated);
 
 /// The union of these bounds and the stated ones.
