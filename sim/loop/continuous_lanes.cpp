@@ -576,10 +576,9 @@ void UPRIGHT_LANES::run_continuous_on_lanes(const LoopSetup& setup, std::span<co
   const bool sticks = Dynamics<Lanes>(model).cart_can_stick();
   with_effects(setup.model.present, [&](const auto& present) {
     using Present = std::decay_t<decltype(present)>;
-    if (sticks)
-      ContinuousRuns<Present, true>(setup, model, present, cases, results).run();
-    else
-      ContinuousRuns<Present, false>(setup, model, present, cases, results).run();
+    if constexpr (may_stick<Present>)
+      if (sticks) return ContinuousRuns<Present, true>(setup, model, present, cases, results).run();
+    ContinuousRuns<Present, false>(setup, model, present, cases, results).run();
   });
 }
 

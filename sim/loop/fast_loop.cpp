@@ -111,7 +111,7 @@ class SmoothPeriod {
 
   [[gnu::flatten]] void advance(PlantState<Lanes>& state, const Lanes& /*command_v*/, const Lanes& motor_v,
                                 double period_s) {
-    const auto rate = [&](const PlantState<Lanes>& s, Stage) { return physics_.derivative(s, motor_v, {}); };
+    const auto rate = [&](const PlantState<Lanes>& s, Stage) { return rate_of(s, motor_v); };
     const PlantState<Lanes> first = rate(state, Stage::end);
     const int pieces = pieces_for(state, first, period_s);
     const Lanes h(period_s / pieces);
@@ -120,6 +120,13 @@ class SmoothPeriod {
   }
 
  private:
+  // One copy for all nine stages, which takes no longer to run and half as long to compile. (With stick-slip
+  // a copy for each is 2 to 4 percent faster.)
+  [[gnu::flatten, gnu::noinline]] PlantState<Lanes> rate_of(const PlantState<Lanes>& state,
+                                                            const Lanes& motor_v) const {
+    return physics_.derivative(state, motor_v, {});
+  }
+
   static constexpr double kink_sweep_mps = 1e-3;
   static constexpr int most_pieces = 16;
 
@@ -236,13 +243,14 @@ void run_with(const LoopSetup& setup, const Present& present, std::span<const Lo
               std::span<LoopResult> results) {
   const PlantModel<Lanes> model = on_lanes(setup.model);
   const Dynamics<Lanes> chain(model);
-  if (chain.cart_can_stick()) {
-    StickSlipPeriod<Present> period(setup, model, present);
-    run_sampled(setup, chain, period, cases, results);
-  } else {
-    SmoothPeriod<Present> period(setup, model, present);
-    run_sampled(setup, chain, period, cases, results);
+  if constexpr (may_stick<Present>) {
+    if (chain.cart_can_stick()) {
+      StickSlipPeriod<Present> period(setup, model, present);
+      return run_sampled(setup, chain, period, cases, results);
+    }
   }
+  SmoothPeriod<Present> period(setup, model, present);
+  run_sampled(setup, chain, period, cases, results);
 }
 
 }  // namespace

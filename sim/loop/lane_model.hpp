@@ -39,6 +39,15 @@ constexpr std::uint64_t coulomb_set = viscous_set | bit_of<effects::CoulombFrict
 constexpr std::uint64_t exponential_set = coulomb_set | bit_of<effects::StribeckFriction>;
 constexpr std::uint64_t dynamic_set = exponential_set | bit_of<effects::BristleFriction>;
 
+/// Whether a cart with these effects can stick: of the sets above, one has no dry friction, and bristles hold
+/// a cart without sticking.
+template <class Present>
+constexpr bool may_stick = true;
+template <>
+inline constexpr bool may_stick<StaticEffectSet<viscous_set>> = false;
+template <>
+inline constexpr bool may_stick<StaticEffectSet<dynamic_set>> = false;
+
 /// Calls `run` with the plant's effects: common sets at compile time, all others at run time.
 template <class Run>
 void with_effects(const EffectSet& present, const Run& run) {

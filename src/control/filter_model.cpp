@@ -1,9 +1,10 @@
 #include "filter_model.hpp"
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <numbers>
 #include <vector>
 
+#include "model/dense_algebra.hpp"
 #include "model/riccati.hpp"
 #include "upright/base/error.hpp"
 #include "upright/model/linear_plant.hpp"
@@ -139,7 +140,7 @@ Eigen::Matrix<double, filter_states, 2> kalman_gain(const ContinuousModel& model
       solve_discrete_riccati(sampled.transpose(), shows.transpose(), sampled_noise(a, w, period_s),
                              MatrixXd::Zero(a.rows(), 2), rounding);
   const MatrixXd spread = shows * solution.x * shows.transpose() + rounding;
-  const MatrixXd gain = spread.ldlt().solve(shows * solution.x).transpose();
+  const MatrixXd gain = solve_symmetric(spread, shows * solution.x).transpose();
   Eigen::Matrix<double, filter_states, 2> whole = Eigen::Matrix<double, filter_states, 2>::Zero();
   whole(at, Eigen::all) = gain * step.cwiseInverse().asDiagonal();
   if (!whole.allFinite())

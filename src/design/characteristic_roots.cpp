@@ -4,7 +4,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "dense_algebra.hpp"
+#include "model/dense_algebra.hpp"
 
 namespace upright {
 

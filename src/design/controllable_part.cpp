@@ -1,10 +1,10 @@
 #include "controllable_part.hpp"
 
-#include <Eigen/LU>
 #include <cmath>
 #include <cstdio>
+#include <optional>
 
-#include "dense_algebra.hpp"
+#include "model/dense_algebra.hpp"
 #include "upright/base/error.hpp"
 
 namespace upright {
@@ -88,10 +88,9 @@ ControllablePart controllable_part(const LinearPlant& linear) {
   if (r < fed_back) refuse(linear, "the voltage does not affect every state that is fed back");
   ControllablePart part;
   part.states.assign(linear.states.begin(), linear.states.begin() + r);
-  const Eigen::FullPivLU<MatrixXd> kept(basis.topRows(r));
-  if (!kept.isInvertible() || kept.rcond() < in_the_subspace)
-    refuse(linear, "the voltage does not affect every state that is fed back");
-  part.follow = basis * kept.inverse();
+  const std::optional<MatrixXd> kept_inverse = inverse_if_regular(basis.topRows(r), in_the_subspace);
+  if (!kept_inverse) refuse(linear, "the voltage does not affect every state that is fed back");
+  part.follow = basis * *kept_inverse;
   part.follow.topRows(r).setIdentity();
   part.a = (linear.a * part.follow).topRows(r);
   part.b = linear.b.head(r);

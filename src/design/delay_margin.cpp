@@ -10,8 +10,8 @@
 #include "characteristic_roots.hpp"
 #include "control/kalman_filter.hpp"
 #include "controllable_part.hpp"
-#include "dense_algebra.hpp"
 #include "linear_sampled_loop.hpp"
+#include "model/dense_algebra.hpp"
 #include "upright/base/error.hpp"
 #include "upright/model/plant_file.hpp"
 

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <cstdio>
 
-#include "dense_algebra.hpp"
+#include "model/dense_algebra.hpp"
 #include "model/riccati.hpp"
 #include "upright/base/error.hpp"
 

@@ -8,7 +8,7 @@
 #include "control/predictor.hpp"
 #include "control/whole_periods.hpp"
 #include "controllable_part.hpp"
-#include "dense_algebra.hpp"
+#include "model/dense_algebra.hpp"
 #include "upright/base/error.hpp"
 #include "upright/model/plant_file.hpp"
 

@@ -4,7 +4,7 @@
 #include <numbers>
 
 #include "delay_margin.hpp"
-#include "dense_algebra.hpp"
+#include "model/dense_algebra.hpp"
 #include "upright/base/error.hpp"
 #include "upright/model/linear_plant.hpp"
 

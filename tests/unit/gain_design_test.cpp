@@ -5,7 +5,7 @@
 #include <Eigen/Eigenvalues>
 #include <random>
 
-#include "design/dense_algebra.hpp"
+#include "model/dense_algebra.hpp"
 #include "model/riccati.hpp"
 #include "upright/base/error.hpp"
 #include "upright/model/plant_file.hpp"

@@ -16,8 +16,18 @@ MatrixXd inverse(const MatrixXd& matrix) {
   return matrix.inverse();
 }
 
+std::optional<MatrixXd> inverse_if_regular(const MatrixXd& matrix, double least_rcond) {
+  const Eigen::FullPivLU<MatrixXd> factored(matrix);
+  if (!factored.isInvertible() || factored.rcond() < least_rcond) return std::nullopt;
+  return factored.inverse();
+}
+
 Eigen::VectorXcd solve(const MatrixXcd& a, const Eigen::VectorXcd& b) {
   return a.partialPivLu().solve(b);
+}
+
+MatrixXd solve_symmetric(const MatrixXd& a, const MatrixXd& b) {
+  return a.ldlt().solve(b);
 }
 
 MatrixXd completed_basis(const MatrixXd& columns) {
