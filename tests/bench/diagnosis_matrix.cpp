@@ -14,8 +14,8 @@
 // --seconds is the processor time that a diagnosis may take. A case that takes longer, or fails otherwise, is
 // a line too, and counts as missed. The judgement of the data may take ten times as long.
 // --markdown writes the tables of all records; a case that is in several files counts once.
-// --timing makes every case six runs of ten seconds at 500 Hz; with --jobs 1 their wall time is the figure of
-// the table. UPRIGHT_THREADS=1 keeps a case on one processor.
+// --timing makes every case six runs of ten seconds at 500 Hz, of a laboratory seven at 1 kHz; with --jobs 1
+// their wall time is the figure of the table. UPRIGHT_THREADS=1 keeps a case on one processor.
 // --case K with --keep DIR writes the plant file, the runs and the truth of one case, for `upright diagnose`.
 //
 // The diagnosis works as the command does: the runs are written as CSV and read again, and it sees nothing
@@ -103,10 +103,11 @@ Request request_of(const Flags& flags, std::size_t number, std::string& label) {
   request.runs = flags.runs;
   request.most_samples = flags.most_samples;
   if (flags.timing) {
-    request.runs = 6;
-    request.rate_hz = 500.0;
+    const bool laboratory = flags.condition == Condition::laboratory;
+    request.runs = laboratory ? 7 : 6;
+    request.rate_hz = laboratory ? 1000.0 : 500.0;
     request.duration_s = 10.0;
-    request.most_samples = 30000.0;
+    request.most_samples = request.runs * request.rate_hz * request.duration_s;
   }
   if (label == "pair") {
     request.hidden = random_pair(request.seed);

@@ -21,7 +21,7 @@ std::string condition_of(const nlohmann::json& record);
 
 /// The diagnosis threw, died, or took too long: a miss wherever it could have been right.
 bool is_failed(const nlohmann::json& record);
-/// Six runs of ten seconds at 500 Hz, for the time they take; not counted otherwise.
+/// A case of `--timing`: counted for the time it takes, not otherwise.
 bool is_timing(const nlohmann::json& record);
 
 std::string first_hidden(const nlohmann::json& record);
