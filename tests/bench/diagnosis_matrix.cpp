@@ -202,7 +202,28 @@ json describe_request(const Flags& flags, std::size_t number) {
   return record;
 }
 
+/// What a correct diagnosis finds of the numbers of the plant file.
+json file_truth(const Plant& believed, const Plant& truth) {
+  json result = json::object();
+  const auto base = [&](const char* kind, double from, double to) {
+    const PlantEffect* hidden = truth.find(kind);
+    result[kind] = {{"scale", to / from * (hidden != nullptr ? hidden->values[0] : 1.0)}};
+  };
+  base("cart_mass", believed.cart_mass_kg, truth.cart_mass_kg);
+  base("back_emf", believed.motor.back_emf_n_per_mps, truth.motor.back_emf_n_per_mps);
+  if (truth.pendulum) {
+    base("pendulum_mass", believed.pendulum->mass_kg, truth.pendulum->mass_kg);
+    base("pendulum_length", believed.pendulum->length_to_com_m, truth.pendulum->length_to_com_m);
+  }
+  for (const PlantEffect& effect : believed.effects)
+    if (const PlantEffect* there = truth.find(effect.number))
+      result[kind_of(effect.number)] =
+          values_json(effect.number, {there->values.begin(), there->values.end()});
+  return result;
+}
+
 void describe_rig(const Case& blind, json& record) {
+  record["file_truth"] = file_truth(blind.believed, blind.rig.plant);
   record["cart_mass_kg"] = blind.believed.cart_mass_kg;
   record["cart_step_m"] = blind.rig.cart_step_m;
   record["jitter_s"] = blind.rig.jitter_s;

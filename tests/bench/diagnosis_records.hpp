@@ -55,8 +55,9 @@ struct Estimate {
   bool covered;
 };
 
-/// Errors of the parameters of hidden effects that were named. A phase counts as a share of half a turn; the
-/// centre of a spring has no size of its own and is left out.
-std::vector<Estimate> estimates_of(const nlohmann::json& record);
+/// Errors of the parameters of effects that were named: of hidden ones ("truth"), or of numbers of the plant
+/// file that were corrected ("file_truth"). A phase counts as a share of half a turn; the centre of a spring
+/// has no size of its own and is left out.
+std::vector<Estimate> estimates_of(const nlohmann::json& record, const char* truths = "truth");
 
 }  // namespace upright::blind

@@ -316,6 +316,19 @@ std::vector<Count> counts_of_kinds() {
   return counts;
 }
 
+/// Of numbers of the plant file, where nothing is hidden.
+Share corrections_covered(const Records& records) {
+  Share covered;
+  for (const json& r : records) {
+    if (!answered_null(r)) continue;
+    for (const Estimate& e : estimates_of(r, "file_truth")) {
+      covered.count += 1.0;
+      covered.hits += e.covered ? 1.0 : 0.0;
+    }
+  }
+  return covered;
+}
+
 /// Level and largest value of a number over the cases that have it.
 void write_spread(std::ostringstream& out, const std::string& what, const Records& records,
                   const std::vector<Goals>& conditions, const std::function<double(const json&)>& value) {
@@ -378,6 +391,10 @@ void write_counts(std::ostringstream& out, const Records& records) {
       out << " | " << share_of(of_condition(records, goals.condition), count.counts, count.hits).text();
     out << " |\n";
   }
+  out << "| 95 % intervals of corrected numbers that contain the true value (nothing hidden)";
+  for (const Goals& goals : conditions)
+    out << " | " << corrections_covered(of_condition(records, goals.condition)).text();
+  out << " |\n";
 }
 
 std::string answer_of(const json& r) {
