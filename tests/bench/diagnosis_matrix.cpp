@@ -38,6 +38,7 @@
 #include <iostream>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <random>
 #include <set>
 #include <sstream>
 #include <stdexcept>
@@ -99,6 +100,9 @@ Request request_of(const Flags& flags, std::size_t number, std::string& label) {
   Request request;
   request.seed = flags.seed * 1000003 + number;
   request.size = flags.size.value_or(static_cast<Size>((number + round) % 3));
+  // Drawn, so that no kind goes with a size: a round has as many places for each as sizes.
+  if (flags.condition == Condition::laboratory && !flags.size)
+    request.size = static_cast<Size>(std::mt19937_64(request.seed)() % 3);
   request.condition = flags.condition;
   request.runs = flags.runs;
   request.most_samples = flags.most_samples;
