@@ -162,14 +162,16 @@ double shrinking_of(const json& r) {
   return gap("gap_before") / gap("gap_after");
 }
 
-std::vector<Estimate> estimates_of(const json& r) {
+std::vector<Estimate> estimates_of(const json& r, const char* truths) {
   std::vector<Estimate> estimates;
+  if (!r.contains(truths)) return estimates;
   for (const json& found : found_in(r)) {
     const std::string kind = found.at("kind");
-    if (!r.at("truth").contains(kind)) continue;
+    if (!r.at(truths).contains(kind)) continue;
     for (const auto& [name, p] : found.at("parameters").items()) {
-      if (name == "center_m" || !p.at("value").is_number()) continue;
-      const double truth = r.at("truth").at(kind).at(name), value = p.at("value");
+      const bool stated = r.at(truths).at(kind).contains(name) && p.at("value").is_number();
+      if (name == "center_m" || !stated) continue;
+      const double truth = r.at(truths).at(kind).at(name), value = p.at("value");
       double off = value - truth, size = std::abs(truth);
       if (name == "phase_rad") {
         off = std::remainder(off, 2.0 * std::numbers::pi);

@@ -21,7 +21,7 @@ std::string condition_of(const nlohmann::json& record);
 
 /// The diagnosis threw, died, or took too long: a miss wherever it could have been right.
 bool is_failed(const nlohmann::json& record);
-/// Six runs of ten seconds at 500 Hz, for the time they take; not counted otherwise.
+/// A case of `--timing`: counted for the time it takes, not otherwise.
 bool is_timing(const nlohmann::json& record);
 
 std::string first_hidden(const nlohmann::json& record);
@@ -55,8 +55,9 @@ struct Estimate {
   bool covered;
 };
 
-/// Errors of the parameters of hidden effects that were named. A phase counts as a share of half a turn; the
-/// centre of a spring has no size of its own and is left out.
-std::vector<Estimate> estimates_of(const nlohmann::json& record);
+/// Errors of the parameters of effects that were named: of hidden ones ("truth"), or of numbers of the plant
+/// file that were corrected ("file_truth"). A phase counts as a share of half a turn; the centre of a spring
+/// has no size of its own and is left out.
+std::vector<Estimate> estimates_of(const nlohmann::json& record, const char* truths = "truth");
 
 }  // namespace upright::blind

@@ -113,6 +113,33 @@ TEST(MatrixTables, CoverageCountsIntervalsThatHold) {
   EXPECT_NE(row(records, "parameter error, median").find("10 %"), std::string::npos);
 }
 
+TEST(MatrixTables, CoverageOfCorrectionsIsThatOfNulls) {
+  Records records = {record(0, {}, "explained"), record(1, {"coulomb_friction"}, "explained")};
+  for (json& r : records) {
+    r["file_truth"] = {{"cart_mass", {{"scale", 1.03}}},
+                       {"viscous_friction", {{"coefficient_n_per_mps", 3.0}}}};
+    r["found"] = {found("cart_mass"), found("viscous_friction")};
+    r["found"][0]["parameters"]["scale"] = {{"value", 1.02}, {"low", 1.0}, {"high", 1.04}};
+    r["found"][1]["parameters"]["coefficient_n_per_mps"] = {{"value", 2.0}, {"low", 1.9}, {"high", 2.1}};
+  }
+  EXPECT_NE(row(records, "95 % intervals of corrected").find("50.0 % (1 of 2)"), std::string::npos);
+}
+
+TEST(MatrixTables, TimingCasesCountForTheirTimeOnly) {
+  Records records = {record(0, {}, "explained"), record(1, {}, "unexplained"),
+                     unknown(2, "unexplained", 1.0)};
+  for (json& r : records) {
+    r["timing"] = true;
+    r["wall_s"] = 4.0 + 5.0 * r.at("case").get<double>();
+  }
+  records[1]["failed"] = "diagnosis took too long";
+  EXPECT_NE(row(records, "the same, with something unknown").find("| <= 20 s | 14 s | holds"),
+            std::string::npos);
+  EXPECT_NE(row(records, "the same, slowest of all").find("| <= 40 s | inf s | **missed**"),
+            std::string::npos);
+  EXPECT_NE(row(records, "completed without").find("| - |"), std::string::npos);
+}
+
 TEST(MatrixRecords, ManyFilesCountEachCaseOnce) {
   const auto folder = std::filesystem::temp_directory_path() / "upright-matrix-records";
   std::filesystem::create_directories(folder);
