@@ -1,4 +1,4 @@
-// `upright export`: measured data for other programs.
+// `upright export`: measured data and plants for other programs.
 #include <cstdio>
 #include <filesystem>
 #include <iostream>
@@ -11,9 +11,11 @@
 #include "measurement/mat_file.hpp"
 #include "options.hpp"
 #include "result_folder.hpp"
+#include "sim/fmu/fmu_writer.hpp"
 #include "upright/base/error.hpp"
 #include "upright/base/yaml_reader.hpp"
 #include "upright/measurement/measurement.hpp"
+#include "upright/model/plant_file.hpp"
 #include "upright/record/run_reader.hpp"
 
 namespace upright::cli {
@@ -24,7 +26,7 @@ namespace fs = std::filesystem;
 
 struct ExportFlags {
   std::string path, out;
-  bool mat = false, csv = false;
+  bool mat = false, csv = false, fmu = false;
 };
 
 /// Columns of equal length, with their names.
@@ -87,20 +89,29 @@ fs::path usual_name(const fs::path& path, const char* ending) {
                                          : fs::path(name).replace_extension(ending);
 }
 
-ExitCode run_export(const ExportFlags& flags) {
-  if (flags.mat == flags.csv) throw ConfigError("what to write is not clear: give one of --mat and --csv");
-  const fs::path path = flags.path;
-  const fs::path file =
-      flags.out.empty() ? usual_name(path, flags.mat ? ".mat" : ".csv") : fs::path(flags.out);
-  if (fs::exists(file))
-    throw ConfigError(file.string() + " already exists: choose another file with --out, or remove it");
+void export_data(const fs::path& path, const fs::path& file, bool as_mat) {
   const bool is_run = fs::exists(path / "samples.csv");
   const ExportedColumns columns = is_run ? columns_of_run(path / "samples.csv") : columns_of_data(path);
   if (columns[0].second.empty()) throw ConfigError(path.string() + " has no rows: record a longer run");
-  if (flags.mat) {
+  if (as_mat) {
     write_mat_file(file, columns);
   } else {
     write_result(file, [&](std::ostream& out) { write_csv(columns, out); });
+  }
+}
+
+ExitCode run_export(const ExportFlags& flags) {
+  if (flags.mat + flags.csv + flags.fmu != 1)
+    throw ConfigError("what to write is not clear: give one of --mat, --csv and --fmu");
+  const fs::path path = flags.path;
+  const char* ending = flags.mat ? ".mat" : flags.csv ? ".csv" : ".fmu";
+  const fs::path file = flags.out.empty() ? usual_name(path, ending) : fs::path(flags.out);
+  if (fs::exists(file))
+    throw ConfigError(file.string() + " already exists: choose another file with --out, or remove it");
+  if (flags.fmu) {
+    write_fmu(read_plant_file(path), path.stem().string(), file);
+  } else {
+    export_data(path, file, flags.mat);
   }
   std::cout << file.string() << std::endl;
   finish_output();
@@ -110,18 +121,24 @@ ExitCode run_export(const ExportFlags& flags) {
 }  // namespace
 
 void add_export(CommandLine& line) {
-  const Command command =
-      line.command("export", "Write measured data for other programs: MATLAB or CSV",
-                   "Example:  upright export runs/20260101T120000Z-run --mat --out run.mat\n"
-                   "Of a run directory, all quantities of each row are written; of other data, the time, the "
-                   "voltage, and\n"
-                   "what was measured, in SI units. Prints the name of the file.");
+  const Command command = line.command(
+      "export", "Write measured data or a plant for other programs: MATLAB, CSV, or an FMU",
+      "Examples:\n"
+      "  upright export runs/20260101T120000Z-run --mat --out run.mat\n"
+      "  upright export config/plants/exponential.yaml --fmu\n"
+      "Of a run directory, all quantities of each row are written; of other data, the time, the voltage,\n"
+      "and what was measured, in SI units. An FMU (FMI 2.0, co-simulation) has the event engine in it:\n"
+      "voltage in; position, angle, velocities and forces out. Prints the name of the file.");
   const auto flags = std::make_shared<ExportFlags>();
-  command.option("path", flags->path, "Run directory, CSV file, MATLAB file or dataset file").required();
+  command
+      .option("path", flags->path,
+              "Run directory, CSV file, MATLAB file or dataset file; with --fmu, a plant file")
+      .required();
   command.flag("--mat", flags->mat, "Write a MATLAB v5 file with a column vector for each quantity");
   command.flag("--csv", flags->csv, "Write a CSV file with a header line");
+  command.flag("--fmu", flags->fmu, "Write the plant as an FMU for Linux on x86-64");
   command.option("--out", flags->out,
-                 "File to write (default: the name of PATH with the ending .mat or .csv)");
+                 "File to write (default: the name of PATH with the ending .mat, .csv or .fmu)");
   command.does([flags] { return run_export(*flags); });
 }
 
