@@ -26,6 +26,8 @@ AddCommand add_effects,
            add_diagnose,
            add_identify,
            add_simulate,
+           add_import,
+           add_export,
            add_virtual_rig,
            add_doctor;
 
@@ -43,6 +45,8 @@ inline constexpr std::array all_commands = {add_effects,
                                             add_diagnose,
                                             add_identify,
                                             add_simulate,
+                                            add_import,
+                                            add_export,
                                             add_virtual_rig,
                                             add_doctor};
 // clang-format on

@@ -15,6 +15,8 @@
 #include "histogram_json.hpp"
 #include "json_number.hpp"
 #include "live.hpp"
+#include "live/row_watchers.hpp"
+#include "live/udp_stream.hpp"
 #include "options.hpp"
 #include "progress.hpp"
 #include "record/histogram_text.hpp"
@@ -36,7 +38,7 @@ namespace upright::cli {
 namespace {
 
 struct RunArguments {
-  std::string rig, gains, plant, out = "runs", label = "run", live_port;
+  std::string rig, gains, plant, out = "runs", label = "run", live_port, stream;
   std::optional<double> delay_s, theta0_deg, wait_s;
   double duration_s = 10.0;
   std::optional<std::uint64_t> seed;
@@ -264,6 +266,19 @@ void print_summary(const SessionResult& result, const LoopLimits& limits, bool f
   std::fflush(stdout);
 }
 
+/// Where --stream sends the rows; null where it was not asked for.
+std::unique_ptr<UdpStream> open_stream(const RunArguments& arguments) {
+  if (arguments.stream.empty()) return nullptr;
+  if (arguments.fast)
+    throw ConfigError("--stream needs real time and --fast is virtual time: remove one of them");
+  return std::make_unique<UdpStream>(arguments.stream);
+}
+
+void print_stream(const UdpStream& stream) {
+  std::printf("Stream: %llu rows sent to %s, %llu dropped.\n", static_cast<unsigned long long>(stream.sent()),
+              stream.address().c_str(), static_cast<unsigned long long>(stream.dropped()));
+}
+
 /// The page that --live asks for.
 std::unique_ptr<LiveView> open_live(const RunArguments& arguments, const RunSetup& setup) {
   LiveSubject subject;
@@ -285,7 +300,7 @@ LiveState end_of(const SessionResult& result, const LoopLimits& limits) {
 }
 
 SessionResult balance(const RunArguments& arguments, RunSetup setup, const SignalFlag& caught_signal,
-                      LiveView* view) {
+                      LiveView* view, UdpStream* stream) {
   MonotonicClock real_clock;
   VirtualClock virtual_clock;
   Clock& clock = arguments.fast ? static_cast<Clock&>(virtual_clock) : real_clock;
@@ -300,7 +315,10 @@ SessionResult balance(const RunArguments& arguments, RunSetup setup, const Signa
   options.out = arguments.out;
   options.realtime = arguments.realtime;
   options.parts = make_model_parts(setup.control);
-  options.watcher = view;
+  RowWatchers watchers;
+  watchers.add(view);
+  watchers.add(stream);
+  options.watcher = &watchers;
   options.stop = stop_watcher(view);
   const LoopLimits limits = setup.limits;
   // On a terminal a run in real time shows where the cart is instead.
@@ -331,14 +349,22 @@ ExitCode run(const RunArguments& arguments) {
   if (!overrun.warning.empty()) std::cerr << "upright: " << overrun.warning << "\n";
   const LoopLimits limits = setup.limits;
   const SignalFlag& caught_signal = catch_signals();
+  const std::unique_ptr<UdpStream> stream = open_stream(arguments);
   const std::unique_ptr<LiveView> view = open_live(arguments, setup);
-  const SessionResult result =
-      shown_by(view.get(), [&] { return balance(arguments, std::move(setup), caught_signal, view.get()); });
+  const SessionResult result = shown_by(view.get(), [&] {
+    return balance(arguments, std::move(setup), caught_signal, view.get(), stream.get());
+  });
 
-  if (arguments.as_json)
-    std::cout << json_of(result, limits, overrun).dump(2, ' ', false, Json::error_handler_t::replace) << "\n";
-  else
+  if (!arguments.as_json && stream) print_stream(*stream);
+  if (arguments.as_json) {
+    Json document = json_of(result, limits, overrun);
+    if (stream)
+      document["stream"] = {
+          {"address", stream->address()}, {"rows_sent", stream->sent()}, {"rows_dropped", stream->dropped()}};
+    std::cout << document.dump(2, ' ', false, Json::error_handler_t::replace) << "\n";
+  } else {
     print_summary(result, limits, arguments.fast);
+  }
   if (!result.log.failure.empty()) std::cerr << "upright: " << result.log.failure << "\n";
   if (result.directory != result.made_at)
     std::cerr << "upright: " << result.made_at.string() << " was moved to " << result.directory.string()
@@ -385,6 +411,9 @@ void add_run(CommandLine& line) {
   command.option("--label", a->label, "Last part of the name of the run directory (default: run)");
   add_realtime(command, a->realtime);
   add_live(command, a->live_port);
+  command.option("--stream", a->stream,
+                 "Send each row as a UDP datagram with JSON, as PlotJuggler's UDP server reads it: "
+                 "udp://127.0.0.1:9870");
   command.flag("--unchecked", a->unchecked, "Run a real rig without a sign check");
   command.flag("--force", a->force, "Run even if the gains do not stabilize the plant");
   command.flag("--json", a->as_json, "Print one JSON document");

@@ -38,18 +38,13 @@ struct Signature {
   const char* remedy;
 };
 
-constexpr const char* from_matlab =
-    "export the signals as text, in MATLAB with writematrix([t x theta u], 'measured.csv'), in Python with "
-    "scipy.io.loadmat or h5py and numpy.savetxt";
+constexpr const char* from_hdf5 = "export the signals as text, in Python with h5py and numpy.savetxt";
 constexpr const char* from_utf16 = "convert it with iconv -f UTF-16 -t UTF-8 FILE > measured.csv";
 constexpr const char* from_spreadsheet = "export the sheet as CSV";
 constexpr const char* from_archive = "unpack it first";
 
 constexpr std::array signatures = {
-    Signature{"MATLAB 7.3 MAT-file"sv, 0, "a MATLAB v7.3 file (HDF5)", from_matlab},
-    Signature{"MATLAB 5.0 MAT-file"sv, 0, "a MATLAB v5 file", from_matlab},
-    Signature{"\x89HDF\r\n\x1a\n"sv, 0, "an HDF5 file", from_matlab},
-    Signature{"\x89HDF\r\n\x1a\n"sv, 512, "a MATLAB v7.3 file (HDF5)", from_matlab},
+    Signature{"\x89HDF\r\n\x1a\n"sv, 0, "an HDF5 file", from_hdf5},
     Signature{"\xff\xfe"sv, 0, "UTF-16 text", from_utf16},
     Signature{"\xfe\xff"sv, 0, "UTF-16 text", from_utf16},
     Signature{"PK\x03\x04"sv, 0, "a spreadsheet or a zip archive", from_spreadsheet},

@@ -49,11 +49,45 @@ constexpr std::array units = {
     Unit{"theta_rad", "turn", 2.0 * std::numbers::pi},
 };
 
+/// The words for numbers of an encoder's steps.
+constexpr std::array<std::string_view, 5> count_words = {"counts", "count", "cnt", "ticks", "steps"};
+
+std::string unit_names(std::string_view quantity) {
+  std::string names;
+  for (const Unit& known : units)
+    if (known.quantity == quantity) names += std::string(names.empty() ? "" : ", ") + std::string(known.name);
+  if (quantity == "cart_m" || quantity == "theta_rad") names += ", counts";
+  return names;
+}
+
+/// SI units per encoder step, by the keys that rig files have for it.
+double factor_of_counts(const YamlMap& source, const std::string& name) {
+  if (name == "cart_m") return source.number("m_per_count", Range::positive());
+  if (name == "theta_rad")
+    return 2.0 * std::numbers::pi / source.number("counts_per_revolution", Range::positive());
+  source.fail("unit", "is counts, but " + name + " is not measured by an encoder",
+              "use one of " + unit_names(name));
+}
+
+/// The factor that `unit` stands for. Empty where there is no such key.
+std::optional<double> read_unit(const YamlMap& source, const std::string& name) {
+  if (!source.has("unit")) return std::nullopt;
+  if (source.has("scale"))
+    source.fail("unit", "stands beside scale, which says the same", "remove one of them");
+  const std::string unit = source.text("unit");
+  if (is_counts(unit)) return factor_of_counts(source, name);
+  const auto factor = factor_of_unit(name, unit);
+  if (!factor)
+    source.fail("unit", "'" + unit + "' is not known", "use one of " + unit_names(name) + ", or scale");
+  return factor;
+}
+
 DatasetColumn read_column(const YamlMap& columns, const std::string& name) {
   if (!columns.is_map(name)) return {columns.text(name), 1.0, 0.0, false};
   const YamlMap source = columns.map(name);
-  DatasetColumn column{source.text("column"), source.number_or("scale", 1.0), source.number_or("offset", 0.0),
-                       source.has("scale")};
+  const std::optional<double> unit = read_unit(source, name);
+  DatasetColumn column{source.text("column"), unit.value_or(source.number_or("scale", 1.0)),
+                       source.number_or("offset", 0.0), unit || source.has("scale")};
   if (name != "time_s") column.delay_s = source.number_or("delay_s", 0.0, Range::not_negative());
   if (name == "time_s") column.period_s = source.optional_number("period_s", Range::positive()).value_or(0.0);
   if (name == "theta_rad") column.mirrored = source.flag_or("mirrored", false);
@@ -155,14 +189,38 @@ std::string column_line(std::string_view quantity, const DatasetColumn& column) 
   return text + "}";
 }
 
-std::optional<double> factor_of_unit(std::string_view quantity, std::string_view unit) {
+namespace {
+
+/// Without brackets, blanks and capitals.
+std::string plain_unit(std::string_view unit) {
   std::string name;
   for (const char c : unit)
     if (std::string_view("[]() \t\"").find(c) == std::string_view::npos)
       name += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  return name;
+}
+
+}  // namespace
+
+std::optional<double> factor_of_unit(std::string_view quantity, std::string_view unit) {
+  const std::string name = plain_unit(unit);
   for (const Unit& known : units)
     if (known.quantity == quantity && known.name == name) return known.factor;
   return std::nullopt;
+}
+
+bool is_counts(std::string_view unit) {
+  const std::string name = plain_unit(unit);
+  return std::find(count_words.begin(), count_words.end(), name) != count_words.end();
+}
+
+std::string_view unit_in_name(std::string_view column) {
+  for (const std::string_view brackets : {"[]", "()"}) {
+    const std::size_t begin = column.rfind(brackets[0]);
+    if (begin != std::string_view::npos && begin > 0 && column.back() == brackets[1])
+      return column.substr(begin + 1, column.size() - begin - 2);
+  }
+  return {};
 }
 
 }  // namespace upright

@@ -1,5 +1,5 @@
-// Dataset files: how a foreign CSV is read as a measurement. docs/reference/dataset-files.md explains every
-// key.
+// Dataset files: how a foreign CSV or MATLAB file is read as a measurement. docs/reference/dataset-files.md
+// explains every key.
 #pragma once
 
 #include <array>
@@ -25,7 +25,7 @@ struct DatasetColumn {
   std::string column;
   double scale = 1.0;
   double offset = 0.0;
-  bool scaled = false;    ///< the file gives a scale, so the unit is known
+  bool scaled = false;    ///< the file gives a scale or a unit
   double delay_s = 0.0;   ///< delay of recording after measurement or command; not for time_s
   double period_s = 0.0;  ///< for time_s: the true period of the rows; 0: as stamped
   double folded_every_rad = 2.0 * std::numbers::pi;  ///< for theta_rad: it was taken modulo this
@@ -62,5 +62,11 @@ std::string column_line(std::string_view quantity, const DatasetColumn& column);
 /// Factor from a named unit to the unit of the quantity ("deg" for theta_rad: pi / 180). Empty if the name is
 /// unknown.
 std::optional<double> factor_of_unit(std::string_view quantity, std::string_view unit);
+
+/// Whether a unit is the step of an encoder, whose size only the rig's builder knows.
+bool is_counts(std::string_view unit);
+
+/// The unit in the name of a column, as in `angle [deg]` or `angle (deg)`; otherwise empty.
+std::string_view unit_in_name(std::string_view column);
 
 }  // namespace upright

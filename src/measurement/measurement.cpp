@@ -10,6 +10,8 @@
 #include "experiment/experiment_file.hpp"
 #include "experiment/pieces/free_decay.hpp"
 #include "folded_angle.hpp"
+#include "mat_file.hpp"
+#include "mat_table.hpp"
 #include "upright/base/error.hpp"
 #include "upright/base/yaml_reader.hpp"
 #include "upright/record/run_reader.hpp"
@@ -33,7 +35,8 @@ bool is_constant(const std::vector<double>& values) {
 /// Collects a table's rows into a measurement, as they are read.
 class Collector {
  public:
-  Collector(const Dataset& dataset, Measurement& measurement) : dataset_(dataset), m_(measurement) {
+  /// Columns of `dataset` without a scale get that of the unit which the file itself names.
+  Collector(Dataset& dataset, Measurement& measurement) : dataset_(dataset), m_(measurement) {
     for (const std::string_view quantity : measured_quantities) {
       const auto at = dataset.columns.find(quantity);
       sources_.push_back(at == dataset.columns.end() ? nullptr : &at->second);
@@ -42,16 +45,22 @@ class Collector {
   }
 
   void read() {
-    read_csv(
-        dataset_.file, wanted_, dataset_.format, [this](const CsvTable& table) { begin(table); },
-        [this](const CsvRow& row) { take(row); });
+    const auto head = [this](const CsvTable& table) { begin(table); };
+    const auto sink = [this](const CsvRow& row) { take(row); };
+    if (is_mat_file(dataset_.file)) {
+      row_word_ = "row";
+      read_mat(dataset_.file, wanted_, head, sink);
+    } else {
+      read_csv(dataset_.file, wanted_, dataset_.format, head, sink);
+    }
     refuse_missing_rows();
     m_.missing_rows = missing_rows_;
     if (missing_rows_ == 0) return;
-    m_.notes.push_back(
-        m_.name + ": " + std::to_string(missing_rows_) + " of " + std::to_string(missing_rows_ + m_.size()) +
-        " rows have a cell without a number, the first in line " + std::to_string(first_missing_line_) +
-        "; they are " + (dataset_.missing == MissingCells::skip ? "skipped" : "gaps in the record"));
+    m_.notes.push_back(m_.name + ": " + std::to_string(missing_rows_) + " of " +
+                       std::to_string(missing_rows_ + m_.size()) +
+                       " rows have a cell without a number, the first in " + row_word_ + " " +
+                       std::to_string(first_missing_line_) + "; they are " +
+                       (dataset_.missing == MissingCells::skip ? "skipped" : "gaps in the record"));
   }
 
  private:
@@ -72,7 +81,7 @@ class Collector {
       throw ConfigError(at + "there is no column for voltage_v" + columns_of(table) +
                         ": map it in a dataset file, or set cart_locked: true there if the pendulum swings "
                         "alone (docs/reference/dataset-files.md)");
-    refuse_other_units(table);
+    apply_units(table);
   }
 
   static constexpr const char* map_them =
@@ -88,18 +97,28 @@ class Collector {
     return text + (table.names.size() > most ? ", ...)" : ")");
   }
 
-  /// A row of units is taken at its word where the dataset file says nothing of a scale.
-  void refuse_other_units(const CsvTable& table) const {
+  /// A unit in the file is taken at its word where the dataset file says nothing of a scale.
+  void apply_units(const CsvTable& table) {
     for (std::size_t q = 0; q < sources_.size(); ++q) {
       if (!place_[q] || sources_[q]->scaled) continue;
-      const auto factor = factor_of_unit(measured_quantities[q], table.units[q]);
+      DatasetColumn& source = *sources_[q];
+      const std::string unit(table.units[q].empty() ? unit_in_name(source.column) : table.units[q]);
+      if (is_counts(unit)) refuse_counts(source, measured_quantities[q]);
+      const auto factor = factor_of_unit(measured_quantities[q], unit);
       if (!factor || *factor == 1.0) continue;
-      DatasetColumn scaled = *sources_[q];
-      scaled.scale = *factor;
-      throw ConfigError(dataset_.file.string() + ":2: the row of units says that " + sources_[q]->column +
-                        " is in " + table.units[q] + ": put this line into the columns of a dataset file: " +
-                        column_line(measured_quantities[q], scaled));
+      source.scale = *factor;
+      source.scaled = true;
+      m_.notes.push_back(m_.name + ": " + source.column + " is in " + unit +
+                         " by the file's own header, so " + std::string(measured_quantities[q]) + " = " +
+                         exact_text(*factor) + " x cell");
     }
+  }
+
+  [[noreturn]] void refuse_counts(const DatasetColumn& source, std::string_view quantity) const {
+    throw ConfigError(dataset_.file.string() + ":1: the header says that " + source.column +
+                      " is in counts: say in the dataset file how large they are: " + std::string(quantity) +
+                      (quantity == "theta_rad" ? ": {column: NAME, unit: counts, counts_per_revolution: N}"
+                                               : ": {column: NAME, unit: counts, m_per_count: SIZE}"));
   }
 
   void take(const CsvRow& row) {
@@ -190,7 +209,8 @@ class Collector {
 
   const Dataset& dataset_;
   Measurement& m_;
-  std::vector<const DatasetColumn*> sources_;
+  std::vector<DatasetColumn*> sources_;
+  std::string row_word_ = "line";
   std::vector<std::string> wanted_;
   std::vector<std::optional<std::size_t>> place_;
   std::size_t missing_rows_ = 0, first_missing_line_ = 0;
@@ -232,12 +252,12 @@ void refuse_gaps_everywhere(const Measurement& m, const Dataset& dataset) {
       "a sensor is written less often than the rows, otherwise fill the cells");
 }
 
-Measurement load(const Dataset& dataset, const std::string& name) {
+Measurement load(Dataset dataset, const std::string& name) {
   Measurement m;
   m.name = name;
-  m.dataset = std::make_shared<const Dataset>(dataset);
   m.cart_locked = dataset.cart_locked;
   Collector(dataset, m).read();
+  m.dataset = std::make_shared<const Dataset>(dataset);
   refuse_too_short(m, dataset);
   refuse_gaps_everywhere(m, dataset);
   if (m.voltage_v.empty()) m.voltage_v.assign(m.size(), 0.0);

@@ -76,6 +76,7 @@ STAGES = {
     "docs/how-to/watch-remotely.md": Stage(
         setup="simulated_rig",
         replaced=((r"upright run (.*) --live", r"upright run \1 --live=0 --duration 1"),
+                  (r"upright run (.*) --stream", r"upright run \1 --duration 1 --stream"),
                   (r"experiments/pivot.yaml (.*) --live", r"experiments/sign-check.yaml \1 --live=0")),
         real_time=True),
     "docs/reference/commands.md": Stage(replaced=((r"COMMAND", "run"),)),

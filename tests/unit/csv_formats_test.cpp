@@ -102,15 +102,28 @@ TEST_F(CsvFormats, RefuseTextAndMixedSignsWithFileAndLine) {
   EXPECT_NE(refusal(file("c.csv", no_names)).find("header: false"), std::string::npos);
 }
 
-TEST_F(CsvFormats, SayWhatUnitARowOfUnitsNames) {
-  file("a.csv", table(',', '.', "\n", "ms,mm,V"));
-  const std::string refused = refusal(folder_ / "a.csv");
-  EXPECT_NE(refused.find("time_s: {column: time_s, scale: 0.001}"), std::string::npos) << refused;
+TEST_F(CsvFormats, NameTheirUnitsInARowOrInTheHeader) {
+  const Measurement named = read_measurement(file("a.csv", table(',', '.', "\n", "ms,mm,V")));
+  EXPECT_NEAR(named.time_s[1], 1e-3 * read_measurement(file("b.csv", table())).time_s[1], 1e-15);
+  EXPECT_NEAR(named.cart_m[1], 1e-6, 1e-12);
+  ASSERT_EQ(named.notes.size(), 2u);
+  EXPECT_NE(named.notes[1].find("cart_m is in mm"), std::string::npos) << named.notes[1];
+  // In the names of the columns.
+  const std::string body = table().substr(table().find('\n'));
+  const auto in_names = [&](const std::string& header, const std::string& columns) {
+    file("a.csv", header + body);
+    return file("d.yaml", "dataset:\n  file: a.csv\n  columns: {" + columns + ", voltage_v: u}\n");
+  };
+  const Measurement bracketed =
+      read_measurement(in_names("t [ms],x (cm),u", "time_s: \"t [ms]\", cart_m: \"x (cm)\""));
+  EXPECT_NEAR(bracketed.time_s[1], named.time_s[1], 1e-15);
+  EXPECT_NEAR(bracketed.cart_m[1], 1e-5, 1e-12);
+  // The dataset file knows better.
   const Measurement scaled = read_measurement(
-      file("d.yaml",
-           "dataset:\n  file: a.csv\n  columns: {time_s: {column: time_s, scale: 0.001}, cart_m: {column: "
-           "cart_m, scale: 0.001}, voltage_v: voltage_v}\n"));
-  EXPECT_NEAR(scaled.cart_m[1], 1e-6, 1e-12);
+      in_names("t [ms],x (cm),u", "time_s: \"t [ms]\", cart_m: {column: \"x (cm)\", scale: 0.5}"));
+  EXPECT_NEAR(scaled.cart_m[1], 5e-4, 1e-12);
+  const std::string counts = refusal(in_names("t,x [counts],u", "time_s: t, cart_m: \"x [counts]\""));
+  EXPECT_NE(counts.find("unit: counts, m_per_count"), std::string::npos) << counts;
 }
 
 TEST_F(CsvFormats, AreToldFromOtherFiles) {
@@ -125,7 +138,8 @@ TEST_F(CsvFormats, AreToldFromOtherFiles) {
   };
   for (const Other& other :
        {Other{"\xff\xfe" + utf16, "UTF-16", "iconv"}, Other{utf16, "UTF-16", "iconv"},
-        Other{version_5, "MATLAB v5", "writematrix"}, Other{version_73, "MATLAB v7.3", "writematrix"},
+        Other{version_5, "no MATLAB file that can be read", "save it again"},
+        Other{version_73, "no MATLAB file that can be read", "save it again"},
         Other{"\x89HDF\r\n\x1a\n"s, "HDF5", "h5py"}, Other{"PK\x03\x04"s, "spreadsheet", "CSV"},
         Other{table() + "\0"s, "zero byte", "CSV"}}) {
     const std::string refused = refusal(file("a.csv", other.text));
