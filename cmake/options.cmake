@@ -1,4 +1,4 @@
-# Compile options every target shares, and the two helpers that make a library or a test.
+# Compile options every target shares, and the helpers that make a library or a test.
 
 add_library(upright_options INTERFACE)
 target_compile_options(upright_options INTERFACE -Wall -Wextra -Wpedantic -Wshadow -Wno-psabi)
@@ -59,15 +59,35 @@ function(upright_library name)
   cmake_parse_arguments(arg "" "" "SOURCES;OFFERS;LINK;PRIVATE" ${ARGN})
   if(arg_SOURCES)
     add_library(${name} STATIC ${arg_SOURCES})
-    target_include_directories(${name} PUBLIC ${PROJECT_SOURCE_DIR}/include
-                               ${PROJECT_SOURCE_DIR}/src ${PROJECT_SOURCE_DIR})
-    target_link_libraries(${name} PUBLIC ${arg_LINK} PRIVATE ${arg_PRIVATE} upright_options)
+    target_include_directories(${name} PUBLIC $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/include>
+                               $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/src> $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}>)
+    # upright_options is of this build alone: whoever links an installed library has options of their own.
+    target_link_libraries(${name} PUBLIC ${arg_LINK} PRIVATE ${arg_PRIVATE} $<BUILD_INTERFACE:upright_options>)
     upright_compile_together(${name})
   else()
     add_library(${name} INTERFACE)
-    target_include_directories(${name} INTERFACE ${PROJECT_SOURCE_DIR}/include)
+    target_include_directories(${name} INTERFACE $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/include>)
     target_link_libraries(${name} INTERFACE ${arg_LINK})
   endif()
+endfunction()
+
+# upright_embed(TARGET NAME=FILE...): each file as the C++ text NAME.inc, which the sources of the target may include.
+function(upright_embed target)
+  set(folder ${CMAKE_CURRENT_BINARY_DIR}/embedded)
+  set(script ${PROJECT_SOURCE_DIR}/cmake/embed_text.cmake)
+  set(texts)
+  foreach(pair IN LISTS ARGN)
+    string(REGEX MATCH "^(.*)=(.*)$" pair ${pair})
+    set(text ${folder}/${CMAKE_MATCH_1}.inc)
+    cmake_path(ABSOLUTE_PATH CMAKE_MATCH_2 OUTPUT_VARIABLE file)
+    add_custom_command(OUTPUT ${text} COMMAND ${CMAKE_COMMAND} -DSOURCE=${file} -DOUTPUT=${text} -P ${script}
+                       DEPENDS ${file} ${script})
+    list(APPEND texts ${text})
+  endforeach()
+  target_sources(${target} PRIVATE ${texts})
+  target_include_directories(${target} PRIVATE ${folder})
+  add_custom_target(${target}_texts DEPENDS ${texts})
+  add_dependencies(embedded_texts ${target}_texts)
 endfunction()
 
 # upright_own_object(NAME INTO LIBRARY SOURCES... [ARCH -march] [OPTIONS COMPILE-OPTIONS...] LINK TARGETS... [UNSANITIZED

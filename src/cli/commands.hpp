@@ -26,7 +26,9 @@ AddCommand add_effects,
            add_diagnose,
            add_identify,
            add_virtual_rig,
-           add_doctor;
+           add_doctor,
+           add_completion,
+           add_manual;
 
 inline constexpr std::array all_commands = {add_effects,
                                             add_check,
@@ -42,7 +44,9 @@ inline constexpr std::array all_commands = {add_effects,
                                             add_diagnose,
                                             add_identify,
                                             add_virtual_rig,
-                                            add_doctor};
+                                            add_doctor,
+                                            add_completion,
+                                            add_manual};
 // clang-format on
 
 }  // namespace upright::cli
