@@ -6,9 +6,13 @@ option(UPRIGHT_PACKAGE "Install what a package of the system has too: udev rule,
 
 # The program, and the texts that it writes about itself.
 install(TARGETS upright RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
-install(DIRECTORY config DESTINATION ${CMAKE_INSTALL_DATADIR}/upright)
+install(DIRECTORY config examples DESTINATION ${CMAKE_INSTALL_DATADIR}/upright)
+# The engines are compiled for a fixed list of effects: who adds one builds from this (examples/own-effect).
+install(DIRECTORY src sim hal studies include cmake packaging config examples
+        DESTINATION ${CMAKE_INSTALL_DATADIR}/upright/source)
+install(FILES CMakeLists.txt CHANGELOG.md LICENSE DESTINATION ${CMAKE_INSTALL_DATADIR}/upright/source)
 
-set(texts ${CMAKE_BINARY_DIR}/texts)
+set(texts ${PROJECT_BINARY_DIR}/texts)
 set(completions bash/upright zsh/_upright fish/upright.fish)
 set(completion_commands)
 foreach(completion IN LISTS completions)
@@ -42,11 +46,12 @@ target_compile_features(upright_base INTERFACE cxx_std_20)
 set(library_folder ${CMAKE_INSTALL_LIBDIR}/cmake/upright)
 install(EXPORT upright NAMESPACE upright:: FILE upright-targets.cmake DESTINATION ${library_folder})
 install(DIRECTORY include/upright DESTINATION ${CMAKE_INSTALL_INCLUDEDIR})
-configure_package_config_file(cmake/upright-config.cmake.in ${CMAKE_BINARY_DIR}/upright-config.cmake
-                              INSTALL_DESTINATION ${library_folder})
+set(upright_source ${CMAKE_INSTALL_DATADIR}/upright/source)
+configure_package_config_file(cmake/upright-config.cmake.in ${PROJECT_BINARY_DIR}/upright-config.cmake
+                              INSTALL_DESTINATION ${library_folder} PATH_VARS upright_source)
 # Before version 1 a minor version may change the API.
-write_basic_package_version_file(${CMAKE_BINARY_DIR}/upright-config-version.cmake COMPATIBILITY SameMinorVersion)
-install(FILES ${CMAKE_BINARY_DIR}/upright-config.cmake ${CMAKE_BINARY_DIR}/upright-config-version.cmake
+write_basic_package_version_file(${PROJECT_BINARY_DIR}/upright-config-version.cmake COMPATIBILITY SameMinorVersion)
+install(FILES ${PROJECT_BINARY_DIR}/upright-config.cmake ${PROJECT_BINARY_DIR}/upright-config-version.cmake
         DESTINATION ${library_folder})
 
 if(UPRIGHT_PACKAGE)

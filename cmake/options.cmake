@@ -30,6 +30,13 @@ if(UPRIGHT_FUZZ)
   target_compile_options(upright_options INTERFACE -fsanitize=fuzzer-no-link)
 endif()
 
+# Effects of one's own: a header in place of include/upright/model/effects/all.hpp, which therefore stands first everywhere.
+set(extra_folder)
+if(UPRIGHT_EXTRA_EFFECTS)
+  set(extra_folder ${PROJECT_BINARY_DIR}/extra)
+  configure_file(${PROJECT_SOURCE_DIR}/cmake/extra_effects.hpp.in ${extra_folder}/upright/model/effects/all.hpp @ONLY)
+endif()
+
 # upright_compile_together(NAME): the sources of a folder are one translation unit. Most of their compile time is the reading of
 # headers, which is done once then. The names in the unnamed namespaces of a folder must therefore differ.
 function(upright_compile_together name)
@@ -59,7 +66,7 @@ function(upright_library name)
   cmake_parse_arguments(arg "" "" "SOURCES;OFFERS;LINK;PRIVATE" ${ARGN})
   if(arg_SOURCES)
     add_library(${name} STATIC ${arg_SOURCES})
-    target_include_directories(${name} PUBLIC $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/include>
+    target_include_directories(${name} PUBLIC $<BUILD_INTERFACE:${extra_folder}> $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/include>
                                $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/src> $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}>)
     # upright_options is of this build alone: whoever links an installed library has options of their own.
     target_link_libraries(${name} PUBLIC ${arg_LINK} PRIVATE ${arg_PRIVATE} $<BUILD_INTERFACE:upright_options>)
@@ -98,7 +105,7 @@ function(upright_own_object name)
   cmake_parse_arguments(arg "" "INTO;ARCH" "SOURCES;OPTIONS;LINK;UNSANITIZED" ${ARGN})
   add_library(${name} OBJECT ${arg_SOURCES})
   upright_optimise(${name} 3)
-  target_include_directories(${name} PRIVATE ${PROJECT_SOURCE_DIR}/include ${PROJECT_SOURCE_DIR}/src ${PROJECT_SOURCE_DIR})
+  target_include_directories(${name} PRIVATE ${extra_folder} ${PROJECT_SOURCE_DIR}/include ${PROJECT_SOURCE_DIR}/src ${PROJECT_SOURCE_DIR})
   # A target of its own, and the last one: then these options win over those before.
   add_library(${name}_options INTERFACE)
   target_compile_options(${name}_options INTERFACE ${arg_OPTIONS})

@@ -9,8 +9,8 @@ file(STRINGS CHANGELOG.md release REGEX "^## \\[${PROJECT_VERSION}\\] - ")
 string(REGEX MATCH "[0-9]+-[0-9]+-[0-9]+" release "${release}")
 execute_process(COMMAND date --utc --rfc-email "--date=${release}" OUTPUT_VARIABLE release_date
                 OUTPUT_STRIP_TRAILING_WHITESPACE COMMAND_ERROR_IS_FATAL ANY)
-configure_file(${packaging}/changelog.in ${CMAKE_BINARY_DIR}/packaging/changelog @ONLY)
-install(FILES ${CMAKE_BINARY_DIR}/packaging/changelog CHANGELOG.md DESTINATION ${CMAKE_INSTALL_DOCDIR})
+configure_file(${packaging}/changelog.in ${PROJECT_BINARY_DIR}/packaging/changelog @ONLY)
+install(FILES ${PROJECT_BINARY_DIR}/packaging/changelog CHANGELOG.md DESTINATION ${CMAKE_INSTALL_DOCDIR})
 # Debian wants changelogs and manual pages compressed; without a time in them each build has the same bytes.
 install(CODE "
   set(root \"\$ENV{DESTDIR}\")

@@ -20,7 +20,7 @@ kernel_packages=(qemu-system-x86 busybox-static libelf1)
 packaging_packages=(dpkg-dev file lintian debootstrap)
 development_packages=(
   clang-14 clang-format-14 clang-tidy-14 clang-tools-14 libclang-rt-14-dev libomp-14-dev ccache
-  gcc-avr avr-libc libsimavr-dev codespell
+  gcc-avr avr-libc libsimavr-dev codespell doxygen
 )
 case "${1:-}" in
   '') ;;

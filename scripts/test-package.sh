@@ -21,6 +21,7 @@ skip() {
 package=${1:-$(scripts/package.sh)}
 echo "checking $(basename "$package"), $(($(stat -c %s "$package") / 1024)) KiB"
 # As root lintian warns about itself.
+scripts/test-examples.sh "$package"
 lintian --allow-root --fail-on error --tag-display-limit 0 "$package"
 
 [ "$(id -u)" -eq 0 ] || skip "only root can enter another system"

@@ -101,6 +101,9 @@ STAGES = {
 
 # Run by something else: an expression of the command, who runs it, the file that says so, and what stands there.
 ELSEWHERE = (
+    (r"scripts/api-reference\.sh", ".ci/run, step 'reference of the library'", ".ci/run", "scripts/api-reference.sh"),
+    (r"cmake -DUPRIGHT_EXTRA_EFFECTS=FILE", ".ci/run, step 'Debian package': the example own-effect",
+     "examples/own-effect/CMakeLists.txt", "UPRIGHT_EXTRA_EFFECTS"),
     (r"scripts/(package|test-package)\.sh", ".ci/run, step 'Debian package'", ".ci/run", "scripts/test-package.sh"),
     (r"sudo apt-get install \./upright_\*_amd64\.deb", ".ci/run, step 'Debian package'", "scripts/test-package.sh",
      "apt-get install -y --no-install-recommends"),

@@ -12,7 +12,8 @@ class YamlKeys;
 
 /// A lower and an upper bound of a quantity.
 struct Bounds {
-  double low = 0.0, high = 0.0;
+  double low = 0.0;   ///< lower end
+  double high = 0.0;  ///< upper end
 };
 
 /// The defaults cover an IP02 with up to 2 N of dry friction, an actuator that is up to 30 ms late, and
