@@ -14,6 +14,7 @@ using AddCommand = void(CommandLine&);
 // clang-format off
 AddCommand add_effects,
            add_check,
+           add_new,
            add_paper,
            add_sweep,
            add_run,
@@ -32,6 +33,7 @@ AddCommand add_effects,
 
 inline constexpr std::array all_commands = {add_effects,
                                             add_check,
+                                            add_new,
                                             add_paper,
                                             add_sweep,
                                             add_run,
