@@ -1,4 +1,4 @@
-# Compile options every target shares, and the two helpers that make a library or a test.
+# Compile options every target shares, and the helpers that make a library or a test.
 
 add_library(upright_options INTERFACE)
 target_compile_options(upright_options INTERFACE -Wall -Wextra -Wpedantic -Wshadow -Wno-psabi)
@@ -30,6 +30,13 @@ if(UPRIGHT_FUZZ)
   target_compile_options(upright_options INTERFACE -fsanitize=fuzzer-no-link)
 endif()
 
+# Effects of one's own: a header in place of include/upright/model/effects/all.hpp, which therefore stands first everywhere.
+set(extra_folder)
+if(UPRIGHT_EXTRA_EFFECTS)
+  set(extra_folder ${PROJECT_BINARY_DIR}/extra)
+  configure_file(${PROJECT_SOURCE_DIR}/cmake/extra_effects.hpp.in ${extra_folder}/upright/model/effects/all.hpp @ONLY)
+endif()
+
 # upright_compile_together(NAME): the sources of a folder are one translation unit. Most of their compile time is the reading of
 # headers, which is done once then. The names in the unnamed namespaces of a folder must therefore differ.
 function(upright_compile_together name)
@@ -59,15 +66,35 @@ function(upright_library name)
   cmake_parse_arguments(arg "" "" "SOURCES;OFFERS;LINK;PRIVATE" ${ARGN})
   if(arg_SOURCES)
     add_library(${name} STATIC ${arg_SOURCES})
-    target_include_directories(${name} PUBLIC ${PROJECT_SOURCE_DIR}/include
-                               ${PROJECT_SOURCE_DIR}/src ${PROJECT_SOURCE_DIR})
-    target_link_libraries(${name} PUBLIC ${arg_LINK} PRIVATE ${arg_PRIVATE} upright_options)
+    target_include_directories(${name} PUBLIC $<BUILD_INTERFACE:${extra_folder}> $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/include>
+                               $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/src> $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}>)
+    # upright_options is of this build alone: whoever links an installed library has options of their own.
+    target_link_libraries(${name} PUBLIC ${arg_LINK} PRIVATE ${arg_PRIVATE} $<BUILD_INTERFACE:upright_options>)
     upright_compile_together(${name})
   else()
     add_library(${name} INTERFACE)
-    target_include_directories(${name} INTERFACE ${PROJECT_SOURCE_DIR}/include)
+    target_include_directories(${name} INTERFACE $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/include>)
     target_link_libraries(${name} INTERFACE ${arg_LINK})
   endif()
+endfunction()
+
+# upright_embed(TARGET NAME=FILE...): each file as the C++ text NAME.inc, which the sources of the target may include.
+function(upright_embed target)
+  set(folder ${CMAKE_CURRENT_BINARY_DIR}/embedded)
+  set(script ${PROJECT_SOURCE_DIR}/cmake/embed_text.cmake)
+  set(texts)
+  foreach(pair IN LISTS ARGN)
+    string(REGEX MATCH "^(.*)=(.*)$" pair ${pair})
+    set(text ${folder}/${CMAKE_MATCH_1}.inc)
+    cmake_path(ABSOLUTE_PATH CMAKE_MATCH_2 OUTPUT_VARIABLE file)
+    add_custom_command(OUTPUT ${text} COMMAND ${CMAKE_COMMAND} -DSOURCE=${file} -DOUTPUT=${text} -P ${script}
+                       DEPENDS ${file} ${script})
+    list(APPEND texts ${text})
+  endforeach()
+  target_sources(${target} PRIVATE ${texts})
+  target_include_directories(${target} PRIVATE ${folder})
+  add_custom_target(${target}_texts DEPENDS ${texts})
+  add_dependencies(embedded_texts ${target}_texts)
 endfunction()
 
 # upright_own_object(NAME INTO LIBRARY SOURCES... [ARCH -march] [OPTIONS COMPILE-OPTIONS...] LINK TARGETS... [UNSANITIZED
@@ -78,7 +105,7 @@ function(upright_own_object name)
   cmake_parse_arguments(arg "" "INTO;ARCH" "SOURCES;OPTIONS;LINK;UNSANITIZED" ${ARGN})
   add_library(${name} OBJECT ${arg_SOURCES})
   upright_optimise(${name} 3)
-  target_include_directories(${name} PRIVATE ${PROJECT_SOURCE_DIR}/include ${PROJECT_SOURCE_DIR}/src ${PROJECT_SOURCE_DIR})
+  target_include_directories(${name} PRIVATE ${extra_folder} ${PROJECT_SOURCE_DIR}/include ${PROJECT_SOURCE_DIR}/src ${PROJECT_SOURCE_DIR})
   # A target of its own, and the last one: then these options win over those before.
   add_library(${name}_options INTERFACE)
   target_compile_options(${name}_options INTERFACE ${arg_OPTIONS})

@@ -3,6 +3,7 @@
 #   scripts/install-deps.sh           packages for building and for the demo
 #   scripts/install-deps.sh --test    also the browser for the tests of the live page
 #   scripts/install-deps.sh --kernel  also QEMU and busybox for the kernel tests of GPIO and Comedi
+#   scripts/install-deps.sh --package also what builds and tests the Debian package
 #   scripts/install-deps.sh --dev     also everything for .ci/run: all of these, clang's formatter, linter, sanitizers and
 #                                     fuzzer, ccache, compiler and emulator for the board's firmware, a spelling checker
 set -euo pipefail
@@ -16,16 +17,18 @@ packages=(
 )
 test_packages=(chromium chromium-driver)
 kernel_packages=(qemu-system-x86 busybox-static libelf1)
+packaging_packages=(dpkg-dev file lintian debootstrap)
 development_packages=(
   clang-14 clang-format-14 clang-tidy-14 clang-tools-14 libclang-rt-14-dev libomp-14-dev ccache
-  gcc-avr avr-libc libsimavr-dev codespell
+  gcc-avr avr-libc libsimavr-dev codespell doxygen
 )
 case "${1:-}" in
   '') ;;
   --test) packages+=("${test_packages[@]}") ;;
   --kernel) packages+=("${kernel_packages[@]}") ;;
-  --dev) packages+=("${test_packages[@]}" "${kernel_packages[@]}" "${development_packages[@]}") ;;
-  *) echo "usage: scripts/install-deps.sh [--test | --kernel | --dev]" >&2; exit 2 ;;
+  --package) packages+=("${packaging_packages[@]}") ;;
+  --dev) packages+=("${test_packages[@]}" "${kernel_packages[@]}" "${packaging_packages[@]}" "${development_packages[@]}") ;;
+  *) echo "usage: scripts/install-deps.sh [--test | --kernel | --package | --dev]" >&2; exit 2 ;;
 esac
 
 command -v apt-get >/dev/null || {

@@ -6,6 +6,7 @@
 - docs/reference/effects.md: every effect of the registry, from `upright effects --json`.
 - docs/reference/commands.md: the options of every command, from its `--help`.
 - docs/reference/diagnosis-rules.md: every limit of SelectionPolicy with its comment, from src/diagnosis/selection_policy.hpp.
+- docs/reference/library.md: every header of include/upright with the first sentence of its comment.
 The parts are between two marker lines. The exit code is 1, with a line for each page that differs.
 """
 import argparse
@@ -77,6 +78,34 @@ def limits_of(header):
     return lines
 
 
+# The libraries that users link, and the folders of include/upright that each adds to those before.
+LIBRARIES = (("model", ("base", "model")), ("sim", ("sim", "sim/loop")), ("control", ("control",)), ("hal", ("hal",)),
+             ("runtime", ("record", "runtime")), ("diagnosis", ("measurement", "estimation", "diagnosis")))
+
+
+def first_sentence(header):
+    comment = []
+    for line in header.read_text().splitlines():
+        if not line.startswith("// "):
+            break
+        comment.append(line.removeprefix("// "))
+    return re.split(r"\. |\.$", " ".join(comment))[0]
+
+
+def headers_of(include):
+    lines, listed = [], set()
+    for library, folders in LIBRARIES:
+        lines += ["", f"### upright::{library}", "", "| header | holds |", "|---|---|"]
+        for header in (header for folder in folders for header in sorted((include / folder).glob("*.hpp"))):
+            listed.add(header)
+            lines.append(f"| `include/upright/{header.relative_to(include).as_posix()}` | {cell(first_sentence(header))} |")
+    # One header for each effect, which registry.hpp includes.
+    left = set(include.rglob("*.hpp")) - listed - set((include / "model" / "effects").glob("*.hpp"))
+    if left:
+        sys.exit(f"{sorted(left)[0]}: belongs to no library of docs/reference/library.md: add its folder to LIBRARIES")
+    return lines
+
+
 def plain(comment):
     return " ".join(line.strip().removeprefix("///").strip() for line in comment.strip().split("\n"))
 
@@ -90,7 +119,7 @@ def main():
     wrong = 0
     limits = limits_of(arguments.root / "src" / "diagnosis" / "selection_policy.hpp")
     for name, lines in (("effects", effects_of(arguments.upright)), ("commands", commands_of(arguments.upright)),
-                        ("diagnosis-rules", limits)):
+                        ("diagnosis-rules", limits), ("library", headers_of(arguments.root / "include" / "upright"))):
         page = arguments.root / "docs" / "reference" / f"{name}.md"
         text = page.read_text()
         begin, end = text.index(BEGIN), text.index(END)

@@ -1,21 +1,26 @@
-// The lanes are compiled twice from the same source, each time in a separate namespace: UPRIGHT_LANES is
-// wide_lanes or baseline_lanes.
+// The lanes are compiled from one source for several kinds of registers, each time in a separate namespace,
+// UPRIGHT_LANES: baseline_lanes and wide_lanes; with UPRIGHT_DISPATCH avx2_lanes and avx512_lanes in place of
+// wide_lanes.
 #pragma once
 
 #include <span>
 
 #include "upright/sim/loop/loop_run.hpp"
 
+#define UPRIGHT_DECLARE_LANES(name)                                                                 \
+  namespace name {                                                                                  \
+  std::size_t runs_side_by_side();                                                                  \
+  void run(const LoopSetup& setup, std::span<const LoopCase> cases, std::span<LoopResult> results); \
+  }
+
 namespace upright {
 
-namespace wide_lanes {
-std::size_t runs_side_by_side();
-void run(const LoopSetup& setup, std::span<const LoopCase> cases, std::span<LoopResult> results);
-}  // namespace wide_lanes
-
-namespace baseline_lanes {
-std::size_t runs_side_by_side();
-void run(const LoopSetup& setup, std::span<const LoopCase> cases, std::span<LoopResult> results);
-}  // namespace baseline_lanes
+UPRIGHT_DECLARE_LANES(baseline_lanes)
+#ifdef UPRIGHT_DISPATCH
+UPRIGHT_DECLARE_LANES(avx2_lanes)
+UPRIGHT_DECLARE_LANES(avx512_lanes)
+#else
+UPRIGHT_DECLARE_LANES(wide_lanes)
+#endif
 
 }  // namespace upright

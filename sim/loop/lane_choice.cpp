@@ -1,8 +1,56 @@
+#include <cstdlib>
+#include <string_view>
+
 #include "event_lane.hpp"
 #include "fast_loop.hpp"
 #include "lane_builds.hpp"
 
 namespace upright {
+
+namespace {
+
+/// One compilation of the lanes.
+struct LaneBuild {
+  std::size_t (*runs_side_by_side)();
+  void (*run)(const LoopSetup& setup, std::span<const LoopCase> cases, std::span<LoopResult> results);
+};
+
+constexpr LaneBuild baseline{baseline_lanes::runs_side_by_side, baseline_lanes::run};
+
+#ifdef UPRIGHT_DISPATCH
+/// What the compiler may use with -march=x86-64-v3, as far as the lanes do.
+bool has_avx2() {
+  return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") && __builtin_cpu_supports("bmi") &&
+         __builtin_cpu_supports("bmi2");
+}
+
+/// The same with -march=x86-64-v4.
+bool has_avx512() {
+  return has_avx2() && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512bw") &&
+         __builtin_cpu_supports("avx512cd") && __builtin_cpu_supports("avx512dq") &&
+         __builtin_cpu_supports("avx512vl");
+}
+
+/// The lanes for this processor. UPRIGHT_LANES chooses narrower ones: baseline or avx2.
+LaneBuild widest() {
+  const char* text = std::getenv("UPRIGHT_LANES");  // NOLINT(concurrency-mt-unsafe): nothing sets it
+  const std::string_view most = text != nullptr ? text : "avx512";
+  if (most == "baseline" || !has_avx2()) return baseline;
+  if (most == "avx2" || !has_avx512()) return {avx2_lanes::runs_side_by_side, avx2_lanes::run};
+  return {avx512_lanes::runs_side_by_side, avx512_lanes::run};
+}
+#else
+LaneBuild widest() {
+  return {wide_lanes::runs_side_by_side, wide_lanes::run};
+}
+#endif
+
+const LaneBuild& lanes_for(LaneRegisters registers) {
+  static const LaneBuild wide = widest();
+  return registers == LaneRegisters::wide ? wide : baseline;
+}
+
+}  // namespace
 
 bool lanes_can_run(const LoopSetup& setup) {
   if (setup.make_parts || setup.model.cart_locked || !setup.model.has_pendulum) return false;
@@ -15,13 +63,12 @@ bool lanes_can_run(const LoopSetup& setup) {
 }
 
 std::size_t runs_side_by_side(LaneRegisters registers) {
-  return registers == LaneRegisters::wide ? wide_lanes::runs_side_by_side()
-                                          : baseline_lanes::runs_side_by_side();
+  return lanes_for(registers).runs_side_by_side();
 }
 
 void run_on_lanes(const LoopSetup& setup, std::span<const LoopCase> cases, std::span<LoopResult> results,
                   LaneRegisters registers) {
-  (registers == LaneRegisters::wide ? wide_lanes::run : baseline_lanes::run)(setup, cases, results);
+  lanes_for(registers).run(setup, cases, results);
 }
 
 }  // namespace upright

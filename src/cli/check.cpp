@@ -1,4 +1,6 @@
 // `upright check`: reads files as the other commands would, without hardware.
+#include "check.hpp"
+
 #include <algorithm>
 #include <array>
 #include <iostream>
@@ -181,6 +183,10 @@ bool check_all(const std::vector<std::string>& files, bool as_json) {
 }
 
 }  // namespace
+
+std::string fault_of_file(const std::string& file) {
+  return check(file).error;
+}
 
 void add_check(CommandLine& line) {
   const Command command = line.command(

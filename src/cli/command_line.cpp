@@ -230,4 +230,55 @@ ExitCode CommandLine::run(int argc, const char* const* argv) {
   return exit_code_;
 }
 
+namespace {
+
+/// The words between the braces of "TEXT:{a,b}", which CLI11 writes where the value is one of few.
+std::vector<std::string> words_of(const std::string& value) {
+  const std::size_t open = value.find('{'), close = value.find('}');
+  std::vector<std::string> words;
+  if (open == std::string::npos || close == std::string::npos) return words;
+  std::string word;
+  for (const char c : value.substr(open + 1, close - open - 1) + ",") {
+    if (c == ',')
+      words.push_back(std::exchange(word, ""));
+    else
+      word += c;
+  }
+  return words;
+}
+
+OptionText text_of(const CLI::Option& option) {
+  OptionText text;
+  text.in_place = option.get_positional();
+  if (text.in_place) text.names.push_back(option.get_single_name());
+  for (const std::string& name : option.get_snames()) text.names.push_back("-" + name);
+  for (const std::string& name : option.get_lnames()) text.names.push_back("--" + name);
+  text.meaning = option.get_description();
+  // Flags take no word; --live may have a text, joined to it by '='.
+  if (option.get_items_expected_max() > 0) text.value = option.get_type_name();
+  text.words = words_of(text.value);
+  text.required = option.get_required();
+  text.many = option.get_items_expected_max() > 1;
+  return text;
+}
+
+CommandText text_of(const CLI::App& app) {
+  CommandText text{app.get_name(), app.get_description(), app.get_footer(), {}};
+  for (const CLI::Option* option : app.get_options()) text.options.push_back(text_of(*option));
+  return text;
+}
+
+}  // namespace
+
+CommandText CommandLine::text() const {
+  return text_of(*app_);
+}
+
+std::vector<CommandText> CommandLine::commands() const {
+  std::vector<CommandText> texts;
+  for (const CLI::App* command : app_->get_subcommands([](const CLI::App*) { return true; }))
+    texts.push_back(text_of(*command));
+  return texts;
+}
+
 }  // namespace upright::cli

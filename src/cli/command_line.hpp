@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "command_text.hpp"
 #include "upright/base/error.hpp"
 #include "upright/base/yaml_reader.hpp"
 
@@ -80,6 +81,11 @@ class CommandLine {
   /// Reads what was typed and runs that command, or prints the help that was asked for. Throws ConfigError
   /// for what makes no sense, and what the command throws.
   ExitCode run(int argc, const char* const* argv);
+
+  const std::string& name() const noexcept { return name_; }
+  /// The program itself, with the options that it has without a command.
+  CommandText text() const;
+  std::vector<CommandText> commands() const;
 
  private:
   std::vector<std::string> joined(int argc, const char* const* argv) const;

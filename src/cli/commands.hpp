@@ -14,6 +14,7 @@ using AddCommand = void(CommandLine&);
 // clang-format off
 AddCommand add_effects,
            add_check,
+           add_new,
            add_paper,
            add_sweep,
            add_run,
@@ -29,10 +30,13 @@ AddCommand add_effects,
            add_import,
            add_export,
            add_virtual_rig,
-           add_doctor;
+           add_doctor,
+           add_completion,
+           add_manual;
 
 inline constexpr std::array all_commands = {add_effects,
                                             add_check,
+                                            add_new,
                                             add_paper,
                                             add_sweep,
                                             add_run,
@@ -48,7 +52,9 @@ inline constexpr std::array all_commands = {add_effects,
                                             add_import,
                                             add_export,
                                             add_virtual_rig,
-                                            add_doctor};
+                                            add_doctor,
+                                            add_completion,
+                                            add_manual};
 // clang-format on
 
 }  // namespace upright::cli

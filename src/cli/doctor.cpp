@@ -1,4 +1,5 @@
 // `upright doctor`: what this machine, and with a rig its link, are good for, on one page with one verdict.
+#include <pwd.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -12,6 +13,7 @@
 
 #include "commands.hpp"
 #include "commissioning/machine_check.hpp"
+#include "commissioning/machine_fix.hpp"
 #include "commissioning/rig_check.hpp"
 #include "commissioning/wake_probe.hpp"
 #include "hal/quanser_proof.hpp"
@@ -34,7 +36,7 @@ struct DoctorArguments {
   std::string rig, gains;
   std::optional<double> rate_hz;
   double seconds = 10.0, hand_s = 30.0;
-  bool by_hand = false, as_json = false;
+  bool by_hand = false, fix = false, as_json = false;
 };
 
 /// What was measured, beside what it means.
@@ -209,7 +211,29 @@ void print(const Page& page, Health verdict) {
   std::fflush(stdout);
 }
 
+std::string user_name() {
+  const passwd* const user = ::getpwuid(::getuid());  // NOLINT(concurrency-mt-unsafe): before any thread
+  return user != nullptr ? user->pw_name : std::to_string(::getuid());
+}
+
+/// Prints what a person with root's rights can do for this machine. Changes nothing.
+ExitCode print_fixes() {
+  if (::geteuid() == 0)
+    std::puts("# Root needs no limits and no group: run this as the user who runs the loop to examine them.");
+  const std::vector<std::string> lines = commands_to_fix(examine_machine(), user_name());
+  std::puts(lines.empty()
+                ? "# Nothing needs to be done."
+                : "# Nothing has been changed. Choose what suits this machine, and run it as root:");
+  for (const std::string& line : lines) std::puts(line.c_str());
+  return ExitCode::done;
+}
+
 ExitCode run(const DoctorArguments& arguments) {
+  if (arguments.fix) {
+    if (!arguments.rig.empty() || arguments.as_json)
+      throw ConfigError("--fix is about this machine alone: remove --rig and --json");
+    return print_fixes();
+  }
   std::optional<RigFile> rig;
   if (!arguments.rig.empty()) rig = read_rig_file(arguments.rig);
   Page page;
@@ -230,7 +254,9 @@ ExitCode run(const DoctorArguments& arguments) {
 void add_doctor(CommandLine& line) {
   const Command command =
       line.command("doctor", "Test the timing of this machine and, with --rig, the link and wiring of a rig",
-                   "Example:  upright doctor --rig config/rigs/modbus-tcp.yaml --rate 500\n"
+                   "Examples:\n"
+                   "  upright doctor --rig config/rigs/modbus-tcp.yaml --rate 500\n"
+                   "  upright doctor --fix\n"
                    "It keeps the motor at zero volts. Every problem comes with a remedy.\n"
                    "Exit code 4 means that the verdict is bad.");
   const auto a = std::make_shared<DoctorArguments>();
@@ -248,6 +274,8 @@ void add_doctor(CommandLine& line) {
       "Test encoder signs, emergency stop and limit switches; asks you to move or press them by hand");
   command.option("--hand-wait", a->hand_s, "How long to wait for each movement by hand [s] (default: 30)")
       .in({0.0, longest_s, true});
+  command.flag("--fix", a->fix,
+               "Print the commands that make this machine suitable; measures and changes nothing");
   command.flag("--json", a->as_json, "Print one JSON document");
   command.does([a] { return run(*a); });
 }

@@ -45,25 +45,41 @@ void print(const EffectInfo& effect) {
   std::cout << "\n";
 }
 
-void print_all(bool as_json) {
-  if (!as_json) {
-    for (const EffectInfo& effect : effect_registry()) print(effect);
-    return;
-  }
+/// One effect, or all when `only` is empty.
+void print_effects(const std::string& only, bool as_json) {
   Json list = Json::array();
-  for (const EffectInfo& effect : effect_registry()) list.push_back(json_of(effect));
-  std::cout << Json{{"effects", list}}.dump(2) << "\n";
+  for (const EffectInfo& effect : effect_registry()) {
+    if (!only.empty() && effect.kind != only) continue;
+    if (as_json)
+      list.push_back(json_of(effect));
+    else
+      print(effect);
+  }
+  if (as_json) std::cout << Json{{"effects", list}}.dump(2) << "\n";
+}
+
+std::string fault_of_kind(const std::string& kind) {
+  if (effect_number(kind) < effect_count) return "";
+  std::vector<std::string> kinds;
+  for (const EffectInfo& info : effect_registry()) kinds.emplace_back(info.kind);
+  const std::string near = nearest_name(kind, kinds);
+  return "there is no effect '" + kind.substr(0, 80) + "'" +
+         (near.empty() ? "" : ", did you mean " + near + "?");
 }
 
 }  // namespace
 
 void add_effects(CommandLine& line) {
   const Command command = line.command("effects", "List every effect that a plant file can contain",
-                                       "Example:  upright effects --json");
+                                       "Examples:\n"
+                                       "  upright effects --json\n"
+                                       "  upright effects coulomb_friction");
+  const auto only = std::make_shared<std::string>();
   const auto as_json = std::make_shared<bool>(false);
+  command.option("effect", *only, "Kind of one effect (default: all)").without(fault_of_kind);
   command.flag("--json", *as_json, "Print one JSON document");
-  command.does([as_json] {
-    print_all(*as_json);
+  command.does([only, as_json] {
+    print_effects(*only, *as_json);
     return ExitCode::done;
   });
 }

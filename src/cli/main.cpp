@@ -1,11 +1,14 @@
 // The program: its commands, and whatever goes wrong as one sentence and an exit code.
+#include <algorithm>
 #include <csignal>
 #include <exception>
 #include <iostream>
 #include <new>
 #include <string>
+#include <vector>
 
 #include "commands.hpp"
+#include "completion.hpp"
 #include "options.hpp"
 #include "upright/base/error.hpp"
 
@@ -26,7 +29,9 @@ ExitCode run(int argc, char** argv) {
       "Exit codes: 0 success, 2 usage or configuration error, 3 stopped or fallen, "
       "4 link or device error");
   for (upright::cli::AddCommand* add : upright::cli::all_commands) add(line);
-  const ExitCode code = line.run(argc, argv);
+  const std::vector<std::string> words(argv + 1, argv + std::max(argc, 1));
+  const bool from_shell = !words.empty() && words.front() == upright::cli::completing;
+  const ExitCode code = from_shell ? upright::cli::complete(line, words) : line.run(argc, argv);
   upright::cli::finish_output();
   return code;
 }

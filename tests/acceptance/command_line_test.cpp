@@ -83,6 +83,13 @@ TEST(CommandLine, EffectsListsTheRegistryAsOneJsonDocument) {
   }
 }
 
+TEST(CommandLine, EffectsOfOneKindListsThatOneAlone) {
+  const Json effects = Json::parse(run_upright("effects coulomb_friction --json").out).at("effects");
+  ASSERT_EQ(effects.size(), 1u);
+  EXPECT_EQ(effects.at(0).at("kind"), "coulomb_friction");
+  expect_one_sentence(run_upright("effects coulomb_frictoin"), "did you mean coulomb_friction?");
+}
+
 TEST(CommandLine, CheckReportsEveryFileAndFailsWhenOneIsBad) {
   const TemporaryFolder folder;
   const std::string good = UPRIGHT_SOURCE_DIR "/config/plants/viscous.yaml";

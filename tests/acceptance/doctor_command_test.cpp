@@ -71,6 +71,14 @@ TEST(Doctor, SaysOnOnePageWhatTheMachineIsGoodFor) {
     }
 }
 
+TEST(Doctor, PrintsTheCommandsThatRepairAMachine) {
+  const CommandResult result = run_upright("doctor --fix");
+  EXPECT_EQ(result.exit_code, 0);
+  // A shell must understand each line.
+  EXPECT_EQ(run_shell("bash -n <<'SCRIPT'\n" + result.out + "SCRIPT\n").exit_code, 0) << result.out;
+  EXPECT_EQ(run_upright("doctor --fix --json").exit_code, 2);
+}
+
 TEST(Doctor, GivesOneDocumentWhoseVerdictFollowsFromItsFindings) {
   const CommandResult result = run_upright("doctor --seconds 0.2 --rate 200 --json");
   const Json document = parsed(result);

@@ -102,6 +102,18 @@ STAGES = {
 
 # Run by something else: an expression of the command, who runs it, the file that says so, and what stands there.
 ELSEWHERE = (
+    (r"scripts/api-reference\.sh", ".ci/run, step 'reference of the library'", ".ci/run", "scripts/api-reference.sh"),
+    (r"cmake -DUPRIGHT_EXTRA_EFFECTS=FILE", ".ci/run, step 'Debian package': the example own-effect",
+     "examples/own-effect/CMakeLists.txt", "UPRIGHT_EXTRA_EFFECTS"),
+    (r"scripts/(package|test-package)\.sh", ".ci/run, step 'Debian package'", ".ci/run", "scripts/test-package.sh"),
+    (r"sudo apt-get install \./upright_\*_amd64\.deb", ".ci/run, step 'Debian package'", "scripts/test-package.sh",
+     "apt-get install -y --no-install-recommends"),
+    (r"sudo adduser \$USER upright", ".ci/run, step 'Debian package'", "scripts/test-package.sh", "adduser --quiet student upright"),
+    (r"upright run --rig /usr/share/upright/config/.*", ".ci/run, step 'Debian package'", "scripts/test-package.sh",
+     'as_user "upright run --rig $share/rigs/simulated.yaml'),
+    (r"upright doctor --fix", "doctor_command_test", "tests/acceptance/doctor_command_test.cpp", '"doctor --fix"'),
+    (r"cmake --install( build/release --prefix ~/\.local)?", ".ci/run, step 'Debian package': cpack runs the same rules",
+     "cmake/install.cmake", "What `cmake --install` and the package contain"),
     (r"\.ci/run", "continuous integration, for each commit", ".ci/run", "Everything that must hold for a commit"),
     (r"scripts/build\.sh .*", ".ci/run, step 'build'", ".ci/run", "scripts/build.sh ci"),
     (r"scripts/test\.sh( ci)?", ".ci/run, step 'tests'", ".ci/run", "scripts/test.sh ci"),

@@ -12,6 +12,7 @@
 #include <string>
 
 #include "commissioning/machine_check.hpp"
+#include "commissioning/machine_fix.hpp"
 #include "commissioning/rig_check.hpp"
 #include "commissioning/wake_probe.hpp"
 #include "record/histogram_text.hpp"
@@ -49,6 +50,42 @@ const Finding& about(const std::vector<Finding>& findings, const std::string& su
   for (const Finding& finding : findings)
     if (finding.subject == subject) return finding;
   throw std::runtime_error("nothing about " + subject);
+}
+
+std::string joined(const std::vector<std::string>& lines) {
+  std::string text;
+  for (const std::string& line : lines) text += line + "\n";
+  return text;
+}
+
+TEST(MachineFix, MakesTheGroupWhereNoPackageDid) {
+  const FakeRoot root;
+  const std::vector<Finding> findings{{"rtprio", Health::poor, "limited to 0", "join the group"},
+                                      {"kernel", Health::good, "PREEMPT_RT", ""}};
+  const std::string text = joined(commands_to_fix(findings, "ada", root.path()));
+  for (const char* part : {"groupadd --force --system upright\n", "cat >/etc/security/limits.d/upright.conf",
+                           "@upright - rtprio 90\n", "KERNEL==\"cpu_dma_latency\", GROUP=\"upright\"",
+                           "usermod --append --groups upright ada "})
+    EXPECT_NE(text.find(part), std::string::npos) << part << "\n" << text;
+  EXPECT_EQ(text.find("linux-image"), std::string::npos) << text;
+}
+
+TEST(MachineFix, OnlyJoinsTheGroupThatThePackageMade) {
+  const FakeRoot root;
+  root.put("etc/security/limits.d/upright.conf", "");
+  root.put("usr/lib/udev/rules.d/60-upright.rules", "");
+  const std::vector<Finding> findings{{"sleep states", Health::poor, "cannot be written", "a rule"}};
+  const std::string text = joined(commands_to_fix(findings, "ada", root.path()));
+  EXPECT_EQ(text.find("cat >"), std::string::npos) << text;
+  EXPECT_NE(text.find("usermod --append --groups upright ada "), std::string::npos) << text;
+}
+
+TEST(MachineFix, LeavesBootOptionsToThePerson) {
+  const FakeRoot root;
+  const std::vector<Finding> findings{{"timer tick", Health::poor, "has it", "boot with nohz_full=1"}};
+  for (const std::string& line : commands_to_fix(findings, "ada", root.path()))
+    EXPECT_EQ(line.front(), '#') << line;
+  EXPECT_TRUE(commands_to_fix({{"timer tick", Health::good, "off", ""}}, "ada", root.path()).empty());
 }
 
 TEST(MachineCheck, KnowsAMachineThatIsWellSetUp) {

@@ -17,8 +17,9 @@ enum class ExitCode : int {
 /// One sentence (cause first, then the remedy), and the exit code with which the command ends.
 class Error : public std::runtime_error {
  public:
+  /// `sentence`: the cause, then the remedy.
   Error(ExitCode code, const std::string& sentence) : std::runtime_error(sentence), code_(code) {}
-  ExitCode code() const { return code_; }
+  ExitCode code() const { return code_; }  ///< the exit code that a command ends with
 
  private:
   ExitCode code_;
@@ -27,12 +28,14 @@ class Error : public std::runtime_error {
 /// A file, an option or a value given by the user is wrong (exit code 2).
 class ConfigError : public Error {
  public:
+  /// `sentence`: file, line and key, the cause, then the remedy.
   explicit ConfigError(const std::string& sentence) : Error(ExitCode::usage, sentence) {}
 };
 
 /// A link or a device failed at set-up (exit code 4).
 class DeviceError : public Error {
  public:
+  /// `sentence`: the cause, then the remedy.
   explicit DeviceError(const std::string& sentence) : Error(ExitCode::device, sentence) {}
 };
 

@@ -16,19 +16,23 @@ namespace upright {
 
 /// The interval in which a number must lie, closed or half-open.
 struct Range {
-  double low = -std::numeric_limits<double>::infinity();
-  double high = std::numeric_limits<double>::infinity();
-  bool low_open = false;  ///< the lower end is excluded
+  double low = -std::numeric_limits<double>::infinity();  ///< the lower end
+  double high = std::numeric_limits<double>::infinity();  ///< the upper end, included
+  bool low_open = false;                                  ///< the lower end is excluded
 
-  static constexpr Range any() { return {}; }
+  static constexpr Range any() { return {}; }  ///< every finite number
+  /// Above zero.
   static constexpr Range positive() { return {0.0, std::numeric_limits<double>::infinity(), true}; }
+  /// Zero or above.
   static constexpr Range not_negative() { return {0.0, std::numeric_limits<double>::infinity(), false}; }
+  /// Both ends included.
   static constexpr Range within(double low, double high) { return {low, high, false}; }
 
+  /// Whether the number lies in it.
   constexpr bool contains(double value) const {
     return (low_open ? value > low : value >= low) && value <= high;
   }
-  std::string text() const;
+  std::string text() const;  ///< "from 0 to 1", "above 0", ..
 };
 
 /// The name in `known` with the smallest edit distance to `word`; empty when none is close enough.
@@ -45,27 +49,34 @@ class YamlMap {
   /// Reads a text in the same way. Errors show `file` as its name.
   static YamlMap from_text(const std::string& text, const std::filesystem::path& file);
 
-  bool has(const std::string& key) const;
-  double number(const std::string& key, const Range& range = {}) const;
+  bool has(const std::string& key) const;  ///< whether the key is there. It is known from now on.
+  double number(const std::string& key, const Range& range = {}) const;  ///< A required number
+  /// A number, or `fallback` without the key.
   double number_or(const std::string& key, double fallback, const Range& range = {}) const;
+  /// A number, or nothing without the key.
   std::optional<double> optional_number(const std::string& key, const Range& range = {}) const;
+  /// A required whole number, both ends included.
   std::int64_t integer(const std::string& key, std::int64_t low, std::int64_t high) const;
+  /// A whole number, or `fallback` without the key.
   std::int64_t integer_or(const std::string& key, std::int64_t fallback, std::int64_t low,
                           std::int64_t high) const;
+  /// true or false, or `fallback` without the key.
   bool flag_or(const std::string& key, bool fallback) const;
-  std::string text(const std::string& key) const;
+  std::string text(const std::string& key) const;  ///< A required text, not empty
+  /// A text, or `fallback` without the key.
   std::string text_or(const std::string& key, const std::string& fallback) const;
   /// A text that must be one of `names`. The error lists them and suggests the nearest.
   std::string choice(const std::string& key, const std::vector<std::string>& names) const;
+  /// A required list of numbers; may be empty.
   std::vector<double> numbers(const std::string& key, const Range& range = {}) const;
-  YamlMap map(const std::string& key) const;
-  std::optional<YamlMap> optional_map(const std::string& key) const;
-  std::vector<YamlMap> maps(const std::string& key) const;
+  YamlMap map(const std::string& key) const;                          ///< A required map
+  std::optional<YamlMap> optional_map(const std::string& key) const;  ///< A map, or nothing without the key
+  std::vector<YamlMap> maps(const std::string& key) const;  ///< A required list of maps; may be empty
   /// True when the key exists and its value is a scalar, a map or a list, respectively.
   bool is_scalar(const std::string& key) const;
-  bool is_map(const std::string& key) const;
-  bool is_list(const std::string& key) const;
-  std::vector<std::string> keys() const;
+  bool is_map(const std::string& key) const;   ///< whether the key holds a map
+  bool is_list(const std::string& key) const;  ///< whether the key holds a list
+  std::vector<std::string> keys() const;       ///< every key, in the order of the file
 
   /// Refuses all keys that were not requested. Call it after the last request.
   void finish() const;
@@ -73,7 +84,7 @@ class YamlMap {
   /// Throws the error for `key` of this map: "remedy: file:line: path.key problem".
   [[noreturn]] void fail(const std::string& key, const std::string& problem, const std::string& remedy) const;
 
-  const std::filesystem::path& file() const;
+  const std::filesystem::path& file() const;  ///< the file, as it was named
   /// A path from this file; a relative path is resolved against the folder of the file.
   std::filesystem::path path(const std::string& key) const;
 

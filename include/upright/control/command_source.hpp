@@ -8,14 +8,15 @@
 
 namespace upright {
 
+/// What the control step does in one period.
 struct Demand {
   bool feedback = true;        ///< state feedback about the reference; false: `voltage_v` is applied directly
   double reference_m = 0.0;    ///< set-point of the cart [m]
   double reference_rad = 0.0;  ///< the upright angle about which feedback acts: a multiple of 2 pi [rad]
-  double voltage_v = 0.0;
-  bool homing = false;     ///< moving to the start position: the cart may begin beyond the track limit
-  bool over = false;       ///< nothing more to do: the run is complete with this period
-  bool timed_out = false;  ///< an awaited condition did not occur in time: the run stops
+  double voltage_v = 0.0;      ///< without feedback: the voltage [V], before the limiter
+  bool homing = false;         ///< moving to the start position: the cart may begin beyond the track limit
+  bool over = false;           ///< nothing more to do: the run is complete with this period
+  bool timed_out = false;      ///< an awaited condition did not occur in time: the run stops
 };
 
 /// Called once per computed period, in the loop: no allocation, no lock, no exception. Equal inputs give

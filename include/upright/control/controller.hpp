@@ -18,22 +18,24 @@ namespace upright {
 
 /// One sample in SI units, unwrapped.
 struct ControlInput {
-  std::uint64_t tick = 0;  ///< period number; increasing. A gap means periods without a sample.
-  double cart_m = 0.0;
-  double theta_rad = 0.0;
+  std::uint64_t tick = 0;    ///< period number; increasing. A gap means periods without a sample.
+  double cart_m = 0.0;       ///< position of the cart [m]
+  double theta_rad = 0.0;    ///< angle of the pendulum [rad]
   double reference_m = 0.0;  ///< set-point of the cart position [m]
 };
 
+/// What the control step computed.
 struct ControlOutput {
-  ControlState state;  ///< measured positions and estimated velocities
-  double voltage_requested_v = 0.0;
-  double voltage_v = 0.0;  ///< after the limiter; zero when the request was not finite
-  bool saturated = false;
-  bool finite = true;
-  Demand demand;          ///< the demand of the command source
-  double lean_rad = 0.0;  ///< theta relative to the upright angle about which feedback acts [rad]
+  ControlState state;                ///< measured positions and estimated velocities
+  double voltage_requested_v = 0.0;  ///< before the limiter [V]
+  double voltage_v = 0.0;            ///< after the limiter; zero when the request was not finite
+  bool saturated = false;            ///< the limiter changed the voltage
+  bool finite = true;                ///< false: the request was not a finite number
+  Demand demand;                     ///< the demand of the command source
+  double lean_rad = 0.0;             ///< theta relative to the upright angle about which feedback acts [rad]
 };
 
+/// The control step with its memory.
 class Controller {
  public:
   /// `amplifier_limit_v`: limit of the voltage. `parts`: those that the configuration requires
@@ -42,6 +44,7 @@ class Controller {
 
   /// From now on, demands come from `source`; null: balance about zero. It must outlive the controller.
   void follow(CommandSource* source) noexcept { source_ = source; }
+  /// Whether demands come from a command source.
   bool is_scripted() const noexcept { return source_ != nullptr; }
 
   /// Discards all history: the next step starts from rest at its sample.
@@ -53,11 +56,11 @@ class Controller {
   /// rest.
   ControlOutput step(const ControlInput& input) noexcept;
 
-  const ControlConfig& config() const { return config_; }
-  const DelayLine& delay_line() const { return delay_; }
-  double amplifier_limit_v() const { return limit_v_; }
+  const ControlConfig& config() const { return config_; }  ///< the gain file's contents
+  const DelayLine& delay_line() const { return delay_; }   ///< the delay of the feedback
+  double amplifier_limit_v() const { return limit_v_; }    ///< the limit of the voltage [V]
 
-  static constexpr std::uint64_t most_missing_periods = 1000;
+  static constexpr std::uint64_t most_missing_periods = 1000;  ///< the longest gap that is bridged [periods]
 
  private:
   void begin(const ControlInput& input) noexcept;

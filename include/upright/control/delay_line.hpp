@@ -19,10 +19,11 @@ class DelayLine {
   /// although neither is a binary fraction). Throws ConfigError when the delay or the period is invalid.
   DelayLine(double delay_s, double period_s);
 
-  double delay_s() const { return delay_s_; }
-  bool exact() const { return fraction_ == 0.0; }
+  double delay_s() const { return delay_s_; }      ///< the delay [s]
+  bool exact() const { return fraction_ == 0.0; }  ///< whether the delay is a whole number of periods
   /// The whole periods of the delay, and the remainder as a fraction of a period.
   std::size_t whole_periods() const { return whole_; }
+  /// The part of a period beyond `whole_periods`, from 0 up to 1.
   double fraction() const { return fraction_; }
 
   /// Discards the history and fills it with `state`.
@@ -32,8 +33,8 @@ class DelayLine {
   /// The state `delay_s` before the one appended last.
   ControlState delayed() const noexcept;
 
-  static constexpr double longest_delay_s = 10.0;
-  static constexpr double longest_delay_periods = 1e6;
+  static constexpr double longest_delay_s = 10.0;       ///< the longest delay [s]
+  static constexpr double longest_delay_periods = 1e6;  ///< the longest delay [periods]
 
  private:
   const ControlState& back(std::size_t periods) const noexcept;

@@ -14,7 +14,8 @@ class YamlKeys;
 
 /// A lower and an upper bound of a quantity.
 struct Bounds {
-  double low = 0.0, high = 0.0;
+  double low = 0.0;   ///< lower end
+  double high = 0.0;  ///< upper end
 };
 
 /// The defaults are the widest bounds that a file can state: from these, no encoder is found stuck.

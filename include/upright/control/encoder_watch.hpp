@@ -18,15 +18,17 @@
 
 namespace upright {
 
+/// Which encoder is stuck.
 enum class StuckEncoder : std::uint8_t { none, cart, pendulum };
 
 /// One period with fresh counts, in which the loop balances.
 struct WatchedPeriod {
-  std::uint64_t tick = 0;
-  double time_s = 0.0;
-  std::int64_t cart_counts = 0, pendulum_counts = 0;
-  double cart_m = 0.0;     ///< scaled and unwrapped
-  double voltage_v = 0.0;  ///< applied from this period on
+  std::uint64_t tick = 0;            ///< number of the period
+  double time_s = 0.0;               ///< time of the reading [s]
+  std::int64_t cart_counts = 0;      ///< as the device gave them
+  std::int64_t pendulum_counts = 0;  ///< as the device gave them
+  double cart_m = 0.0;               ///< scaled and unwrapped
+  double voltage_v = 0.0;            ///< applied from this period on
 };
 
 /// A resting cart driven by the applied voltages, with one value of friction and one of lag. The force of
@@ -34,6 +36,7 @@ struct WatchedPeriod {
 class DrivenCart {
  public:
   DrivenCart() = default;
+  /// `breakaway_v` moves a resting cart [V]; `lag_s` is that of the motor [s].
   DrivenCart(const EncoderAssumptions& assumptions, double breakaway_v, double lag_s);
 
   /// Stops the cart; the motor's force continues.
@@ -49,12 +52,12 @@ class DrivenCart {
 /// The latest cart positions as means over short intervals, and their distance from a parabola.
 class CartPath {
  public:
-  void clear() noexcept { count_ = filling_ = 0; }
+  void clear() noexcept { count_ = filling_ = 0; }  ///< forgets everything
   /// True when an interval was completed.
   bool add(double time_s, double cart_m) noexcept;
   /// Root mean square residual of the best parabola [m]; 0 with fewer than `fewest` intervals.
   double rms_from_parabola_m() const noexcept;
-  double duration_s() const noexcept;
+  double duration_s() const noexcept;  ///< from the first to the last kept interval [s]
 
  private:
   static constexpr std::size_t most = 32, fewest = 8;
@@ -69,11 +72,13 @@ class CartPath {
   int filling_ = 0;
 };
 
+/// Finds encoders whose fresh counts do not follow the motion.
 class EncoderWatch {
  public:
   /// `m_per_count`, `rad_per_count`: resolution of the encoders.
   EncoderWatch(const EncoderAssumptions& assumptions, double m_per_count, double rad_per_count) noexcept;
 
+  /// Takes one period; says which encoder is stuck, if any.
   StuckEncoder step(const WatchedPeriod& period) noexcept;
   /// Discards the history: for periods in which the loop does not balance.
   void reset() noexcept { started_ = false; }

@@ -40,14 +40,15 @@ class DelayCompensator {
 /// The parts of a controller that need a plant file.
 struct ModelParts {
   ModelParts() = default;
+  /// A compensator alone.
   template <class Compensator>
   requires std::is_convertible_v<std::unique_ptr<Compensator>, std::unique_ptr<DelayCompensator>> ModelParts(
       std::unique_ptr<Compensator> of)
       : compensator(std::move(of)) {}
-  ModelParts(std::nullptr_t) {}
+  ModelParts(std::nullptr_t) {}  ///< no parts
 
-  std::unique_ptr<StateEstimator> estimator;
-  std::unique_ptr<DelayCompensator> compensator;
+  std::unique_ptr<StateEstimator> estimator;      ///< null: the velocity estimator is used
+  std::unique_ptr<DelayCompensator> compensator;  ///< null: the delay is not compensated
 };
 
 }  // namespace upright

@@ -5,15 +5,17 @@
 
 namespace upright {
 
+/// How velocities follow from positions.
 enum class EstimatorKind : std::uint8_t {
   second_order_filter,  ///< wc^2 s / (s^2 + 2 zeta wc s + wc^2), as on Quanser rigs
   difference,           ///< (x_k - x_{k-1}) / T
 };
 
+/// Section `velocity_estimator` of a gain file.
 struct EstimatorConfig {
-  EstimatorKind kind = EstimatorKind::second_order_filter;
-  double cutoff_hz = 50.0;  ///< wc / (2 pi)
-  double damping = 0.9;     ///< zeta
+  EstimatorKind kind = EstimatorKind::second_order_filter;  ///< filter or difference
+  double cutoff_hz = 50.0;                                  ///< wc / (2 pi)
+  double damping = 0.9;                                     ///< zeta
 };
 
 /// One step of an estimator in coefficients, for the loop and for engines with many lanes:
@@ -26,7 +28,12 @@ struct EstimatorConfig {
 /// linear between samples, the appropriate assumption for an encoder on a body with inertia. After the
 /// transient, a constant gives exactly zero and a ramp its exact slope, at any sampling rate.
 struct EstimatorStep {
-  double p11 = 0.0, p12 = 0.0, p21 = 0.0, p22 = 0.0, g1 = 0.0, g2 = 0.0;
+  double p11 = 0.0;  ///< from lag to lag
+  double p12 = 0.0;  ///< from velocity to lag
+  double p21 = 0.0;  ///< from lag to velocity
+  double p22 = 0.0;  ///< from velocity to velocity
+  double g1 = 0.0;   ///< from dx to lag
+  double g2 = 0.0;   ///< from dx to velocity
 };
 
 /// Throws ConfigError when the configuration is invalid for this period.
@@ -35,6 +42,7 @@ EstimatorStep make_estimator_step(const EstimatorConfig& config, double period_s
 /// Estimates the velocity of one coordinate.
 class VelocityEstimator {
  public:
+  /// Starts at rest at 0: call `start` with the first sample.
   explicit VelocityEstimator(const EstimatorStep& step) : step_(step) {}
 
   /// Starts at rest at `position`.
@@ -54,8 +62,9 @@ class VelocityEstimator {
     return velocity;
   }
 
+  /// The latest estimate [units of the samples per s].
   double velocity() const noexcept { return velocity_; }
-  double position() const noexcept { return position_; }
+  double position() const noexcept { return position_; }  ///< the latest sample
 
  private:
   EstimatorStep step_;

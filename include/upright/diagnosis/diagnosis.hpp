@@ -17,84 +17,92 @@ namespace upright {
 /// The name of an effect in plant files.
 std::string kind_of(std::size_t effect);
 
+/// What the data say about the model.
 enum class Verdict { explained, no_discrepancy, unexplained, not_excited };
-std::string_view name_of(Verdict verdict);
+std::string_view name_of(Verdict verdict);  ///< "explained", "no_discrepancy", ..
 
 /// An effect that the data require.
 struct FoundEffect {
-  std::size_t effect = 0;
-  double gap_before = 0.0, gap_after = 0.0;
-  std::vector<ParameterEstimate> parameters;
+  std::size_t effect = 0;                     ///< number in the registry
+  double gap_before = 0.0;                    ///< held-out error over the noise floor, without it
+  double gap_after = 0.0;                     ///< the same with it
+  std::vector<ParameterEstimate> parameters;  ///< values in the resulting model
+  /// Numbers of the effects that the data cannot tell from it.
   std::vector<std::size_t> indistinguishable_from;
-  std::string where;
+  std::string where;  ///< where in time and state the disagreement is, in words
 };
 
+/// What one candidate achieved.
 struct CandidateScore {
-  std::size_t effect = 0;
-  double gap_after = 0.0;
-  double evidence = 0.0;  ///< reduction of minus twice the log likelihood, training runs
+  std::size_t effect = 0;  ///< number in the registry
+  double gap_after = 0.0;  ///< gap with it: held-out error over the noise floor
+  double evidence = 0.0;   ///< reduction of minus twice the log likelihood, training runs
 };
 
 /// The fit of one effect in one round of the search, and the decision on it.
 struct Trial {
-  std::size_t round = 0;
-  std::size_t effect = 0;
-  double evidence = 0.0;   ///< reduction of minus twice the log likelihood, training runs
-  double held = 0.0;       ///< the same on held-out runs
-  double t_value = 0.0;    ///< of the reduction per quarter of a second
-  double certainty = 0.0;  ///< distance of its size from zero effect [standard errors]
-  Noise noise;             ///< estimated together with the effect
-  std::vector<ParameterEstimate> parameters;
-  std::string rule = "undecided";  ///< the deciding rule, see docs/reference/diagnosis-rules.md
-  bool taken = false;
+  std::size_t round = 0;                      ///< number of the round of the search, from 0
+  std::size_t effect = 0;                     ///< number in the registry
+  double evidence = 0.0;                      ///< reduction of minus twice the log likelihood, training runs
+  double held = 0.0;                          ///< the same on held-out runs
+  double t_value = 0.0;                       ///< of the reduction per quarter of a second
+  double certainty = 0.0;                     ///< distance of its size from zero effect [standard errors]
+  Noise noise;                                ///< estimated together with the effect
+  std::vector<ParameterEstimate> parameters;  ///< values of this fit
+  std::string rule = "undecided";             ///< the deciding rule, see docs/reference/diagnosis-rules.md
+  bool taken = false;                         ///< whether the effect was added
 };
 
 /// The effects of the model after one step of the search (addition, exchange or removal of an effect).
 /// Values are those of the training runs.
 struct Step {
+  /// An effect of the model.
   struct Effect {
-    std::size_t effect = 0;
-    std::vector<ParameterEstimate> parameters;
+    std::size_t effect = 0;                     ///< number in the registry
+    std::vector<ParameterEstimate> parameters;  ///< values of the fit
   };
-  std::vector<Effect> effects;
+  std::vector<Effect> effects;  ///< every effect of the model then
 };
 
+/// A safe run that would distinguish them.
 struct NextExperiment {
-  std::string name;
-  std::string description;
-  std::string file;       ///< the experiment file, for `upright experiment`
-  double distance = 0.0;  ///< smallest separation of the remaining explanations [noise standard deviations]
+  std::string name;         ///< of the experiment
+  std::string description;  ///< what it does, for people
+  std::string file;         ///< the experiment file, for `upright experiment`
+  double distance = 0.0;    ///< smallest separation of the remaining explanations [noise standard deviations]
 };
 
+/// The result of a diagnosis.
 struct Diagnosis {
-  Verdict verdict = Verdict::no_discrepancy;
+  Verdict verdict = Verdict::no_discrepancy;  ///< the conclusion
   /// A signal ended the search: the result is the best so far. If it was not examined, the verdict is
   /// `unexplained`, and gaps that were not measured are NaN.
   bool interrupted = false;
   /// The bound of the search ended it. The result so far was examined as usual, unless that reached a
   /// bound of its own.
   bool bound_reached = false;
-  bool examined = true;  ///< the residual was examined, so that the verdict is valid
-  double gap_before = 0.0, gap_after = 0.0;
-  std::vector<FoundEffect> effects;        ///< in the order of discovery
-  std::vector<CandidateScore> candidates;  ///< of the first round, best first
-  std::vector<Trial> trials;               ///< all complete fits of the search, in order
-  std::vector<Step> steps;                 ///< the model after each step
-  std::optional<NextExperiment> next_experiment;
-  Plant model;  ///< the plant file with the effects added
-  Noise noise;
-  std::vector<std::string> notes;  ///< how the data were read and split
-  std::string residual;            ///< description of the remaining residual
-  std::vector<std::size_t> held_out_runs;
-  /// On held-out segments, with the plant file as given and with the model found.
-  std::vector<ResidualTrace> residual_before, residual_after;
+  bool examined = true;              ///< the residual was examined, so that the verdict is valid
+  double gap_before = 0.0;           ///< held-out error over the noise floor, of the plant file as given
+  double gap_after = 0.0;            ///< the same of the model found
+  std::vector<FoundEffect> effects;  ///< in the order of discovery
+  std::vector<CandidateScore> candidates;         ///< of the first round, best first
+  std::vector<Trial> trials;                      ///< all complete fits of the search, in order
+  std::vector<Step> steps;                        ///< the model after each step
+  std::optional<NextExperiment> next_experiment;  ///< absent: none is needed
+  Plant model;                                    ///< the plant file with the effects added
+  Noise noise;                                    ///< as estimated with the model
+  std::vector<std::string> notes;                 ///< how the data were read and split
+  std::string residual;                           ///< description of the remaining residual
+  std::vector<std::size_t> held_out_runs;         ///< runs that no fit saw
+  std::vector<ResidualTrace> residual_before;     ///< on held-out segments, with the plant file as given
+  std::vector<ResidualTrace> residual_after;      ///< the same with the model found
 };
 
 /// The round that added an effect: its trial, and at most three distinguishable effects with the next
 /// largest evidence, best first. Points into the diagnosis.
 struct NextBest {
-  const Trial* taken = nullptr;
-  std::vector<const Trial*> others;
+  const Trial* taken = nullptr;      ///< the trial that added it; null: there is none
+  std::vector<const Trial*> others;  ///< at most three, best first
 };
 
 /// Empty for an effect that was added in a pair, by an exchange, or as a correction.
@@ -104,12 +112,14 @@ NextBest next_best(const Diagnosis& diagnosis, const FoundEffect& effect);
 /// 750; on data in wrong units, which yield no result, 2000 and more.
 inline constexpr double default_search_bound = 10000.0;
 
+/// How a diagnosis searches.
 struct DiagnosisOptions {
   /// A nonzero value interrupts the search within some tenths of a second. Null: no interruption.
   const std::atomic<int>* signal = nullptr;
-  double search_bound = default_search_bound;
+  double search_bound = default_search_bound;  ///< in evaluations of each sample
   /// Called from time to time with the progress (0 to 1) and the current activity.
   std::function<void(double, const std::string&)> progress;
+  /// Reports progress, where anybody listens: `done` from 0 to 1.
   void tell(double done, const std::string& what) const {
     if (progress) progress(done, what);
   }

@@ -24,12 +24,12 @@ namespace upright {
 
 /// A parameter of an effect that the fit may change, with its prior.
 struct FreeParameter {
-  std::size_t effect = 0;
-  std::size_t index = 0;
-  double low = 0.0;
-  double high = 0.0;
-  double scale = 1.0;  ///< order of magnitude
-  double prior_mean = 0.0;
+  std::size_t effect = 0;    ///< number in the registry
+  std::size_t index = 0;     ///< which of its parameters
+  double low = 0.0;          ///< lower bound
+  double high = 0.0;         ///< upper bound
+  double scale = 1.0;        ///< order of magnitude
+  double prior_mean = 0.0;   ///< expected value before the data
   double prior_sigma = 0.0;  ///< standard deviation; 0: no prior
 };
 
@@ -41,14 +41,16 @@ std::vector<PlantState<double>> estimate_initial_states(const std::vector<Measur
 /// Converts initial states to a plant whose sensors show the same motion differently.
 void convert_initial_states(std::vector<PlantState<double>>& starts, const Plant& from, const Plant& to);
 
+/// What a fit starts from, and ends with.
 struct FitPoint {
-  Plant plant;
+  Plant plant;                             ///< with the values of the free parameters
   std::vector<PlantState<double>> starts;  ///< one per segment
-  Noise noise;
+  Noise noise;                             ///< of the sensors and of the process
 };
 
+/// The result of a fit.
 struct FitResult {
-  FitPoint point;
+  FitPoint point;          ///< where it ended
   double objective = 0.0;  ///< minus twice the log of likelihood and priors
   /// Predicted reduction by a further step, residuals being linear; absent where bounds cut it short.
   std::optional<double> predicted_reduction;
@@ -59,18 +61,19 @@ struct FitResult {
   std::vector<double> segment_samples;     ///< number of residuals in that sum, weighted
   Eigen::MatrixXd covariance;   ///< of the free parameters, robust to coloured noise (sandwich estimator)
   Eigen::MatrixXd information;  ///< of the free parameters, initial states eliminated
-  bool converged = false;
-  double work_samples = 0.0;  ///< number of samples processed, counting repetitions
+  bool converged = false;       ///< false: the iterations were used up
+  double work_samples = 0.0;    ///< number of samples processed, counting repetitions
 };
 
 /// A joint Gaussian prior of all free parameters, in their order.
 struct GaussianPrior {
-  Eigen::VectorXd mean;
-  Eigen::MatrixXd information;
+  Eigen::VectorXd mean;         ///< of the parameters, in the order of the free ones
+  Eigen::MatrixXd information;  ///< inverse of their covariance, square
 };
 
+/// How a fit proceeds.
 struct FitOptions {
-  int max_iterations = 12;
+  int max_iterations = 12;                 ///< of Gauss-Newton
   int noise_rounds = 6;                    ///< upper bound of noise estimations; 0: the noise is fixed
   std::optional<Noise> alternative_noise;  ///< second starting point of the noise search, used where it gives
                                            ///< the better result

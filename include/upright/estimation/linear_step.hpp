@@ -5,9 +5,10 @@ namespace upright {
 
 /// State order: x, theta, v, omega, bristle. Channels: cart, pendulum.
 struct LinearStep {
-  static constexpr int states = 5;
+  static constexpr int states = 5;    ///< the number of states
   double transition[states][states];  ///< from the previous sample, after its update; identity at the first
-  double by_force[2], by_torque[2];   ///< accelerations of cart and pendulum per unit force and torque
+  double by_force[2];                 ///< accelerations of cart and pendulum per unit of force on the cart
+  double by_torque[2];                ///< the same per unit of torque on the pendulum
   double residual[2];                 ///< measured minus predicted from the previous samples
   double innovation[2];               ///< the same, predicted from the sample's earlier channel as well
   double update[2][states];           ///< Kalman gain of each channel, applied in sequence
@@ -17,7 +18,7 @@ struct LinearStep {
   double gain[2];                     ///< derivative of the sensor's output with respect to its coordinate
   double rate[2];                     ///< velocities, for jitter
   double holds[2];  ///< dry friction [N, N m] that holds cart and pendulum at the end; 0: they move
-  double period_s;
+  double period_s;  ///< from the previous sample [s]
 };
 
 }  // namespace upright

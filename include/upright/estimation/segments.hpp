@@ -11,9 +11,9 @@ namespace upright {
 
 /// Samples first..last (inclusive) of a run, simulated from one initial state.
 struct Segment {
-  std::size_t run = 0;
-  std::size_t first = 0;
-  std::size_t last = 0;
+  std::size_t run = 0;    ///< number of the run, from 0
+  std::size_t first = 0;  ///< its first sample
+  std::size_t last = 0;   ///< its last sample
 };
 
 /// The samples before which rows are missing: those of `breaks`, and those after more than five periods
@@ -26,9 +26,9 @@ std::vector<Segment> cut_segments(const std::vector<Measurement>& runs, double l
 
 /// The data of a fit.
 struct FitData {
-  const std::vector<Measurement>* runs = nullptr;
-  std::vector<Segment> segments;
-  WorkBound* bound = nullptr;  ///< of the search to which the fit belongs; null: none
+  const std::vector<Measurement>* runs = nullptr;  ///< they must outlive this
+  std::vector<Segment> segments;                   ///< in the order of the runs
+  WorkBound* bound = nullptr;                      ///< of the search to which the fit belongs; null: none
 };
 
 }  // namespace upright

@@ -10,16 +10,18 @@ namespace upright {
 /// A search ended because its bound was reached.
 class BoundReached : public std::exception {
  public:
+  /// The sentence for the user.
   const char* what() const noexcept override { return "the bound of the search is reached"; }
 };
 
 /// Counted by fits whose data have a pointer to it. Not thread-safe.
 class WorkBound {
  public:
+  /// The bound, in samples processed.
   explicit WorkBound(double most_samples) : left_samples_(most_samples) {}
 
-  void count(double samples) { left_samples_ -= samples; }
-  void grant(double samples) { left_samples_ = samples; }
+  void count(double samples) { left_samples_ -= samples; }  ///< so many samples were processed
+  void grant(double samples) { left_samples_ = samples; }   ///< so many samples are left from now on
   /// Whether this much additional work would reach the bound.
   bool is_reached_with(double samples) const { return samples >= left_samples_; }
   /// Throws BoundReached where the bound is reached.

@@ -22,14 +22,15 @@ struct EncoderCalibration {
 
 /// Calibration of both encoders and their zeros.
 struct Calibration {
-  EncoderCalibration cart;
-  EncoderCalibration pendulum;
+  EncoderCalibration cart;      ///< metres per count
+  EncoderCalibration pendulum;  ///< radians per count
   /// True: the pose at the first reading is the zero. False: the counts below are the zero.
   bool zero_at_start = false;
-  std::int64_t cart_zero_counts = 0;
-  std::int64_t pendulum_zero_counts = 0;
-  ZeroPose zero_pose = ZeroPose::upright;
+  std::int64_t cart_zero_counts = 0;       ///< counts of the cart at its zero
+  std::int64_t pendulum_zero_counts = 0;   ///< counts of the pendulum at the zero pose
+  ZeroPose zero_pose = ZeroPose::upright;  ///< how the pendulum is at its zero counts
 
+  /// Angle at the zero counts [rad].
   double zero_angle_rad() const { return zero_pose == ZeroPose::hanging ? std::numbers::pi : 0.0; }
 };
 
@@ -50,6 +51,7 @@ constexpr std::int64_t counts_between(std::int64_t from, std::int64_t to, int wi
 /// between two readings.
 class Unwrapper {
  public:
+  /// `width_bits`: of the device's counter.
   explicit constexpr Unwrapper(int width_bits = 32) noexcept : width_bits_(width_bits) {}
 
   /// Starts at `counts`, relative to `zero` modulo the counter's range.
@@ -63,6 +65,7 @@ class Unwrapper {
     last_ = counts;
     return total_;
   }
+  /// Counts since the first ones, unwrapped.
   constexpr std::int64_t total() const noexcept { return total_; }
 
  private:
@@ -73,18 +76,20 @@ class Unwrapper {
 
 /// Cart position [m] and pendulum angle [rad, 0 upright, continuous].
 struct Pose {
-  double cart_m = 0.0;
-  double theta_rad = 0.0;
+  double cart_m = 0.0;     ///< position of the cart [m]
+  double theta_rad = 0.0;  ///< angle of the pendulum [rad], 0 upright
 };
 
 /// Converts the device's counts to a pose. The first reading initialises it.
 class PoseScaler {
  public:
+  /// Starts without history: the first counts set the turn.
   explicit PoseScaler(const Calibration& calibration = {}) noexcept
       : calibration_(calibration),
         cart_(calibration.cart.width_bits),
         pendulum_(calibration.pendulum.width_bits) {}
 
+  /// The pose for the device's counts, unwrapped from the ones before.
   Pose scale(std::int64_t cart_counts, std::int64_t pendulum_counts) noexcept {
     if (!started_) {
       started_ = true;
@@ -107,7 +112,7 @@ class PoseScaler {
     return pose();
   }
 
-  const Calibration& calibration() const noexcept { return calibration_; }
+  const Calibration& calibration() const noexcept { return calibration_; }  ///< the calibration in use
 
  private:
   Pose pose() const noexcept {
@@ -132,9 +137,10 @@ inline std::int64_t counts_at(double position, double zero_position, std::int64_
   return signed_counts(zero_counts + static_cast<std::int64_t>(counts), encoder.width_bits);
 }
 
+/// Counts of both encoders.
 struct EncoderCounts {
-  std::int64_t cart = 0;
-  std::int64_t pendulum = 0;
+  std::int64_t cart = 0;      ///< of the cart's encoder
+  std::int64_t pendulum = 0;  ///< of the pendulum's encoder
 };
 
 /// The counts of both encoders at a pose. If the zero is taken at the start, counts are zero at x = 0 and

@@ -7,7 +7,7 @@
 
 namespace upright {
 
-inline constexpr std::int64_t nanoseconds_per_second = 1'000'000'000;
+inline constexpr std::int64_t nanoseconds_per_second = 1'000'000'000;  ///< to convert times
 
 /// Time of CLOCK_MONOTONIC.
 inline std::int64_t monotonic_ns() noexcept {
@@ -16,10 +16,11 @@ inline std::int64_t monotonic_ns() noexcept {
   return now.tv_sec * nanoseconds_per_second + now.tv_nsec;
 }
 
+/// The time that a loop follows.
 class Clock {
  public:
   virtual ~Clock() = default;
-  virtual std::int64_t now_ns() noexcept = 0;
+  virtual std::int64_t now_ns() noexcept = 0;  ///< the time now [ns]
   /// Returns at `time_ns` or later; earlier only after a signal.
   virtual void sleep_until(std::int64_t time_ns) noexcept = 0;
   /// True when time advances only in `sleep_until`: the loop may wait for its log; runs are repeatable.
@@ -29,7 +30,7 @@ class Clock {
 /// CLOCK_MONOTONIC, absolute sleeps.
 class MonotonicClock final : public Clock {
  public:
-  std::int64_t now_ns() noexcept override { return monotonic_ns(); }
+  std::int64_t now_ns() noexcept override { return monotonic_ns(); }  ///< time of CLOCK_MONOTONIC [ns]
   void sleep_until(std::int64_t time_ns) noexcept override {
     timespec until{};
     until.tv_sec = time_ns / nanoseconds_per_second;
@@ -42,7 +43,7 @@ class MonotonicClock final : public Clock {
 /// Advances only when requested; never goes back.
 class VirtualClock final : public Clock {
  public:
-  std::int64_t now_ns() noexcept override { return now_ns_; }
+  std::int64_t now_ns() noexcept override { return now_ns_; }  ///< the time to which it was advanced [ns]
   void sleep_until(std::int64_t time_ns) noexcept override {
     if (time_ns > now_ns_) now_ns_ = time_ns;
   }

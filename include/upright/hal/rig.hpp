@@ -39,10 +39,12 @@ enum class RigFault : std::uint8_t {
   watchdog_expired,    ///< the device's own watchdog has switched the voltage off, and keeps it off
 };
 
+/// True for a fault that the emergency stop causes.
 constexpr bool is_emergency_stop(RigFault fault) noexcept {
   return fault == RigFault::emergency_stop;
 }
 
+/// True for a fault that a limit switch causes.
 constexpr bool is_limit_switch(RigFault fault) noexcept {
   return fault == RigFault::limit_switch || fault == RigFault::limit_switch_plus ||
          fault == RigFault::limit_switch_minus;
@@ -55,14 +57,14 @@ constexpr bool is_safety_input(RigFault fault) noexcept {
 
 /// One exchange with the encoders. Counts are the device's own, of its counter width, not unwrapped.
 struct RigReading {
-  std::int64_t cart_counts = 0;
-  std::int64_t pendulum_counts = 0;
-  std::int64_t time_ns = 0;    ///< when the counts were taken, on the loop's clock
-  std::uint64_t sequence = 0;  ///< increases with each fresh reading
+  std::int64_t cart_counts = 0;      ///< of the cart's encoder
+  std::int64_t pendulum_counts = 0;  ///< of the pendulum's encoder
+  std::int64_t time_ns = 0;          ///< when the counts were taken, on the loop's clock
+  std::uint64_t sequence = 0;        ///< increases with each fresh reading
   /// How often the link was recovered since the rig was opened: reconnected or resynchronised.
   std::uint32_t recoveries = 0;
-  RigStatus status = RigStatus::fault;
-  RigFault fault = RigFault::none;
+  RigStatus status = RigStatus::fault;  ///< whether the counts are new
+  RigFault fault = RigFault::none;      ///< cause of a fault; `none` otherwise
 };
 
 /// A sample that a device took on its own time.
@@ -74,8 +76,8 @@ struct DeviceSample {
 /// Which digital inputs a rig has that stop the motor. While one is active every reading is a fault that
 /// names it.
 struct SafetyInputs {
-  bool emergency_stop = false;
-  int limit_switches = 0;
+  bool emergency_stop = false;  ///< wired, and stops the motor
+  int limit_switches = 0;       ///< how many are wired
 };
 
 /// Identification of a device for the record of a run: "serial_number" and its text, ...
@@ -84,9 +86,9 @@ using DeviceFacts = std::vector<std::pair<std::string, std::string>>;
 /// The state of a stop. Zero volts is confirmed when the device has accepted it and, if its output can be
 /// read back, when that reads zero.
 struct StopReport {
-  bool zero_confirmed = false;
-  bool read_back = false;  ///< the output reads zero; false: only the device's acknowledgement is known
-  bool disabled = true;    ///< the amplifier is disabled, or the backend cannot disable it
+  bool zero_confirmed = false;  ///< the device is known to be at zero volts
+  bool read_back = false;       ///< the output reads zero; false: only the device's acknowledgement is known
+  bool disabled = true;         ///< the amplifier is disabled, or the backend cannot disable it
   /// Programmed time after the last request at which the device's own watchdog switches the voltage off
   /// [s]; 0: it has no watchdog.
   double watchdog_s = 0.0;
@@ -112,7 +114,7 @@ class Rig {
   virtual ~Rig() = default;
   /// Connects, checks the device, and sets the motor to zero volts.
   virtual void open() = 0;
-  virtual RigReading read() noexcept = 0;
+  virtual RigReading read() noexcept = 0;  ///< the newest counts. A fault is a status, not an exception.
   /// Commands a voltage from the limiter. A value that is not finite is refused and replaced by zero
   /// volts.
   virtual RigFault write(double voltage_v) noexcept = 0;

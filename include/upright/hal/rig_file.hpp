@@ -30,11 +30,12 @@ struct RigRoles {
   bool pendulum = false;  ///< counts the pendulum's encoder
   bool output = false;    ///< puts out the voltage
 
-  bool encoders() const noexcept { return cart || pendulum; }
-  bool any() const noexcept { return encoders() || output; }
-  bool all() const noexcept { return cart && pendulum && output; }
+  bool encoders() const noexcept { return cart || pendulum; }       ///< counts at least one encoder
+  bool any() const noexcept { return encoders() || output; }        ///< has at least one role
+  bool all() const noexcept { return cart && pendulum && output; }  ///< has every role
 };
 
+/// Section `amplifier` of a rig file.
 struct Amplifier {
   double limit_v = 0.0;  ///< symmetric limit of commands
   int sign = 1;          ///< -1 where a positive command would push the cart toward -x
@@ -42,16 +43,17 @@ struct Amplifier {
 
 /// The simulated rig: plant, initial state, sensors and clock.
 struct SimulatedRig {
-  std::filesystem::path plant;  ///< plant file
-  Pose initial;
-  double initial_cart_mps = 0.0;
-  double initial_theta_radps = 0.0;
+  std::filesystem::path plant;       ///< plant file
+  Pose initial;                      ///< pose at the start
+  double initial_cart_mps = 0.0;     ///< velocity of the cart at the start [m/s]
+  double initial_theta_radps = 0.0;  ///< rate of the pendulum at the start [rad/s]
   bool quantise = true;          ///< false: encoders with 1024 times the resolution, see calibration_in_use
   double cart_noise_m = 0.0;     ///< standard deviation, before quantisation
   double theta_noise_rad = 0.0;  ///< standard deviation, before quantisation
   double timing_jitter_s = 0.0;  ///< standard deviation of the delay of readings
 };
 
+/// Of a serial line.
 enum class Parity : std::uint8_t { none, even, odd };
 
 /// Modbus functions that transfer counts and voltage.
@@ -62,38 +64,39 @@ enum class ModbusExchange : std::uint8_t {
 
 /// A watchdog in the device: it switches the voltage off when no valid request came within its time.
 struct DeviceWatchdog {
-  int address = 0;
-  double time_s = 0.0;
+  int address = 0;                 ///< of the holding register
+  double time_s = 0.0;             ///< its time [s]
   double seconds_per_count = 0.0;  ///< seconds per count of the register
 
-  int counts() const;
+  int counts() const;  ///< its time as the register holds it
 };
 
+/// Section `modbus` of a rig file.
 struct ModbusRig {
-  std::string host;    ///< modbus-tcp
-  int port = 502;      ///< modbus-tcp
-  std::string device;  ///< modbus-rtu: the serial line
-  int baud = 0;        ///< modbus-rtu
-  Parity parity = Parity::none;
-  int stop_bits = 1;
-  int unit = 1;
+  std::string host;                 ///< modbus-tcp
+  int port = 502;                   ///< modbus-tcp
+  std::string device;               ///< modbus-rtu: the serial line
+  int baud = 0;                     ///< modbus-rtu
+  Parity parity = Parity::none;     ///< of the serial line
+  int stop_bits = 1;                ///< of the serial line, 1 or 2
+  int unit = 1;                     ///< address of the device
   double response_timeout_s = 0.0;  ///< per exchange; the factory checks it against the period
-  ModbusExchange exchange = ModbusExchange::read_write;
+  ModbusExchange exchange = ModbusExchange::read_write;  ///< how counts and voltage are transferred
   // The following keys are present as far as the device is used: no counters where only the voltage uses
   // Modbus, no voltage where only the encoders do and `exchange` does not need one.
   bool input_registers = false;  ///< counters are input registers (0x04)
-  int cart_address = 0;
-  int pendulum_address = 0;
-  CounterFormat counter;
-  int voltage_address = 0;
-  VoltageFormat voltage;
+  int cart_address = 0;          ///< of the cart's counter
+  int pendulum_address = 0;      ///< of the pendulum's counter
+  CounterFormat counter;         ///< of both counters
+  int voltage_address = 0;       ///< of the voltage's holding register
+  VoltageFormat voltage;         ///< what the voltage's registers hold
   /// False: the voltage registers do not read back as the output, so that a stop does not read them.
   bool voltage_reads_back = true;
   std::optional<int> enable_address;      ///< holding register: 1 enables the amplifier, 0 disables it
   std::optional<int> boot_count_address;  ///< same table as the counters: changes when the device restarts
   /// Same table as the counters: why the device has stopped the motor itself, see fault_in_status().
   std::optional<int> status_address;
-  std::optional<DeviceWatchdog> watchdog;
+  std::optional<DeviceWatchdog> watchdog;  ///< absent: the device has none
 };
 
 /// The section of a backend that has no own member in RigFile.
@@ -101,38 +104,39 @@ struct BackendWiring {
   virtual ~BackendWiring() = default;
 };
 
+/// A rig file.
 struct RigFile {
   static constexpr double longest_watchdog_s = 10.0;  ///< a longer watchdog would offer no protection
 
-  std::filesystem::path file;
+  std::filesystem::path file;  ///< as it was named
   // The sources of counts and the destination of the voltage. Simulated applies to all of them or none.
-  Backend cart_encoder = Backend::simulated;
-  Backend pendulum_encoder = Backend::simulated;
-  Backend output = Backend::simulated;
-  Calibration calibration;
-  Amplifier amplifier;
-  double track_limit_m = 0.0;  ///< the loop stops where |x| reaches it
+  Backend cart_encoder = Backend::simulated;      ///< who counts the cart's encoder
+  Backend pendulum_encoder = Backend::simulated;  ///< who counts the pendulum's encoder
+  Backend output = Backend::simulated;            ///< who puts out the voltage
+  Calibration calibration;                        ///< from counts to metres and radians
+  Amplifier amplifier;                            ///< limit and sign of the voltage
+  double track_limit_m = 0.0;                     ///< the loop stops where |x| reaches it
   /// Without voltage, a cart coasts for this many seconds times its velocity: while balancing, the loop
   /// stops where the cart can just be halted before the track limit.
   double coast_s = 0.0;
   double fall_angle_rad = 0.0;  ///< the loop stops where |theta| reaches it
   double watchdog_s = 0.0;      ///< the motor is at zero volts this long after the last good exchange
   double spin_us = 0.0;         ///< final part of each wait in which the loop polls the clock
-  std::optional<SimulatedRig> simulated;
-  std::optional<ModbusRig> modbus;
-  std::optional<ComediRig> comedi;
-  std::optional<QuanserRig> quanser;
-  std::optional<GpioRig> gpio;
-  std::shared_ptr<const BackendWiring> wiring;  ///< of any other backend; a rig has one at most
-  std::optional<StatedAssumptions> encoder_watch;
+  std::optional<SimulatedRig> simulated;            ///< of backend simulated
+  std::optional<ModbusRig> modbus;                  ///< of backends modbus-tcp and modbus-rtu
+  std::optional<ComediRig> comedi;                  ///< of backend comedi
+  std::optional<QuanserRig> quanser;                ///< of backend quanser-hil
+  std::optional<GpioRig> gpio;                      ///< digital lines of any rig
+  std::shared_ptr<const BackendWiring> wiring;      ///< of any other backend; a rig has one at most
+  std::optional<StatedAssumptions> encoder_watch;   ///< widens what the plant implies
 };
 
 /// Reads a rig file. Throws ConfigError with remedy, file, line and key.
 RigFile read_rig_file(const std::filesystem::path& file);
-RigFile read_rig(const YamlMap& document);
+RigFile read_rig(const YamlMap& document);  ///< the same for a file that was opened already
 
-RigRoles roles_of(const RigFile& rig, Backend backend);
-bool is_simulated(const RigFile& rig);
+RigRoles roles_of(const RigFile& rig, Backend backend);  ///< what this backend does in the rig
+bool is_simulated(const RigFile& rig);  ///< whether the plant is simulated: then all of the rig is
 /// For messages: "modbus-tcp", or "encoders comedi, output modbus-tcp", ...
 std::string backends_text(const RigFile& rig);
 

@@ -12,6 +12,7 @@
 
 namespace upright {
 
+/// What a run adds to the rig file.
 struct SimulatedRigOptions {
   std::uint64_t seed = 1;            ///< of sensor noise and timing jitter
   std::optional<double> theta0_rad;  ///< replaces the rig file's initial angle

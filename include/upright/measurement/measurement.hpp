@@ -15,40 +15,41 @@ struct Dataset;
 
 /// From sample `from` on, `added_rad` was added to unwrap an angle that was recorded modulo a turn.
 struct Unfolding {
-  std::size_t from = 0;
-  double added_rad = 0.0;
+  std::size_t from = 0;    ///< the sample from which it applies
+  double added_rad = 0.0;  ///< what was added to the angle [rad]
 };
 
 /// One run: encoders are read at time_s[k]; voltage_v[k] is held from then until time_s[k + 1].
 struct Measurement {
-  std::string name;
-  std::vector<double> time_s;
-  std::vector<double> voltage_v;
-  std::vector<double> cart_m;     ///< empty: not measured
-  std::vector<double> theta_rad;  ///< empty: not measured; unwrapped, 0 upright
-  bool cart_locked = false;
+  std::string name;                   ///< for messages
+  std::vector<double> time_s;         ///< increasing [s]
+  std::vector<double> voltage_v;      ///< held until the next sample [V]
+  std::vector<double> cart_m;         ///< empty: not measured
+  std::vector<double> theta_rad;      ///< empty: not measured; unwrapped, 0 upright
+  bool cart_locked = false;           ///< the cart was held: only the pendulum swings
   double cart_resolution_m = 0.0;     ///< 0: no quantisation found
   double theta_resolution_rad = 0.0;  ///< 0: no quantisation found
   /// Weight of each sample as a measurement: repeated quantised values carry less information. Empty: all
   /// 1.
-  std::vector<double> cart_weight, theta_weight;
-  /// The results of cart_noise_m() and theta_noise_rad() at reading; otherwise these evaluate all
-  /// samples.
-  std::optional<double> known_cart_noise_m, known_theta_noise_rad;
-  std::vector<std::size_t> breaks;  ///< samples preceded by missing rows: no segment crosses them
-  std::vector<Unfolding> unfoldings;
-  std::shared_ptr<const Dataset> dataset;  ///< how it was read; null if not from a file
-  std::size_t missing_rows = 0;            ///< rows of the file with a cell that has no number
-  std::vector<std::string> notes;          ///< findings and assumptions of the reader
+  std::vector<double> cart_weight;
+  std::vector<double> theta_weight;  ///< the same of the angle
+  /// The result of cart_noise_m() at reading; otherwise it evaluates all samples.
+  std::optional<double> known_cart_noise_m;
+  std::optional<double> known_theta_noise_rad;  ///< the same of theta_noise_rad()
+  std::vector<std::size_t> breaks;              ///< samples preceded by missing rows: no segment crosses them
+  std::vector<Unfolding> unfoldings;            ///< of an angle that its source folded
+  std::shared_ptr<const Dataset> dataset;       ///< how it was read; null if not from a file
+  std::size_t missing_rows = 0;                 ///< rows of the file with a cell that has no number
+  std::vector<std::string> notes;               ///< findings and assumptions of the reader
 
-  std::size_t size() const { return time_s.size(); }
-  bool has_cart() const { return !cart_m.empty(); }
-  bool has_theta() const { return !theta_rad.empty(); }
-  double median_period_s() const;
+  std::size_t size() const { return time_s.size(); }     ///< number of samples
+  bool has_cart() const { return !cart_m.empty(); }      ///< whether the cart was measured
+  bool has_theta() const { return !theta_rad.empty(); }  ///< whether the pendulum was measured
+  double median_period_s() const;                        ///< median time between samples [s]
   /// Standard deviation of the sensor noise, estimated from the data: quantisation and noise beyond
   /// it.
   double cart_noise_m() const;
-  double theta_noise_rad() const;
+  double theta_noise_rad() const;  ///< the same of the angle [rad]
 };
 
 /// Reads one item of `--data`. Throws ConfigError with remedy, file and line for unusable data: no common

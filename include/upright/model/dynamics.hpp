@@ -19,20 +19,21 @@ namespace upright {
 /// State of the plant. `motor_v` is used with motor_lag only, `bristle_m` with bristle_friction only.
 template <class S>
 struct PlantState {
-  S cart_m{};
-  S theta_rad{};
-  S cart_mps{};
-  S theta_radps{};
-  S motor_v{};
-  S bristle_m{};
+  S cart_m{};       ///< position of the cart [m]
+  S theta_rad{};    ///< angle of the pendulum [rad], 0 upright
+  S cart_mps{};     ///< velocity of the cart [m/s]
+  S theta_radps{};  ///< rate of the pendulum [rad/s]
+  S motor_v{};      ///< motor voltage after the motor lag [V]
+  S bristle_m{};    ///< deflection of the bristles [m]
 };
 
 /// Mode of a contact with dry friction: sticking, or sliding in one direction.
 enum class Contact : std::int8_t { slip_backward = -1, stick = 0, slip_forward = 1 };
 
+/// The modes of both dry contacts.
 struct Contacts {
-  Contact cart = Contact::slip_forward;
-  Contact pivot = Contact::slip_forward;
+  Contact cart = Contact::slip_forward;   ///< between cart and track
+  Contact pivot = Contact::slip_forward;  ///< in the pivot
 };
 
 /// The physics of one plant. `Present` is the set of its effects: EffectSet, or a StaticEffectSet for
@@ -40,6 +41,7 @@ struct Contacts {
 template <class S, class Present = EffectSet>
 class Dynamics {
  public:
+  /// `present`: the effects, where they are known at compile time.
   explicit Dynamics(const PlantModel<S>& model, Present present = {})
       : model_(model), base_(model.corrected()) {
     if constexpr (std::is_same_v<Present, EffectSet>) {
@@ -67,17 +69,21 @@ class Dynamics {
     });
   }
 
-  const PlantModel<S>& model() const { return model_; }
+  const PlantModel<S>& model() const { return model_; }  ///< the model, as given
+  /// Base parameters after the effects that correct them.
   const BaseParameters<S>& base() const { return base_; }
+  /// Whether dry friction can hold the cart.
   bool cart_can_stick() const { return cart_dry_ && !bristles_ && model_.smoothing == 0.0; }
+  /// Whether dry friction can hold the pendulum.
   bool pivot_can_stick() const { return pivot_dry_ && model_.smoothing == 0.0; }
   /// The force has a kink at zero velocity: engines should not step across it.
   bool cart_has_kink() const { return cart_can_stick() || cart_kink_; }
+  /// Whether a torque of the pivot is not smooth at rest.
   bool pivot_has_kink() const { return pivot_can_stick() || pivot_kink_; }
-  bool has_motor_lag() const { return lag_; }
-  bool has_bristle_state() const { return bristles_; }
-  bool has_pendulum() const { return model_.has_pendulum; }
-  bool cart_locked() const { return model_.cart_locked; }
+  bool has_motor_lag() const { return lag_; }                ///< whether `motor_v` is a state
+  bool has_bristle_state() const { return bristles_; }       ///< whether `bristle_m` is a state
+  bool has_pendulum() const { return model_.has_pendulum; }  ///< false: the cart is alone
+  bool cart_locked() const { return model_.cart_locked; }    ///< true: only the pendulum moves
 
   /// Voltage after dead zone, gain, offset and saturation; engines treat delay and lag.
   S actuate(S volts) const {
@@ -90,6 +96,7 @@ class Dynamics {
     return volts;
   }
 
+  /// Delay of the plant's input [s].
   S input_delay_s() const {
     S delay(0.0);
     for_each_effect([&]<std::size_t I>() {
@@ -100,6 +107,7 @@ class Dynamics {
     return delay;
   }
 
+  /// Of the motor lag [s]; 0: none.
   S motor_time_constant_s() const {
     S constant(0.0);
     for_each_effect([&]<std::size_t I>() {
@@ -134,6 +142,7 @@ class Dynamics {
     return positive_part(level);
   }
 
+  /// Largest torque of dry friction in the pivot [N m].
   S pivot_dry_level() const {
     S level(0.0);
     for_each_effect([&]<std::size_t I>() {
@@ -160,6 +169,7 @@ class Dynamics {
     return force;
   }
 
+  /// Torque about the pivot without dry friction [N m].
   S pivot_smooth_torque(const S& omega) const {
     S torque(0.0);
     for_each_effect([&]<std::size_t I>() {
@@ -284,8 +294,8 @@ class Dynamics {
     return rate;
   }
 
-  S bristle_stiffness() const { return sum_of_bristles<true>(); }
-  S bristle_damping() const { return sum_of_bristles<false>(); }
+  S bristle_stiffness() const { return sum_of_bristles<true>(); }  ///< of the bristles [N/m]
+  S bristle_damping() const { return sum_of_bristles<false>(); }   ///< of the bristles [N s/m]
 
   /// Smallest inertia that a force on the cart acts on [kg].
   S least_cart_inertia() const {

@@ -33,6 +33,7 @@ namespace upright {
 /// The part of the plant to which an effect belongs.
 enum class Enters { cart, actuator, pendulum, sensor, parameter };
 
+/// "cart", "actuator", ...
 constexpr std::string_view name_of(Enters enters) {
   switch (enters) {
     case Enters::cart:
@@ -49,43 +50,46 @@ constexpr std::string_view name_of(Enters enters) {
   return "";
 }
 
+/// A parameter of an effect.
 struct ParameterInfo {
-  std::string_view name;
-  std::string_view unit;
-  Range range;
+  std::string_view name;  ///< as in plant files, with its unit
+  std::string_view unit;  ///< for people; empty: none
+  Range range;            ///< what a plant file may have
   double neutral;  ///< value at which the effect vanishes; NaN where there is none (a shape, a position)
   double typical;  ///< order of magnitude on a laboratory cart; start of a search
-  std::string_view meaning;
+  std::string_view meaning;  ///< with its symbol in the equation
 };
 
+/// For a parameter that makes the effect vanish at no value.
 constexpr double no_neutral = std::numeric_limits<double>::quiet_NaN();
 
+/// The entry of an effect in the registry.
 struct EffectInfo {
-  std::string_view kind;
-  Enters enters;
-  bool dry;  ///< a level of dry friction of a contact, not a force law
-  std::string_view equation;
-  std::string_view meaning;
-  std::span<const ParameterInfo> parameters;
+  std::string_view kind;                      ///< its name in plant files
+  Enters enters;                              ///< where it acts
+  bool dry;                                   ///< a level of dry friction of a contact, not a force law
+  std::string_view equation;                  ///< in the symbols of the parameters
+  std::string_view meaning;                   ///< one phrase for people
+  std::span<const ParameterInfo> parameters;  ///< in the order of plant files
 };
 
 /// The outputs of the sensors.
 template <class S>
 struct Outputs {
-  S cart_m;
-  S theta_rad;
+  S cart_m;     ///< measured position of the cart [m]
+  S theta_rad;  ///< measured angle of the pendulum [rad]
 };
 
 /// Parameters of the rigid body and the motor, as numbers of a scalar type.
 template <class S>
 struct BaseParameters {
-  S cart_mass_kg;
-  S pendulum_mass_kg;
-  S length_to_com_m;
-  S inertia_about_pivot_kgm2;
-  S gravity_mps2;
-  S force_per_volt_n;
-  S back_emf_n_per_mps;
+  S cart_mass_kg;              ///< of the cart alone [kg]
+  S pendulum_mass_kg;          ///< of the pendulum [kg]
+  S length_to_com_m;           ///< from pivot to centre of mass [m]
+  S inertia_about_pivot_kgm2;  ///< of the pendulum [kg m^2]
+  S gravity_mps2;              ///< acceleration of gravity [m/s^2]
+  S force_per_volt_n;          ///< of the motor [N/V]
+  S back_emf_n_per_mps;        ///< of the motor [N s/m]
 };
 
 }  // namespace upright

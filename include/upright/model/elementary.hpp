@@ -15,12 +15,12 @@ namespace upright::elementary {
 
 /// Beyond 2^20 quarter turns, the period is the double nearest to 2 pi.
 double sin(double angle);
-double cos(double angle);
-double exp(double x);
+double cos(double angle);  ///< cosine; `angle` in [rad]
+double exp(double x);      ///< exponential function
 /// exp(x) - 1, accurate near 0 too.
 double expm1(double x);
-double log(double x);
-double tanh(double x);
+double log(double x);   ///< natural logarithm
+double tanh(double x);  ///< hyperbolic tangent
 /// x^y for x >= 0. The relative error grows with |y log x|, by one unit in the last place per unit.
 double power(double x, double y);
 /// Square root of x^2 + y^2, where the squares neither overflow nor underflow.
@@ -28,9 +28,11 @@ inline double hypot(double x, double y) {
   return std::sqrt(x * x + y * y);
 }
 
+/// Both of one angle.
 template <class S>
 struct SineAndCosine {
-  S sine, cosine;
+  S sine;    ///< of the angle
+  S cosine;  ///< of the angle
 };
 /// Both, at little more than the cost of one.
 SineAndCosine<double> sine_and_cosine(double angle);
@@ -45,6 +47,7 @@ concept Dual = requires(const S& x) {
 template <class S>
 concept Composed = std::is_class_v<S>;
 
+/// The same for other scalars, with derivatives.
 template <Composed S>
 S sin(const S& x) {
   if constexpr (Dual<S>) {
@@ -55,6 +58,7 @@ S sin(const S& x) {
   }
 }
 
+/// The same for other scalars, with derivatives.
 template <Composed S>
 SineAndCosine<S> sine_and_cosine(const S& x) {
   if constexpr (Dual<S>) {
@@ -65,6 +69,7 @@ SineAndCosine<S> sine_and_cosine(const S& x) {
   }
 }
 
+/// The same for other scalars, with derivatives.
 template <Composed S>
 S exp(const S& x) {
   if constexpr (Dual<S>) {
@@ -75,6 +80,7 @@ S exp(const S& x) {
   }
 }
 
+/// The same for other scalars, with derivatives.
 template <Composed S>
 S log(const S& x) {
   if constexpr (Dual<S>)
@@ -83,6 +89,7 @@ S log(const S& x) {
     return log(x);
 }
 
+/// The same for other scalars, with derivatives.
 template <Composed S>
 S tanh(const S& x) {
   if constexpr (Dual<S>) {

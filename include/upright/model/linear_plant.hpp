@@ -14,6 +14,7 @@ namespace upright {
 
 /// The number of states that the gains of a gain file multiply, in their order.
 constexpr std::size_t fed_back_count = 4;
+/// Their names.
 constexpr std::array<std::string_view, fed_back_count> fed_back_names = {
     "cart_m", "theta_rad", "cart_velocity_mps", "pendulum_rate_radps"};
 
@@ -26,10 +27,10 @@ struct LinearPlant {
   Eigen::MatrixXd a;                  ///< n x n
   Eigen::VectorXd b;                  ///< n, per volt after the static actuator chain
   Eigen::VectorXd constant;           ///< n, the rate at the origin with zero volts after the static chain
-  double actuator_slope = 1.0;  ///< volts after the static chain per volt commanded, outside a dead zone
-  double input_delay_s = 0.0;
-  Eigen::VectorXd sensor_scale;  ///< one for each fed-back state of the plant
-  Eigen::VectorXd sensor_offset;
+  double actuator_slope = 1.0;     ///< volts after the static chain per volt commanded, outside a dead zone
+  double input_delay_s = 0.0;      ///< delay of the plant's input [s]
+  Eigen::VectorXd sensor_scale;    ///< one for each fed-back state of the plant
+  Eigen::VectorXd sensor_offset;   ///< one for each fed-back state of the plant
   std::vector<std::string> notes;  ///< what the linearisation neglects, one sentence each
 };
 
@@ -44,9 +45,10 @@ Plant sliding_plant(const Plant& plant);
 
 /// x(t + duration) = a x(t) + b u for an input that is constant over the duration; exact.
 struct SampledPlant {
-  Eigen::MatrixXd a;
+  Eigen::MatrixXd a;  ///< transition over the duration, n x n
   Eigen::MatrixXd b;  ///< one column per input
 };
+/// Throws ConfigError where an entry is not finite.
 SampledPlant hold_input(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b, double duration_s);
 
 /// A matrix as errors show it: "A = [1 2; 3 4]".

@@ -8,17 +8,19 @@
 
 namespace upright {
 
+/// Base parameters and effects as numbers of type S.
 template <class S>
 struct PlantModel {
-  BaseParameters<S> base{};  ///< as in the plant file, before the parameter effects
-  bool has_pendulum = false;
-  bool cart_locked = false;  ///< the cart is held: only the pendulum moves
-  EffectSet present;
+  BaseParameters<S> base{};                         ///< as in the plant file, before the parameter effects
+  bool has_pendulum = false;                        ///< false: the cart is alone
+  bool cart_locked = false;                         ///< the cart is held: only the pendulum moves
+  EffectSet present;                                ///< which effects it has
   std::array<S, all_parameter_count> parameters{};  ///< contiguous, indexed by parameter_offset
   /// 0: dry friction is a contact with events. Above 0: sgn(v) becomes tanh(smoothing v), without
   /// sticking (for linear design).
   double smoothing = 0.0;
 
+  /// The parameters of effect I.
   template <std::size_t I>
   const S* of() const {
     return &parameters[parameter_offset<I>];

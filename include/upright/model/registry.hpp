@@ -15,21 +15,25 @@
 
 namespace upright {
 
-constexpr std::size_t effect_count = std::tuple_size_v<AllEffects>;
-constexpr std::size_t most_effect_parameters = 3;
+constexpr std::size_t effect_count = std::tuple_size_v<AllEffects>;  ///< the number of effects
+constexpr std::size_t most_effect_parameters = 3;                    ///< no effect has more parameters
 
+/// The type of effect I.
 template <std::size_t I>
 using EffectAt = std::tuple_element_t<I, AllEffects>;
 
+/// The number of parameters of effect I.
 template <std::size_t I>
 constexpr std::size_t parameter_count_of = std::size(EffectAt<I>::parameters);
 
 /// Offset of the parameters of effect I in the array of all parameters.
 template <std::size_t I>
 constexpr std::size_t parameter_offset = parameter_offset<I - 1> + parameter_count_of<I - 1>;
+/// Those of the first effect come first.
 template <>
 inline constexpr std::size_t parameter_offset<0> = 0;
 
+/// The number of parameters of all effects together.
 constexpr std::size_t all_parameter_count =
     parameter_offset<effect_count - 1> + parameter_count_of<effect_count - 1>;
 
@@ -43,7 +47,7 @@ constexpr std::size_t effect_index() {
   }
 }
 
-/// Calls f.template operator()<I>() for every effect index I.
+/// Calls `f.template operator()<I>()` for every effect index I.
 template <class F>
 constexpr void for_each_effect(F&& f) {
   [&]<std::size_t... I>(std::index_sequence<I...>) {
@@ -63,19 +67,22 @@ std::size_t effect_parameter_offset(std::size_t effect);
 
 /// A set of effects known at run time.
 struct EffectSet {
-  std::uint64_t mask = 0;
+  std::uint64_t mask = 0;  ///< bit I: effect I is in the set
+  /// Whether effect I is in the set.
   template <std::size_t I>
   constexpr bool has() const {
     return (mask >> I & 1u) != 0;
   }
+  /// Whether this effect is in the set.
   constexpr bool has(std::size_t effect) const { return (mask >> effect & 1u) != 0; }
-  void add(std::size_t effect) { mask |= std::uint64_t{1} << effect; }
+  void add(std::size_t effect) { mask |= std::uint64_t{1} << effect; }  ///< puts this effect into the set
 };
 static_assert(effect_count <= 64);
 
 /// A set of effects known at compile time: absent effects cost nothing.
 template <std::uint64_t Mask>
 struct StaticEffectSet {
+  /// Whether effect I is in the set.
   template <std::size_t I>
   static constexpr bool has() {
     return (Mask >> I & 1u) != 0;

@@ -6,6 +6,7 @@
 
 namespace upright {
 
+/// Cart and pendulum without friction.
 struct RigidBody {
   double mass_kg = 0.0;       ///< total mass
   double moment_kgm = 0.0;    ///< m l; 0 without a pendulum
@@ -15,6 +16,7 @@ struct RigidBody {
   double equivalent_length_m() const { return inertia_kgm2 / moment_kgm; }
 };
 
+/// The rigid body of a plant.
 inline RigidBody rigid_body(const Plant& plant) {
   RigidBody body{plant.cart_mass_kg};
   if (!plant.pendulum) return body;
@@ -38,9 +40,12 @@ inline double pendulum_radps2(double sine, double cosine, double pivot_mps2, dou
 /// The inverse of the mass matrix: accelerations per unit of force on the cart and of torque on the
 /// pendulum. It is symmetric.
 struct InverseMass {
-  double cart_by_force = 0.0, coupled = 0.0, pendulum_by_torque = 0.0;  ///< [1/kg], [1/(kg m)], [1/(kg m^2)]
+  double cart_by_force = 0.0;       ///< [1/kg]
+  double coupled = 0.0;             ///< cart by torque, and pendulum by force [1/(kg m)]
+  double pendulum_by_torque = 0.0;  ///< [1/(kg m^2)]
 };
 
+/// At an angle with this cosine.
 inline InverseMass inverse_mass(const RigidBody& body, double cosine) {
   if (body.inertia_kgm2 == 0.0) return {1.0 / body.mass_kg, 0.0, 0.0};
   const double off = body.moment_kgm * cosine;

@@ -15,6 +15,7 @@ S select(bool condition, const S& yes, const S& no) {
 inline double value_of(double x) {
   return x;
 }
+/// The value of a dual number, without its derivatives.
 template <class S>
 requires requires(const S& x) {
   x.a;
@@ -29,15 +30,18 @@ template <class S>
 bool is_plainly(const S& /*x*/, double /*number*/) {
   return false;
 }
+/// The same for a plain number.
 inline bool is_plainly(double x, double number) {
   return x == number;
 }
 
+/// Absolute value.
 template <class S>
 S absolute(const S& x) {
   return select(x < S(0.0), S(-x), x);
 }
 
+/// The value where it is positive, otherwise 0.
 template <class S>
 S positive_part(const S& x) {
   return select(x > S(0.0), x, S(0.0));

@@ -5,6 +5,7 @@
 
 namespace upright {
 
+/// How the clock of a device behaved.
 struct DeviceTiming {
   std::uint64_t samples = 0;  ///< that arrived, from the run's first on
   std::uint64_t lost = 0;     ///< that were due and did not arrive

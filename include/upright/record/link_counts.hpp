@@ -20,15 +20,17 @@ enum class LinkTrouble : std::uint8_t {
   other,          ///< a fault of the device, not of the link
 };
 
+/// Cycles with trouble on the link, by cause.
 struct LinkCounts {
-  static constexpr std::size_t kinds = 6;
+  static constexpr std::size_t kinds = 6;  ///< how many causes there are
 
   std::array<std::uint64_t, kinds> cycles{};  ///< by LinkTrouble
   std::uint64_t longest = 0;                  ///< largest number of consecutive cycles without fresh counts
   std::uint64_t recoveries = 0;               ///< how often the link was recovered
 
+  /// Cycles with this trouble.
   std::uint64_t of(LinkTrouble trouble) const noexcept { return cycles[static_cast<std::size_t>(trouble)]; }
-  void add(const RigReading& reading) noexcept;
+  void add(const RigReading& reading) noexcept;  ///< counts one reading
 
  private:
   std::uint64_t in_a_row_ = 0;

@@ -34,6 +34,7 @@ enum class StopReason : std::uint8_t {
 /// "duration", "signal", "not_finite", ...
 const char* name_of(StopReason reason) noexcept;
 
+/// Where the loop stops.
 struct LoopLimits {
   std::uint64_t periods = 0;    ///< rows of a complete run
   double track_limit_m = 0.0;   ///< stop where |x| reaches it
@@ -51,12 +52,19 @@ struct LoopLimits {
   bool signs_unproven = false;  ///< a real rig whose signs have not been checked
 };
 
+/// What happened how often.
 struct LoopCounts {
-  std::uint64_t periods = 0;  ///< cycles that were run
-  std::uint64_t fresh = 0, stale = 0, faults = 0;
-  std::uint64_t missed = 0;  ///< periods without a cycle
-  std::uint64_t overruns_wake = 0, overruns_read = 0, overruns_compute = 0, overruns_write = 0;
-  std::uint64_t saturated = 0, writes_failed = 0;
+  std::uint64_t periods = 0;           ///< cycles that were run
+  std::uint64_t fresh = 0;             ///< readings with new counts
+  std::uint64_t stale = 0;             ///< readings without new counts
+  std::uint64_t faults = 0;            ///< readings that failed
+  std::uint64_t missed = 0;            ///< periods without a cycle
+  std::uint64_t overruns_wake = 0;     ///< cycles that ended late because the loop woke late
+  std::uint64_t overruns_read = 0;     ///< the same because of reading
+  std::uint64_t overruns_compute = 0;  ///< the same because of the control step
+  std::uint64_t overruns_write = 0;    ///< the same because of writing
+  std::uint64_t saturated = 0;         ///< cycles at the voltage limit
+  std::uint64_t writes_failed = 0;     ///< cycles in which the rig did not take the voltage
   std::uint64_t page_faults = 0;  ///< of the loop's thread; zero with locked memory; counted by the session
   LinkCounts link;                ///< why readings were stale or faults
 };
@@ -78,24 +86,30 @@ void for_each_count(const LoopCounts& c, See&& see) {
   see("page_faults", c.page_faults);
 }
 
+/// How a run ended.
 struct LoopOutcome {
-  StopReason reason = StopReason::duration;
-  RigFault fault = RigFault::none;          ///< cause of a stop by the rig or the link
-  int exception = 0;                        ///< exception code of the device that caused the fault
-  StuckEncoder stuck = StuckEncoder::none;  ///< cause of a stop by a stuck encoder
-  int signal = 0;
-  bool realtime = false;             ///< the loop had SCHED_FIFO
-  std::int64_t start_ns = 0;         ///< on the loop's clock: time zero of the samples
-  std::uint64_t tick = 0;            ///< cycle in which the run ended
-  std::uint64_t first_bad_tick = 0;  ///< first cycle with the fault that ended the run
-  double time_s = 0.0;               ///< at the end of the run
-  double worst_theta_rad = 0.0;      ///< largest |theta|
-  double worst_cart_m = 0.0;         ///< largest |x|
-  double last_theta_rad = 0.0, last_cart_m = 0.0;
-  StopReport stop;  ///< whether the motor is known to be at zero volts
-  LoopCounts counts;
+  StopReason reason = StopReason::duration;  ///< why it ended
+  RigFault fault = RigFault::none;           ///< cause of a stop by the rig or the link
+  int exception = 0;                         ///< exception code of the device that caused the fault
+  StuckEncoder stuck = StuckEncoder::none;   ///< cause of a stop by a stuck encoder
+  int signal = 0;                            ///< number of the signal; 0: none
+  bool realtime = false;                     ///< the loop had SCHED_FIFO
+  std::int64_t start_ns = 0;                 ///< on the loop's clock: time zero of the samples
+  std::uint64_t tick = 0;                    ///< cycle in which the run ended
+  std::uint64_t first_bad_tick = 0;          ///< first cycle with the fault that ended the run
+  double time_s = 0.0;                       ///< at the end of the run
+  double worst_theta_rad = 0.0;              ///< largest |theta|
+  double worst_cart_m = 0.0;                 ///< largest |x|
+  double last_theta_rad = 0.0;               ///< angle of the last cycle
+  double last_cart_m = 0.0;                  ///< cart position of the last cycle
+  StopReport stop;                           ///< whether the motor is known to be at zero volts
+  LoopCounts counts;                         ///< what happened how often
   std::optional<DeviceTiming> device_clock;  ///< none: the computer was the clock
-  DurationHistogram wake_late, read, compute, write, cycle;
+  DurationHistogram wake_late;               ///< lateness of the wake-ups
+  DurationHistogram read;                    ///< duration of reading
+  DurationHistogram compute;                 ///< duration of the control step
+  DurationHistogram write;                   ///< duration of writing
+  DurationHistogram cycle;                   ///< duration of the whole cycle
 };
 
 /// Calls see(name, histogram) for each part of a cycle.

@@ -11,15 +11,19 @@
 
 namespace upright {
 
+/// The first row that differs.
 struct ReplayMismatch {
-  std::uint64_t tick = 0;
-  double logged_requested_v = 0.0, computed_requested_v = 0.0;
-  double logged_v = 0.0, computed_v = 0.0;
+  std::uint64_t tick = 0;             ///< number of the period
+  double logged_requested_v = 0.0;    ///< before the limiter
+  double computed_requested_v = 0.0;  ///< the same, computed again
+  double logged_v = 0.0;              ///< after the limiter
+  double computed_v = 0.0;            ///< the same, computed again
 };
 
+/// What a replay found.
 struct ReplayResult {
-  std::uint64_t rows = 0;  ///< number of rows compared
-  std::optional<ReplayMismatch> first_mismatch;
+  std::uint64_t rows = 0;                        ///< number of rows compared
+  std::optional<ReplayMismatch> first_mismatch;  ///< absent: every voltage agrees
   /// Tick of the first row before which the log has lost rows: from there on replay cannot be exact.
   std::optional<std::uint64_t> first_lost_tick;
 };

@@ -42,7 +42,7 @@ class RowMemory final : public RowSink {
   }
   void push_waiting(const LogRecord& record) noexcept override { push(record); }
   bool failed() const noexcept override { return false; }
-  std::vector<LogRecord> take() { return std::move(rows_); }
+  std::vector<LogRecord> take() { return std::move(rows_); }  ///< the rows so far; none are left
 
  private:
   std::vector<LogRecord> rows_;
@@ -53,6 +53,7 @@ class RowMemory final : public RowSink {
 class RowWatcher {
  public:
   virtual ~RowWatcher() = default;
+  /// Called by the writer thread. It must not wait.
   virtual void see(std::span<const LogRecord> rows) noexcept = 0;
 };
 
@@ -68,8 +69,9 @@ enum class LogFileState : std::uint8_t {
 /// by separate threads, so that a slow disk delays neither the loop nor the writing.
 class RunLog final : public RowSink {
  public:
+  /// Sizes of the log.
   struct Options {
-    std::size_t queue_rows = 16384;
+    std::size_t queue_rows = 16384;  ///< rows that may wait for the disk
     /// False: sync only at the end (virtual time, where only the simulation could be lost).
     bool sync_while_running = true;
     RowWatcher* watcher = nullptr;  ///< null: none. It must outlive the log.
@@ -94,7 +96,9 @@ class RunLog final : public RowSink {
 
   /// Writes the queued rows, syncs and closes. May be called twice.
   void close() noexcept;
+  /// Rows on the disk so far.
   std::uint64_t rows_written() const noexcept { return rows_.load(std::memory_order_relaxed); }
+  /// Rows for which the queue had no room.
   std::uint64_t rows_dropped() const noexcept { return dropped_.load(std::memory_order_relaxed); }
   /// Empty, or why the log ended early, then the remedy.
   std::string failure() const;

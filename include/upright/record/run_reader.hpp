@@ -48,17 +48,18 @@ class SampleReader {
 /// Reads all rows. Throws as SampleReader does.
 Samples read_samples(const std::filesystem::path& file);
 
+/// A run directory as read.
 struct RunRecord {
-  std::filesystem::path path;
-  YamlMap document;  ///< the complete run.yaml
-  std::string label;
-  std::string started_utc;
-  double duration_s = 0.0;  ///< requested
-  ControlConfig control;
-  RigFile rig;
+  std::filesystem::path path;      ///< of the directory
+  YamlMap document;                ///< the complete run.yaml
+  std::string label;               ///< of the run
+  std::string started_utc;         ///< as in run.yaml
+  double duration_s = 0.0;         ///< requested
+  ControlConfig control;           ///< the gain file of the run
+  RigFile rig;                     ///< the rig file of the run
   std::optional<Plant> plant;      ///< simulated rigs only
   std::optional<YamlMap> outcome;  ///< none: the run was killed
-  Samples samples;
+  Samples samples;                 ///< the rows
 };
 
 /// Reads a run directory. Throws ConfigError with remedy, file, line and key.

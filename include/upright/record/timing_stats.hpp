@@ -8,8 +8,10 @@
 
 namespace upright {
 
+/// Durations, counted by size.
 class DurationHistogram {
  public:
+  /// Counts one duration [ns].
   void add(std::int64_t ns) noexcept {
     const std::uint64_t value = ns > 0 ? static_cast<std::uint64_t>(ns) : 0;
     ++buckets_[bucket_of(value)];
@@ -18,9 +20,10 @@ class DurationHistogram {
     max_ns_ = std::max(max_ns_, value);
   }
 
-  std::uint64_t count() const noexcept { return count_; }
+  std::uint64_t count() const noexcept { return count_; }  ///< how many there were
+  /// Their mean [us]; 0: there were none.
   double mean_us() const noexcept { return count_ == 0 ? 0.0 : sum_ns_ / static_cast<double>(count_) / 1e3; }
-  double max_us() const noexcept { return static_cast<double>(max_ns_) / 1e3; }
+  double max_us() const noexcept { return static_cast<double>(max_ns_) / 1e3; }  ///< the longest [us]
 
   /// Quantile `part` (0 to 1) of the durations: the upper end of its bucket, at most the
   /// maximum.
@@ -35,8 +38,10 @@ class DurationHistogram {
     return max_us();
   }
 
-  static constexpr std::size_t bucket_count = 8 * 40;
+  static constexpr std::size_t bucket_count = 8 * 40;  ///< eight to each doubling
+  /// How many durations are in each bucket.
   const std::array<std::uint64_t, bucket_count>& buckets() const noexcept { return buckets_; }
+  /// The longest duration of a bucket [ns].
   static constexpr std::uint64_t upper_end_ns(std::size_t bucket) noexcept {
     if (bucket < 8) return bucket;
     const std::uint64_t octave = bucket / 8, part = bucket % 8;

@@ -15,7 +15,8 @@ namespace upright {
 /// not there by then was lost, or comes so late that it is as good as lost.
 class DeviceClock {
  public:
-  static constexpr std::int64_t parts = 4, parts_late = 3;
+  static constexpr std::int64_t parts = 4;       ///< of a period
+  static constexpr std::int64_t parts_late = 3;  ///< by which a sample may be late
 
   /// Until when the sample of the next cycle is waited for.
   static std::int64_t patience_ends_ns(const LoopPhase& phase) noexcept {

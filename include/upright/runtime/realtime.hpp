@@ -8,6 +8,7 @@
 
 namespace upright {
 
+/// What is asked of the kernel.
 struct RealtimeRequest {
   int priority = 80;  ///< of SCHED_FIFO
   int cpu = -1;       ///< processor for the thread; -1: the last one allowed, when there are several

@@ -31,26 +31,28 @@ std::string gap_of_encoder_watch(const RigFile& rig);
 /// `delay_exceeded`. Throws ConfigError where the encoder watch lacks a bound.
 LoopLimits rig_limits(const RigFile& rig, const std::optional<Plant>& plant);
 
+/// What a session adds to its setup.
 struct SessionOptions {
-  std::filesystem::path out = "runs";  ///< parent folder of run directories
-  RealtimeRequest realtime;            ///< ignored in virtual time
-  ModelParts parts;
-  std::size_t log_queue_rows = RunLog::Options{}.queue_rows;
-  CommandSource* source = nullptr;  ///< null: balance. It must outlive the session.
-  RowWatcher* watcher = nullptr;    ///< of the log's rows; null: none. It must outlive the session.
+  std::filesystem::path out = "runs";                         ///< parent folder of run directories
+  RealtimeRequest realtime;                                   ///< ignored in virtual time
+  ModelParts parts;                                           ///< of the control step (`make_model_parts`)
+  std::size_t log_queue_rows = RunLog::Options{}.queue_rows;  ///< rows that may wait for the disk
+  CommandSource* source = nullptr;                            ///< null: balance. It must outlive the session.
+  RowWatcher* watcher = nullptr;  ///< of the log's rows; null: none. It must outlive the session.
   /// Called about five times per second by the calling thread while the loop runs; may be empty.
   std::function<void(const LiveStatus&)> show;
   StopWatcher stop;  ///< callbacks while the session waits for zero volts
 };
 
+/// What a session leaves.
 struct SessionResult {
   std::filesystem::path directory;  ///< path at the end of the run
   std::filesystem::path made_at;    ///< path at creation; different if another program moved the directory
-  LoopOutcome outcome;
-  LogSummary log;
-  RealtimeGrant scheduling;
-  bool outcome_written = false;
-  double elapsed_s = 0.0;  ///< wall-clock time
+  LoopOutcome outcome;              ///< how the loop ended
+  LogSummary log;                   ///< what was written
+  RealtimeGrant scheduling;         ///< what the kernel granted
+  bool outcome_written = false;     ///< false: run.yaml is that of the start
+  double elapsed_s = 0.0;           ///< wall-clock time
 };
 
 /// Determines the zero counts of a calibration whose zero is the pose at the start: reads the open rig

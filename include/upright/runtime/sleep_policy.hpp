@@ -10,15 +10,17 @@ namespace upright {
 
 /// Cycles are due at start + tick x period: an overrun does not shift the phase.
 struct LoopPhase {
-  std::int64_t start_ns = 0;
-  std::int64_t period_ns = 1;
-  std::uint64_t next_tick = 0;
+  std::int64_t start_ns = 0;    ///< time of the first period [ns]
+  std::int64_t period_ns = 1;   ///< length of a period [ns]
+  std::uint64_t next_tick = 0;  ///< number of the next period
 
+  /// When a period begins [ns].
   std::int64_t due_ns(std::uint64_t tick) const noexcept {
     return start_ns + static_cast<std::int64_t>(tick) * period_ns;
   }
 };
 
+/// One wake-up.
 struct Wake {
   std::uint64_t tick = 0;    ///< the cycle to run now
   std::uint64_t missed = 0;  ///< cycles that were due before it and are skipped

@@ -15,6 +15,7 @@
 
 namespace upright {
 
+/// What can happen to the contacts of a plant during a step, and what ends its motion.
 enum class EventKind : std::uint8_t {
   cart_stick,
   cart_breakaway,
@@ -28,13 +29,15 @@ enum class EventKind : std::uint8_t {
   actuator_corner,
 };
 
+/// What happened during the integration.
 struct Event {
-  double time_s = 0.0;
-  EventKind kind = EventKind::cart_stick;
+  double time_s = 0.0;                     ///< when it happened [s]
+  EventKind kind = EventKind::cart_stick;  ///< what happened
 };
 
+/// How an engine integrates.
 struct EngineOptions {
-  double max_step_s = 1e-3;
+  double max_step_s = 1e-3;  ///< longest step [s]
   /// Upper bound of the step of the Runge-Kutta engine, as a fraction of the inverse of the greatest rate
   /// of the motion.
   double step_fraction = 0.2;
@@ -58,25 +61,27 @@ struct EngineOptions {
 
 /// An event to watch for. `sign`: direction of the motion before it; `corner_v`: voltage of a corner.
 struct Watch {
-  EventKind kind = EventKind::cart_stick;
-  double sign = 1.0;
-  double corner_v = 0.0;
+  EventKind kind = EventKind::cart_stick;  ///< what happens there
+  double sign = 1.0;                       ///< direction of the motion before it
+  double corner_v = 0.0;                   ///< voltage of a corner of the actuator chain [V]
 };
 
 /// A list of a few watches, without allocation.
 struct WatchList {
-  std::array<Watch, 6> items{};
-  std::size_t count = 0;
-  void add(const Watch& watch) { items[count++] = watch; }
-  const Watch* begin() const { return items.data(); }
-  const Watch* end() const { return items.data() + count; }
+  std::array<Watch, 6> items{};                              ///< the first `count` are in use
+  std::size_t count = 0;                                     ///< how many are in use
+  void add(const Watch& watch) { items[count++] = watch; }   ///< appends one
+  const Watch* begin() const { return items.data(); }        ///< the first one
+  const Watch* end() const { return items.data() + count; }  ///< beyond the last one
 };
 
+/// The contact of a motion with this velocity.
 inline Contact direction_of(double velocity) {
   if (velocity == 0.0) return Contact::stick;
   return velocity > 0.0 ? Contact::slip_forward : Contact::slip_backward;
 }
 
+/// -1, 0 or 1.
 inline double sign_of_contact(Contact contact) {
   return static_cast<double>(contact);
 }
@@ -275,6 +280,7 @@ double turning_positive(F&& f, double f_low, double f_high, double h, double tol
 /// that chattering does not cause unbounded work.
 class EventBudget {
  public:
+  /// Begins a window at `time_s`.
   void restart(double time_s) {
     window_begin_s_ = time_s;
     events_ = 0;
@@ -284,7 +290,7 @@ class EventBudget {
     if (time_s - window_begin_s_ >= window_s) restart(time_s);
     return events_ >= most_events;
   }
-  void count() { ++events_; }
+  void count() { ++events_; }  ///< counts one event
 
  private:
   static constexpr double window_s = 1e-4;
@@ -297,9 +303,10 @@ class EventBudget {
 /// zone and of saturation.
 template <class S>
 struct ActuatorCorners {
-  std::array<double, 4> volts{};
-  std::size_t count = 0;
+  std::array<double, 4> volts{};  ///< the first `count` are in use [V]
+  std::size_t count = 0;          ///< how many corners there are
 
+  /// Those of this model's actuator chain.
   explicit ActuatorCorners(const PlantModel<S>& model) {
     constexpr std::size_t dead = effect_index<effects::VoltageDeadZone>();
     constexpr std::size_t gain = effect_index<effects::VoltageGain>();
@@ -341,16 +348,17 @@ struct ActuatorCorners {
 /// The motion over one step as a polynomial in time about `at_s`; `factor[k]` multiplies (t - at_s)^k.
 /// Passed to step sinks under a varying voltage; dense output for delayed feedback.
 struct DenseStep {
-  static constexpr int most_factors = 13;
-  double begin_s = 0.0;
-  double end_s = 0.0;
-  double at_s = 0.0;
-  int factors = 0;
-  bool ends_at_event = false;   ///< the acceleration is discontinuous at `end_s`
-  bool ends_at_corner = false;  ///< the derivative of the acceleration is
-  std::array<PlantState<double>, most_factors> factor{};
+  static constexpr int most_factors = 13;                 ///< of the longest polynomial
+  double begin_s = 0.0;                                   ///< where the step begins [s]
+  double end_s = 0.0;                                     ///< where the step ends [s]
+  double at_s = 0.0;                                      ///< the time about which it is expanded [s]
+  int factors = 0;                                        ///< how many factors are in use
+  bool ends_at_event = false;                             ///< the acceleration is discontinuous at `end_s`
+  bool ends_at_corner = false;                            ///< the derivative of the acceleration is
+  std::array<PlantState<double>, most_factors> factor{};  ///< of each power of time
 };
 
+/// Sets the flags of a step that ends at `found`; null: it ends at nothing.
 inline void mark_end(DenseStep& step, const Watch* found) {
   step.ends_at_corner = found != nullptr && found->kind == EventKind::actuator_corner;
   step.ends_at_event = found != nullptr && !step.ends_at_corner;

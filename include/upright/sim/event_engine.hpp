@@ -22,10 +22,11 @@ namespace upright {
 template <class S>
 class EventEngine {
  public:
+  /// Starts at rest: call `start`.
   explicit EventEngine(const PlantModel<S>& model, const EngineOptions& options = {})
       : dynamics_(model), plain_(values_of(model)), corners_(model), options_(options) {}
 
-  const Dynamics<S>& dynamics() const { return dynamics_; }
+  const Dynamics<S>& dynamics() const { return dynamics_; }  ///< the equations of motion
 
   /// Starts from a state at a time, at rest or moving, under `voltage_v` (after the input delay).
   void start(const PlantState<S>& state, double time_s = 0.0, const S& voltage_v = S(0.0)) {
@@ -131,8 +132,8 @@ class EventEngine {
     if (!halted_) time_s_ = end_s;
   }
 
-  const PlantState<S>& state() const { return state_; }
-  Outputs<S> outputs() const { return dynamics_.measure(state_); }
+  const PlantState<S>& state() const { return state_; }             ///< the state now
+  Outputs<S> outputs() const { return dynamics_.measure(state_); }  ///< what the sensors show now
   /// Replaces the present state: its derivatives, for callers that propagate sensitivities themselves, or
   /// its values too, for observers that correct it. A sticking contact keeps sticking as long as its
   /// velocity is zero.
@@ -158,17 +159,20 @@ class EventEngine {
     set(state_.bristle_m, 4, dynamics_.has_bristle_state());
     seeded_ = true;
   }
-  Contacts contacts() const { return contacts_; }
-  double time_s() const { return time_s_; }
+  Contacts contacts() const { return contacts_; }  ///< the modes of the contacts now
+  double time_s() const { return time_s_; }        ///< the time now [s]
+  /// Whether dry friction holds the cart.
   bool cart_at_rest() const { return dynamics_.cart_can_stick() && contacts_.cart == Contact::stick; }
+  /// Whether dry friction holds the pendulum.
   bool pivot_at_rest() const { return dynamics_.pivot_can_stick() && contacts_.pivot == Contact::stick; }
   /// The event that halted the engine: fall or track_end.
   std::optional<EventKind> halted() const { return halted_; }
 
   /// The number of events since `start`, and the latest of them (a ring of `kept_events`).
   std::uint64_t event_count() const { return event_count_; }
+  /// One of the last `kept_events` events.
   const Event& event(std::uint64_t index) const { return events_[index % kept_events]; }
-  static constexpr std::uint64_t kept_events = 256;
+  static constexpr std::uint64_t kept_events = 256;  ///< how many events are kept
   /// Steps since `start`, a measure of computing time.
   std::uint64_t step_count() const { return step_count_; }
 

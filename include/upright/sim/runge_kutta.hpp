@@ -14,6 +14,7 @@ namespace upright {
 /// Whether the voltage at the motor is a state variable, or constant over the step.
 enum class MotorVoltage : std::uint8_t { held, moves };
 
+/// The state after `h` at this rate [s].
 template <MotorVoltage motor = MotorVoltage::held, class S>
 PlantState<S> moved(const PlantState<S>& s, const PlantState<S>& rate, const S& h) {
   PlantState<S> to{s.cart_m + h * rate.cart_m,
@@ -29,10 +30,10 @@ PlantState<S> moved(const PlantState<S>& s, const PlantState<S>& rate, const S& 
 /// Coefficients of the bristles at the beginning of a step, for the exponential method below. The method
 /// has order 4 for any coefficients; accurate ones reduce the error of long steps.
 struct Bristles {
-  double relaxation_radps = 0.0;  ///< R, including the velocity that their damping gives the cart
-  double drift_mps2 = 0.0;        ///< rate of change of the remaining part of their rate
-  double cart_mps_per_m = 0.0;    ///< velocity that their damping takes from the cart per deflection
-  double theta_radps_per_m = 0.0;
+  double relaxation_radps = 0.0;   ///< R, including the velocity that their damping gives the cart
+  double drift_mps2 = 0.0;         ///< rate of change of the remaining part of their rate
+  double cart_mps_per_m = 0.0;     ///< velocity that their damping takes from the cart per deflection
+  double theta_radps_per_m = 0.0;  ///< rate that their damping takes from the pendulum per deflection
 };
 
 /// Bristles within a step of length h for any relaxation rate: dz/dt = -R z + drift t + smooth part, by
@@ -41,12 +42,16 @@ struct Bristles {
 /// damping on the cart follows from their displacement, not from their rate at the nodes.
 template <class S>
 struct Relaxation {
-  Bristles bristles;
-  S half_decay, decay;             ///< exp(-R h / 2), exp(-R h)
+  Bristles bristles;               ///< coefficients at the begin of the step
+  S half_decay;                    ///< exp(-R h / 2)
+  S decay;                         ///< exp(-R h)
   S half_weight;                   ///< weight of the smooth part over half the step
   std::array<S, 3> whole_weights;  ///< of the smooth part at the beginning, in the middle and at the end
-  S first_half_m, second_half_m, whole_m;  ///< contribution of the drift
-  S half_drift_mps, drift_mps;             ///< drift in the middle and at the end
+  S first_half_m;                  ///< contribution of the drift over the first half
+  S second_half_m;                 ///< contribution of the drift over the second half
+  S whole_m;                       ///< contribution of the drift over the whole step
+  S half_drift_mps;                ///< drift in the middle
+  S drift_mps;                     ///< drift at the end
 
   /// The smooth part of their rate at a drift of `drift`.
   S smooth(const PlantState<S>& at, const PlantState<S>& rate, const S& drift) const {
@@ -60,6 +65,7 @@ struct Relaxation {
     at.theta_radps = at.theta_radps - S(bristles.theta_radps_per_m) * aside;
   }
 
+  /// Over a step of `h` [s].
   Relaxation(const Bristles& those, const S& h) : bristles(those) {
     const double rate = bristles.relaxation_radps;
     const Phi half(-0.5 * rate * value_of(h)), whole(-rate * value_of(h));

@@ -8,7 +8,7 @@
 
 namespace upright {
 
-/// Simulates a sequence of voltage commands with any engine (EventEngine<S>, CvodeEngine) with numbers S.
+/// Simulates a sequence of voltage commands with any engine (EventEngine, CvodeEngine) with numbers S.
 /// Allocates at construction only.
 template <class Engine, class S>
 class BasicSimulator {
@@ -35,6 +35,7 @@ class BasicSimulator {
     waiting_[(first_ + count_++) % waiting_.size()] = {S(time_s) + delay_s_, voltage_v};
   }
 
+  /// Integrates to `time_s`; each command acts at its time.
   void advance_to(double time_s) {
     while (count_ > 0 && value_of(waiting_[first_].acts_s) < time_s) {
       const Command next = waiting_[first_];
@@ -45,9 +46,9 @@ class BasicSimulator {
     if (time_s > value_of(now_s_)) move_to(S(time_s));
   }
 
-  Engine& engine() { return engine_; }
-  const Engine& engine() const { return engine_; }
-  double time_s() const { return value_of(now_s_); }
+  Engine& engine() { return engine_; }                ///< the engine, to change its state
+  const Engine& engine() const { return engine_; }    ///< the engine
+  double time_s() const { return value_of(now_s_); }  ///< the time now [s]
   /// The command that acts at present: after the input delay, before the rest of the actuator chain.
   double acting_v() const { return acting_v_; }
 

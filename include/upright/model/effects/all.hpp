@@ -35,6 +35,7 @@
 namespace upright {
 
 // clang-format off
+/// Every effect of this build.
 using AllEffects =
     std::tuple<effects::ViscousFriction,
                effects::CoulombFriction,

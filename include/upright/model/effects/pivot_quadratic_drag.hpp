@@ -6,11 +6,14 @@
 
 namespace upright::effects {
 
+/// Air drag on the pendulum, proportional to the square of its rate.
 struct PivotQuadraticDrag {
+  /// Its parameters, in the order of a plant file.
   static constexpr ParameterInfo parameters[] = {
       {"coefficient_nms2_per_rad2", "N m s^2/rad^2", Range::not_negative(), 0.0, 0.0003,
        "c: torque per rate squared"},
   };
+  /// Its entry in the registry.
   static constexpr EffectInfo info{"pivot_quadratic_drag",
                                    Enters::pendulum,
                                    false,
@@ -18,8 +21,10 @@ struct PivotQuadraticDrag {
                                    "drag on the pendulum with the square of its rate: the air",
                                    parameters};
 
+  /// Its torque is not smooth at zero rate.
   static constexpr bool kink_at_pivot_rest = true;
 
+  /// Torque about the pivot [N m].
   template <class S>
   static S pivot_torque(const S* p, const S& omega) {
     return -p[0] * omega * absolute(omega);

@@ -5,10 +5,13 @@
 
 namespace upright::effects {
 
+/// Friction in the pivot, proportional to the rate.
 struct PivotViscousFriction {
+  /// Its parameters, in the order of a plant file.
   static constexpr ParameterInfo parameters[] = {
       {"coefficient_nms_per_rad", "N m s/rad", Range::not_negative(), 0.0, 0.001, "c: torque per rate"},
   };
+  /// Its entry in the registry.
   static constexpr EffectInfo info{"pivot_viscous_friction",
                                    Enters::pendulum,
                                    false,
@@ -16,6 +19,7 @@ struct PivotViscousFriction {
                                    "friction in the pivot in proportion to the rate",
                                    parameters};
 
+  /// Torque about the pivot [N m].
   template <class S>
   static S pivot_torque(const S* p, const S& omega) {
     return -p[0] * omega;

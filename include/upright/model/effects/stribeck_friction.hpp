@@ -11,13 +11,16 @@
 
 namespace upright::effects {
 
+/// Dry friction with a higher level near rest; the breakaway level is Fc + Fe (paper, equation (5)).
 struct StribeckFriction {
+  /// Its parameters, in the order of a plant file.
   static constexpr ParameterInfo parameters[] = {
       {"extra_force_n", "N", Range::not_negative(), 0.0, 0.5, "Fe: by how much breakaway exceeds sliding"},
       {"velocity_mps", "m/s", Range::positive(), no_neutral, 0.1,
        "vs: Stribeck velocity, over which the excess decays"},
       {"shape", "1", (Range{0.1, 10.0}), no_neutral, 2.0, "form factor of the decay"},
   };
+  /// Its entry in the registry.
   static constexpr EffectInfo info{
       "stribeck_friction",
       Enters::cart,
@@ -26,11 +29,13 @@ struct StribeckFriction {
       "dry friction that is larger near rest: the breakaway level is Fc + Fe (paper, equation (5))",
       parameters};
 
+  /// Its share of the dry level [N].
   template <class S>
   static S cart_dry_level(const S* p, const S& /*x*/, const S& speed, const S& /*direction*/) {
     return p[0] * decay(S(speed / p[1]), p[2]);
   }
 
+  /// Its greatest rate [1/s].
   static double rate_radps(const double* p, double v, double mass) {
     return std::abs(v) < 4.0 * p[1] ? p[0] / (p[1] * mass) : 0.0;
   }

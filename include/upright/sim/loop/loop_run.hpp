@@ -16,16 +16,16 @@ namespace upright {
 
 /// Settings that all runs of a sweep share.
 struct LoopSetup {
-  PlantModel<double> model;
-  ControlConfig control;  ///< `delay_s` is ignored: each run has its own
+  PlantModel<double> model;  ///< the plant
+  ControlConfig control;     ///< `delay_s` is ignored: each run has its own
   /// Continuous: V(t) = gains . y(t - delay), with the true velocities. Sampled: the control step at the
   /// gain file's rate, with velocity estimator, encoder resolution and amplifier limit.
   bool sampled = false;
   double cart_resolution_m = 0.0;     ///< sampled: resolution of the encoder; 0: exact
   double angle_resolution_rad = 0.0;  ///< sampled: resolution of the encoder; 0: exact
   double amplifier_limit_v = 1e6;     ///< sampled; the default is above any command
-  double duration_s = 20.0;
-  double fell_above_rad = 1.0;  ///< a run ends where |theta| reaches this
+  double duration_s = 20.0;           ///< of each run [s]
+  double fell_above_rad = 1.0;        ///< a run ends where |theta| reaches this
   /// Makes the estimator and the compensator of a sampled loop for one delay; empty: neither.
   std::function<ModelParts(const ControlConfig&)> make_parts;
 
@@ -35,25 +35,28 @@ struct LoopSetup {
 
 /// Released at rest at an angle with the cart at 0 and constant history (paper, equation (15)).
 struct LoopCase {
-  double theta0_rad = 0.0;
-  double delay_s = 0.0;
+  double theta0_rad = 0.0;  ///< initial angle [rad]
+  double delay_s = 0.0;     ///< delay of the feedback [s]
 };
 
+/// What one run did.
 struct LoopResult {
   double fall_time_s = std::numeric_limits<double>::quiet_NaN();  ///< NaN: it did not fall
   /// Half of peak to peak over the last third; for a run that fell, the largest absolute value.
   double theta_amplitude_rad = 0.0;
-  double cart_amplitude_m = 0.0;
-  PlantState<double> end;  ///< final state
+  double cart_amplitude_m = 0.0;  ///< half of the range of the cart within the window [m]
+  PlantState<double> end;         ///< final state
 
-  bool fell() const { return fall_time_s == fall_time_s; }
+  bool fell() const { return fall_time_s == fall_time_s; }  ///< whether the pendulum fell
 };
 
 /// Extremes of angle and position over the last third, and the largest absolute values until a fall.
 class MotionRange {
  public:
+  /// `window_begin_s`: from when on the range counts [s].
   explicit MotionRange(double window_begin_s) : window_begin_s_(window_begin_s) {}
 
+  /// Takes one sample.
   void take(double time_s, double theta_rad, double cart_m) {
     theta_most_ = std::max(theta_most_, std::abs(theta_rad));
     cart_most_ = std::max(cart_most_, std::abs(cart_m));
@@ -64,6 +67,7 @@ class MotionRange {
     cart_high_ = std::max(cart_high_, cart_m);
   }
 
+  /// Writes the amplitudes.
   void into(LoopResult& result) const {
     result.theta_amplitude_rad = result.fell() ? theta_most_ : 0.5 * (theta_high_ - theta_low_);
     result.cart_amplitude_m = result.fell() ? cart_most_ : 0.5 * (cart_high_ - cart_low_);
