@@ -122,13 +122,13 @@ struct RigFile {
   double fall_angle_rad = 0.0;  ///< the loop stops where |theta| reaches it
   double watchdog_s = 0.0;      ///< the motor is at zero volts this long after the last good exchange
   double spin_us = 0.0;         ///< final part of each wait in which the loop polls the clock
-  std::optional<SimulatedRig> simulated;            ///< of backend simulated
-  std::optional<ModbusRig> modbus;                  ///< of backends modbus-tcp and modbus-rtu
-  std::optional<ComediRig> comedi;                  ///< of backend comedi
-  std::optional<QuanserRig> quanser;                ///< of backend quanser-hil
-  std::optional<GpioRig> gpio;                      ///< digital lines of any rig
-  std::shared_ptr<const BackendWiring> wiring;      ///< of any other backend; a rig has one at most
-  std::optional<StatedAssumptions> encoder_watch;   ///< widens what the plant implies
+  std::optional<SimulatedRig> simulated;           ///< of backend simulated
+  std::optional<ModbusRig> modbus;                 ///< of backends modbus-tcp and modbus-rtu
+  std::optional<ComediRig> comedi;                 ///< of backend comedi
+  std::optional<QuanserRig> quanser;               ///< of backend quanser-hil
+  std::optional<GpioRig> gpio;                     ///< digital lines of any rig
+  std::shared_ptr<const BackendWiring> wiring;     ///< of any other backend; a rig has one at most
+  std::optional<StatedAssumptions> encoder_watch;  ///< widens what the plant implies
 };
 
 /// Reads a rig file. Throws ConfigError with remedy, file, line and key.
