@@ -20,6 +20,19 @@ std::string kind_of(std::size_t effect);
 enum class Verdict { explained, no_discrepancy, unexplained, not_excited };
 std::string_view name_of(Verdict verdict);
 
+/// What an effect saves on one run: the fall of minus twice the log likelihood.
+struct RunEvidence {
+  std::size_t run = 0;
+  double evidence = 0.0;
+};
+
+/// A stretch of a run, and what an effect saves there.
+struct ShownStretch {
+  std::size_t run = 0;
+  double from_s = 0.0, to_s = 0.0;
+  double evidence = 0.0;
+};
+
 /// An effect that the data require.
 struct FoundEffect {
   std::size_t effect = 0;
@@ -27,6 +40,44 @@ struct FoundEffect {
   std::vector<ParameterEstimate> parameters;
   std::vector<std::size_t> indistinguishable_from;
   std::string where;
+  std::vector<RunEvidence> shown_on;  ///< by run; empty if it was not measured
+  ShownStretch shows_most;            ///< the 0.2 s that show it most
+};
+
+/// An effect that helps a part of the data only, so that it is not named.
+struct LocalEffect {
+  std::size_t effect = 0;
+  std::vector<ParameterEstimate> parameters;  ///< fitted to all runs
+  std::string where;                          ///< where it holds and where not
+  std::vector<RunEvidence> shown_on;          ///< each run fitted with its own part of the data
+};
+
+/// The smallest size of an effect that the data would have shown.
+struct Detectable {
+  std::size_t effect = 0;
+  double size = 0.0;       ///< of its first parameter; of a number of the plant file, how far it may be off
+  double usual = 0.0;      ///< order of magnitude on such a rig
+  std::vector<double> at;  ///< its further parameters
+};
+
+/// A number of the plant file that the data moved.
+struct MovedNumber {
+  std::string name, unit;
+  double file = 0.0, fitted = 0.0;
+  double low = 0.0, high = 0.0;  ///< what is believed of it, from the file: 95 percent
+};
+
+/// An open-loop simulation of a run. Quantities that are not measured are NaN.
+struct ModelScore {
+  double gap = 0.0;  ///< error divided by the noise floor
+  double cart_rmse_m = 0.0, theta_rmse_rad = 0.0;
+};
+
+/// A run that was never fitted, simulated with the plant file as given and with the model that was found.
+struct ValidatedRun {
+  std::string name;
+  ModelScore given, found;
+  bool is_worse() const { return found.gap > given.gap; }
 };
 
 struct CandidateScore {
@@ -76,7 +127,11 @@ struct Diagnosis {
   bool bound_reached = false;
   bool examined = true;  ///< the residual was examined, so that the verdict is valid
   double gap_before = 0.0, gap_after = 0.0;
-  std::vector<FoundEffect> effects;        ///< in the order of discovery
+  std::vector<FoundEffect> effects;          ///< in the order of discovery
+  std::vector<LocalEffect> helps_here_only;  ///< not in `effects`, and not in `model`
+  std::vector<Detectable> detectable;
+  std::vector<MovedNumber> numbers;
+  std::vector<ValidatedRun> validation;    ///< filled by the caller, after the answer
   std::vector<CandidateScore> candidates;  ///< of the first round, best first
   std::vector<Trial> trials;               ///< all complete fits of the search, in order
   std::vector<Step> steps;                 ///< the model after each step
@@ -86,6 +141,7 @@ struct Diagnosis {
   std::vector<std::string> notes;  ///< how the data were read and split
   std::string residual;            ///< description of the remaining residual
   std::vector<std::size_t> held_out_runs;
+  std::vector<std::string> run_names;
   /// On held-out segments, with the plant file as given and with the model found.
   std::vector<ResidualTrace> residual_before, residual_after;
 };
