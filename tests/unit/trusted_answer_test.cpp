@@ -127,6 +127,25 @@ TEST(Halves, DoNotDependOnTheOrderOfRuns) {
   EXPECT_EQ(names(turned), names(runs));
 }
 
+TEST(Pitch, IsShownByOneRunNotByPlacesFarApart) {
+  Measurement here, far;
+  for (int k = 0; k < 200; ++k) {
+    const double t = 0.01 * k, x = 0.03 * std::sin(3.0 * t);
+    for (Measurement* run : {&here, &far}) {
+      run->time_s.push_back(t);
+      run->voltage_v.push_back(0.0);
+      run->cart_m.push_back(run == &far ? x + 0.5 : x);
+    }
+  }
+  const SelectionPolicy policy;
+  const auto longest_pitch = [&](const std::vector<Measurement>& runs) {
+    const DataRange range = range_of(runs, file_plant(), policy.excitation);
+    return free_parameters(effect_number("cogging_force"), range, policy.prior)[1].high;
+  };
+  EXPECT_DOUBLE_EQ(longest_pitch({here, far}), longest_pitch({here}));
+  EXPECT_NEAR(longest_pitch({here}), 0.06 / policy.prior.crests_of_pitch, 1e-4);
+}
+
 TEST(Phase, IsWithinHalfATurn) {
   constexpr double pi = std::numbers::pi;
   EXPECT_DOUBLE_EQ(wrapped_phase(-pi), pi);
