@@ -12,6 +12,7 @@
 #include "diagnosis/diagnosis_json.hpp"
 #include "diagnosis/plain_words.hpp"
 #include "diagnosis/simulated_segments.hpp"
+#include "diagnosis/validation.hpp"
 #include "experiment_data.hpp"
 #include "measurement/data_check.hpp"
 #include "measurement/long_records.hpp"
@@ -32,6 +33,7 @@ namespace fs = std::filesystem;
 struct DiagnoseFlags {
   std::string model;
   std::vector<std::string> data;
+  std::vector<std::string> validate;
   std::string out;
   bool as_json = false;
   bool trials = false;
@@ -96,7 +98,8 @@ void print_verdict(const Diagnosis& d) {
   if (!d.examined) return;
   switch (d.verdict) {
     case Verdict::explained:
-      std::printf("Explained: with the effects below, the model explains the data.\n");
+      std::printf("Explained: with the %s below, the model explains the data.\n",
+                  d.effects.empty() ? "numbers" : "effects");
       break;
     case Verdict::no_discrepancy:
       std::printf("No discrepancy: the model agrees with the data.\n");
@@ -105,7 +108,7 @@ void print_verdict(const Diagnosis& d) {
       std::printf("Unexplained: the model lacks something that no known effect explains.\n");
       break;
     case Verdict::not_excited:
-      std::printf("Not excited: these data contain too little motion to judge the model.\n");
+      std::printf("Not excited: these data could not show what the model may lack.\n");
       break;
   }
 }
@@ -115,6 +118,72 @@ std::string gap_text(double gap) {
   char text[32];
   std::snprintf(text, sizeof text, "%.2f", gap);
   return text;
+}
+
+/// On which runs an effect shows, and in which stretch most.
+void print_shown(const Diagnosis& d, const FoundEffect& effect) {
+  if (effect.shown_on.empty()) return;
+  std::printf("      evidence by run:");
+  for (const RunEvidence& of : effect.shown_on)
+    std::printf(" %s %.4g%s", d.run_names[of.run].c_str(), of.evidence,
+                &of == &effect.shown_on.back() ? "" : ",");
+  std::printf("; shows most in %s from %.4g to %.4g s\n", d.run_names[effect.shows_most.run].c_str(),
+              effect.shows_most.from_s, effect.shows_most.to_s);
+}
+
+void print_local(const Diagnosis& d) {
+  if (d.helps_here_only.empty()) return;
+  std::printf("Helps only on a part of the data (not in the model):\n");
+  for (const LocalEffect& local : d.helps_here_only) {
+    std::printf("  %-28s", kind_of(local.effect).c_str());
+    print_values(local.parameters);
+    std::printf("\n      %s\n", local.where.c_str());
+  }
+}
+
+void print_numbers(const Diagnosis& d) {
+  if (d.numbers.empty()) return;
+  std::printf("Numbers of the plant file that moved:\n");
+  std::printf("  %-44s %12s %12s   %s\n", "number", "file", "fitted", "believed within");
+  for (const MovedNumber& n : d.numbers) {
+    const bool outside = n.fitted < n.low || n.fitted > n.high;
+    std::printf("  %-44s %12.5g %12.5g   %.5g to %.5g %s%s\n", n.name.c_str(), n.file, n.fitted, n.low,
+                n.high, n.unit.c_str(), outside ? " (outside)" : "");
+  }
+}
+
+/// What the data would have shown, where the answer is that nothing was found.
+void print_power(const Diagnosis& d) {
+  if (d.verdict != Verdict::no_discrepancy && d.verdict != Verdict::not_excited) return;
+  for (const Detectable& each : d.detectable)
+    std::printf("%s%s above %.2g %s%s",
+                &each == &d.detectable.front() ? "These data would have shown: " : ", ",
+                kind_of(each.effect).c_str(), each.size,
+                std::string(effect_registry()[each.effect].parameters[0].unit).c_str(),
+                &each == &d.detectable.back() ? ".\n" : "");
+}
+
+std::string score_text(const ModelScore& score) {
+  char text[96];
+  std::string all = "gap " + gap_text(score.gap);
+  if (std::isfinite(score.cart_rmse_m)) {
+    std::snprintf(text, sizeof text, ", %.4g m", score.cart_rmse_m);
+    all += text;
+  }
+  if (std::isfinite(score.theta_rmse_rad)) {
+    std::snprintf(text, sizeof text, ", %.4g rad", score.theta_rmse_rad);
+    all += text;
+  }
+  return all;
+}
+
+void print_validation(const Diagnosis& d) {
+  if (d.validation.empty()) return;
+  std::printf("Validation on runs that were not fitted (open-loop simulation: gap, RMS error):\n");
+  for (const ValidatedRun& run : d.validation)
+    std::printf("  %s: %s as given; %s with the model found%s\n", run.name.c_str(),
+                score_text(run.given).c_str(), score_text(run.found).c_str(),
+                run.is_worse() ? ". WORSE: the model found is further off than the one given" : "");
 }
 
 void print(const Diagnosis& d, const std::string& out) {
@@ -134,10 +203,15 @@ void print(const Diagnosis& d, const std::string& out) {
         names += (names.empty() ? "" : ", ") + kind_of(other);
       std::printf("      these data do not distinguish it from: %s\n", names.c_str());
     }
+    print_shown(d, effect);
     print_next_best(next_best(d, effect));
   }
+  print_local(d);
+  print_numbers(d);
+  print_validation(d);
   print_steps(d);
   std::printf("Residual tests: %s.\n", in_plain_words(d.residual).c_str());
+  print_power(d);
   if (d.next_experiment)
     std::printf("Next experiment, to distinguish them: upright experiment %s --rig RIG\n  %s\n",
                 d.next_experiment->file.c_str(), d.next_experiment->description.c_str());
@@ -236,6 +310,14 @@ void write_results(const Diagnosis& d, const Plant& given, const std::vector<Mea
                [&](std::ostream& out) { out << diagnosis_json(d).dump(2) << "\n"; });
 }
 
+/// Runs that are simulated only. They are read as strictly as the others.
+std::vector<Measurement> validation_runs(const DiagnoseFlags& flags, const Plant& plant) {
+  if (flags.validate.empty()) return {};
+  const std::vector<Measurement> runs = read_measurements(runs_named(flags.validate).runs);
+  if (!flags.trust_data) refuse_mistakes(runs, plant);
+  return runs;
+}
+
 ExitCode run_diagnose(const DiagnoseFlags& flags) {
   end_on_signal();
   Progress progress("reading the data");
@@ -244,6 +326,7 @@ ExitCode run_diagnose(const DiagnoseFlags& flags) {
   std::vector<Measurement> runs = read_measurements(named.runs);
   if (!flags.trust_data) refuse_mistakes(runs, plant);
   runs = within_samples(std::move(runs), most_diagnosed_samples);
+  const std::vector<Measurement> unseen = validation_runs(flags, plant);
   if (!flags.out.empty() && fs::exists(fs::path(flags.out) / "diagnosis.json"))
     throw ConfigError(flags.out + " already holds a diagnosis: choose another folder with --out");
   DiagnosisOptions options;
@@ -253,6 +336,10 @@ ExitCode run_diagnose(const DiagnoseFlags& flags) {
   options.progress = progress.callback();
   Diagnosis diagnosis = diagnose(plant, runs, options);
   diagnosis.notes.insert(diagnosis.notes.begin(), named.left_out.begin(), named.left_out.end());
+  if (!unseen.empty()) {
+    progress.begin("validation");
+    diagnosis.validation = validate(plant, diagnosis, unseen);
+  }
   progress.begin("writing the results");
   if (!flags.out.empty()) write_results(diagnosis, plant, runs, flags);
   progress.end();
@@ -281,6 +368,8 @@ void add_diagnose(CommandLine& line) {
       .option("--data", flags->data,
               "Measured runs: experiment folders, run directories, CSV or dataset files")
       .required();
+  command.option("--validate", flags->validate,
+                 "Runs that are not fitted: the models as given and as found are scored on them");
   command.option("--out", flags->out,
                  "Folder for the results: diagnosis.json, the improved model.yaml, and CSV files");
   command.flag("--trust-data", flags->trust_data,

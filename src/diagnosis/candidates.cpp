@@ -36,10 +36,10 @@ FreeParameter free_parameter(std::size_t effect, std::size_t index, const DataRa
   return p;
 }
 
-/// A force along the track counts as one that repeats when the run passes some of its crests.
+/// A force along the track counts as one that repeats when a run passes some of its crests. Several runs at
+/// different places pass the same crests together, but each could as well have a force of its own.
 double longest_pitch_m(const DataRange& range, const PriorPolicy& prior) {
-  return std::max(prior.least_longest_pitch_m,
-                  (range.cart_high_m - range.cart_low_m) / prior.crests_of_pitch);
+  return std::max(prior.least_longest_pitch_m, range.longest_travel_m / prior.crests_of_pitch);
 }
 
 }  // namespace
@@ -57,6 +57,8 @@ DataRange range_of(const std::vector<Measurement>& runs, const Plant& plant, con
       range.largest_voltage_v = std::max(range.largest_voltage_v, std::abs(v));
     if (!run.has_cart()) continue;
     range.cart_moves = true;
+    const auto [low, high] = std::minmax_element(run.cart_m.begin(), run.cart_m.end());
+    range.longest_travel_m = std::max(range.longest_travel_m, *high - *low);
     for (const double x : run.cart_m) {
       range.cart_low_m = first ? x : std::min(range.cart_low_m, x);
       range.cart_high_m = first ? x : std::max(range.cart_high_m, x);

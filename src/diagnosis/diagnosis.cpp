@@ -3,17 +3,22 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <set>
 #include <sstream>
 #include <tuple>
 
 #include "adequacy.hpp"
 #include "base/parallel.hpp"
+#include "base_numbers.hpp"
+#include "detectable.hpp"
 #include "estimation/held_out.hpp"
 #include "estimation/smoother.hpp"
 #include "indistinguishable.hpp"
+#include "listing.hpp"
 #include "next_experiment.hpp"
 #include "plant_scale.hpp"
 #include "plausibility.hpp"
+#include "reproducibility.hpp"
 #include "search.hpp"
 #include "stepwise_selection.hpp"
 #include "upright/base/error.hpp"
@@ -44,7 +49,7 @@ class Diagnostician {
       if (left.structured && selection_.renew_initial_states()) left = settle();
       if (left.structured && selection_.find_pairs_of_all()) left = settle();
       if (left.beyond_sensors && selection_.find_thoroughly(left.structured)) left = settle();
-      conclude(left);
+      conclude(without_local_effects(left));
     } catch (const Interrupted&) {
       result_.interrupted = true;
     } catch (const BoundReached&) {
@@ -91,7 +96,7 @@ class Diagnostician {
     if (decided_) return;
     bound_.grant(budget_.examination_share * work_samples_);
     try {
-      conclude(settle());
+      conclude(without_local_effects(settle()));
     } catch (const Interrupted&) {
       result_.interrupted = true;
     } catch (const BoundReached&) {
@@ -118,7 +123,9 @@ class Diagnostician {
     result_.gap_before = known_gap(selection_.given());
     result_.gap_after = known_gap(h);
     result_.noise = h.train.point.noise;
-    result_.model = selection_.found().empty() ? plant_ : model_with(selection_.found(), h.train.point.plant);
+    result_.model = selection_.found().empty()
+                        ? plant_
+                        : model_with(plant_, h.train.point.plant, search_.nuisances(), selection_.found());
     result_.residual = "not examined: the search was not finished";
     result_.verdict = moves_enough(runs_, policy_.excitation) ? Verdict::unexplained : Verdict::not_excited;
   }
@@ -127,6 +134,8 @@ class Diagnostician {
   void note_runs() {
     result_.notes.clear();
     result_.effects.clear();
+    result_.run_names.clear();
+    for (const Measurement& run : runs_) result_.run_names.push_back(run.name);
     for (const Measurement& run : runs_)
       result_.notes.insert(result_.notes.end(), run.notes.begin(), run.notes.end());
     if (runs_.size() == 1) result_.notes.push_back("one run only: a third of its segments is held out");
@@ -161,7 +170,8 @@ class Diagnostician {
     }
     std::vector<std::size_t> corrections;
     for (const std::size_t j : certain_parameters(posterior, is_correction, policy_.correction))
-      if (is_correction[j] && !keeps_prior(h, j) && search_.is_plausible(h, h.free[j].effect) &&
+      if (is_correction[j] && !keeps_prior(h, j) && !withdrawn_.contains(h.free[j].effect) &&
+          search_.is_plausible(h, h.free[j].effect) &&
           std::find(corrections.begin(), corrections.end(), h.free[j].effect) == corrections.end())
         corrections.push_back(h.free[j].effect);
     fit_last(corrections);
@@ -216,36 +226,73 @@ class Diagnostician {
     for (const auto& [number, gap, effect] : ranked) corrections_.push_back(effect);
   }
 
+  /// An effect that does not reproduce, or that takes held-out data further from the model, is not named: it
+  /// goes, and what is left is looked at anew.
+  ResidualTests without_local_effects(ResidualTests left) {
+    for (;;) {
+      options_.tell(0.93, "comparing parts of the data");
+      reproductions_ = reproduce(search_, known_, all_found());
+      const Reproduction* least = nullptr;
+      for (const Reproduction& r : reproductions_)
+        if (is_contradicted(r, policy_.reproducibility) && (least == nullptr || r.t_value < least->t_value))
+          least = &r;
+      if (least != nullptr) {
+        withdraw(least->effect, least->where);
+      } else {
+        options_.tell(0.94, "measuring the gap");
+        listing_ = list_effects(search_, final_, all_found());
+        if (!listing_.raises) return left;
+        withdraw(*listing_.raises, "it helps the runs that were fitted, and takes held-out data further off");
+      }
+      left = settle();
+    }
+  }
+
+  void withdraw(std::size_t effect, const std::string& where) {
+    for (const std::size_t gone : selection_.withdraw(effect)) {
+      LocalEffect local{gone, estimates_of(gone, known_), where, {}};
+      if (gone != effect) local.where = "it cannot be without " + kind_of(effect);
+      for (const Reproduction& r : reproductions_)
+        if (r.effect == gone) local.shown_on = r.runs;
+      result_.helps_here_only.push_back(local);
+      withdrawn_.insert(gone);
+    }
+  }
+
   void conclude(const ResidualTests& tests) {
-    options_.tell(0.93, "measuring the gap");
+    options_.tell(0.95, "measuring the noise floor");
     note_runs();
     result_.noise = known_.train.point.noise;
     const std::vector<std::size_t> all = all_found();
-    const Noise& fitted_noise = final_.train.point.noise;
-    const Noise quiet = sensors_only(final_.train.point.noise);
-    // Of what is left but cannot be told from noise, the floor is what such noise makes; else the sensors
-    // alone.
-    const double floor = tests.structured ? 1.0 : held_out_floor(search_, final_, tests).usual;
-    const auto gap_with = [&](const std::vector<std::size_t>& effects, const Hypothesis& from, bool settled) {
-      Hypothesis h = search_.fitted_separately(effects, from, &fitted_noise, settled);
-      search_.filter_held_out(h, quiet);
-      return search_.gap_of(h) / floor;
-    };
-    double gap = result_.gap_before = gap_with({}, final_, false);
-    for (std::size_t i = 0; i < all.size(); ++i) {
-      const std::vector<std::size_t> first(all.begin(), all.begin() + static_cast<std::ptrdiff_t>(i) + 1);
+    // The same floor whatever the verdict: nearly equal fits are measured in the same unit. An error that was
+    // reached is no less than the floor.
+    const double usual = held_out_floor(search_, final_, tests).usual;
+    // Without an effect the numbers of the file stand, unless they are what is clearly off.
+    const bool numbers_only = all.empty() && listing_.numbers_moved < listing_.before &&
+                              listing_.before > policy_.power.clear_gap * usual;
+    if (numbers_only) listing_.after = *listing_.numbers_moved;
+    const double floor = std::max(std::min(usual, listing_.after), std::numeric_limits<double>::min());
+    result_.gap_before = listing_.before / floor;
+    for (const Listing::Row& row : listing_.rows) {
       FoundEffect found;
-      found.effect = all[i];
-      found.gap_before = gap;
-      gap = gap_with(first, final_, i + 1 == all.size());
-      found.gap_after = gap;
-      found.parameters = estimates_of(all[i], known_);
-      found.where = selection_.where(all[i]);
+      found.effect = row.effect;
+      found.gap_before = row.before / floor;
+      found.gap_after = row.after / floor;
+      found.parameters = estimates_of(row.effect, known_);
+      found.where = selection_.where(row.effect);
+      for (const Reproduction& r : reproductions_)
+        if (r.effect == row.effect) {
+          found.shown_on = r.runs;
+          found.shows_most = r.shows_most;
+        }
       result_.effects.push_back(found);
     }
-    result_.gap_after = gap;
+    result_.gap_after = listing_.after / floor;
     result_.residual = tests.sentence;
-    result_.model = all.empty() ? plant_ : model_with(all, known_.train.point.plant);
+    const Plant& fitted = known_.train.point.plant;
+    result_.model =
+        all.empty() && !numbers_only ? plant_ : model_with(plant_, fitted, search_.nuisances(), all);
+    result_.numbers = moved_numbers(plant_, result_.model, search_.range(), policy_.prior);
     for (auto& candidate : result_.candidates) {
       candidate.gap_after = result_.gap_before;
       for (auto& [effect, h] : selection_.finalists()) {
@@ -257,6 +304,8 @@ class Diagnostician {
     std::stable_sort(result_.candidates.begin(), result_.candidates.end(),
                      [](const auto& a, const auto& b) { return a.evidence > b.evidence; });
     note_doubtful_numbers();
+    opened_ = open_effects(search_, final_, all);
+    result_.detectable = detectable_sizes(search_, opened_);
     decide(tests);
     trace_residuals();
     find_indistinguishable();
@@ -316,51 +365,37 @@ class Diagnostician {
     return all;
   }
 
-  /// The plant file with the effects added. What moved within what is believed of it goes into the numbers
-  /// that were there.
-  Plant model_with(const std::vector<std::size_t>& all, const Plant& fitted) const {
-    Plant model = plant_;
-    for (const std::size_t effect : search_.nuisances()) {
-      if (std::find(all.begin(), all.end(), effect) != all.end()) continue;
-      if (plant_.find(effect) != nullptr) {
-        model.set(effect, fitted.find(effect)->values);
-      } else if (effect_registry()[effect].enters == Enters::parameter) {
-        fold(model, effect, fitted.find(effect)->values[0]);
-      }
-    }
-    for (const std::size_t effect : all) model.set(effect, fitted.find(effect)->values);
-    return model;
-  }
-
-  /// Puts the scale of a base parameter into the plant's own numbers.
-  static void fold(Plant& plant, std::size_t effect, double scale) {
-    Plant scaled = plant;
-    scaled.set(effect, std::vector<double>{scale});
-    const BaseParameters<double> base = make_model<double>(scaled).corrected();
-    plant.cart_mass_kg = base.cart_mass_kg;
-    plant.motor.back_emf_n_per_mps = base.back_emf_n_per_mps;
-    if (!plant.pendulum) return;
-    const bool rod = !plant.pendulum->given_inertia_kgm2;
-    plant.pendulum->mass_kg = base.pendulum_mass_kg;
-    plant.pendulum->length_to_com_m = base.length_to_com_m;
-    if (!rod) plant.pendulum->given_inertia_kgm2 = base.inertia_about_pivot_kgm2;
-  }
-
   void decide(const ResidualTests& tests) {
-    const bool worse = result_.gap_after > result_.gap_before;
-    if (worse)
-      result_.notes.emplace_back(
-          "what was found takes held-out data further from the model, so it explains nothing: check the "
-          "data and the plant file first");
-    if (tests.structured || worse) {
+    const bool clear_gap = result_.gap_after > policy_.power.clear_gap;
+    const std::vector<Detectable> hidden = may_hide(result_.detectable, plant_, policy_.power);
+    const bool nothing_found = result_.effects.empty() && result_.numbers.empty();
+    if (tests.structured || (clear_gap && !result_.effects.empty())) {
       result_.verdict = Verdict::unexplained;
-    } else if (!result_.effects.empty()) {
+    } else if (!clear_gap && !nothing_found) {
       result_.verdict = Verdict::explained;
+    } else if (!result_.helps_here_only.empty()) {
+      result_.verdict = Verdict::unexplained;
+    } else if (clear_gap || !hidden.empty() || !moves_enough(runs_, policy_.excitation)) {
+      result_.verdict = Verdict::not_excited;
     } else {
-      result_.verdict =
-          moves_enough(runs_, policy_.excitation) ? Verdict::no_discrepancy : Verdict::not_excited;
+      result_.verdict = Verdict::no_discrepancy;
     }
+    if (result_.verdict == Verdict::not_excited) note_power(clear_gap, hidden);
     decided_ = true;
+  }
+
+  /// Why data in which nothing is found do not show that nothing is missing.
+  void note_power(bool clear_gap, const std::vector<Detectable>& hidden) {
+    std::ostringstream text;
+    text.precision(2);
+    if (clear_gap)
+      text << "the fitted runs leave the numbers of the plant file so open that held-out data are "
+           << result_.gap_after << " times as far off as noise: record longer runs";
+    for (const Detectable& d : hidden)
+      text << (text.str().empty() ? "" : "; ") << kind_of(d.effect)
+           << " could hide: these data would show it above " << d.size << " "
+           << effect_registry()[d.effect].parameters[0].unit << ", and " << d.usual << " is usual";
+    if (!text.str().empty()) result_.notes.push_back(text.str());
   }
 
   /// Other effects that do as well in the place of one that was found: from sensitivities, or fitted where an
@@ -368,7 +403,7 @@ class Diagnostician {
   void find_indistinguishable() {
     options_.tell(0.94, "searching for confusable effects");
     std::vector<std::pair<std::size_t, Plant>> alternatives;
-    for (const Alternative& alternative : linear_alternatives(search_, final_, all_found())) {
+    for (const Alternative& alternative : linear_alternatives(search_, final_, all_found(), opened_)) {
       declare(alternative.instead_of, alternative.effect);
       alternatives.emplace_back(alternative.effect, alternative.plant);
     }
@@ -432,6 +467,10 @@ class Diagnostician {
   Hypothesis final_;  ///< fitted to the training runs, judged on the others
   Hypothesis known_;  ///< the same effects fitted to all runs: what the model says in the end
   std::vector<std::size_t> corrections_;
+  std::set<std::size_t> withdrawn_;  ///< found, and not named
+  std::vector<Reproduction> reproductions_;
+  Listing listing_;
+  std::vector<OpenedEffect> opened_;
 };
 
 }  // namespace

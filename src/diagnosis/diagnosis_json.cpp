@@ -57,6 +57,75 @@ json next_best_json(const NextBest& best) {
   return others;
 }
 
+/// Empty where the caller did not name its runs.
+std::string run_name(const Diagnosis& diagnosis, std::size_t run) {
+  return run < diagnosis.run_names.size() ? diagnosis.run_names[run] : "";
+}
+
+json shown_on_json(const Diagnosis& diagnosis, const std::vector<RunEvidence>& shown_on) {
+  json runs = json::array();
+  for (const RunEvidence& of : shown_on)
+    runs.push_back({{"run", run_name(diagnosis, of.run)}, {"evidence", number(of.evidence)}});
+  return runs;
+}
+
+json shows_most_json(const Diagnosis& diagnosis, const FoundEffect& effect) {
+  if (effect.shown_on.empty()) return nullptr;
+  const ShownStretch& most = effect.shows_most;
+  return {{"run", run_name(diagnosis, most.run)},
+          {"from_s", number(most.from_s)},
+          {"to_s", number(most.to_s)},
+          {"evidence", number(most.evidence)}};
+}
+
+json local_json(const Diagnosis& diagnosis, const LocalEffect& effect) {
+  return {{"kind", kind_of(effect.effect)},
+          {"parameters", parameters_json(effect.parameters)},
+          {"where", effect.where},
+          {"shown_on", shown_on_json(diagnosis, effect.shown_on)}};
+}
+
+json detectable_json(const Detectable& d) {
+  const std::span<const ParameterInfo> parameters = effect_registry()[d.effect].parameters;
+  json at = json::object();
+  for (std::size_t i = 0; i < d.at.size(); ++i) at[std::string(parameters[i + 1].name)] = number(d.at[i]);
+  return {{"kind", kind_of(d.effect)},
+          {"parameter", std::string(parameters[0].name)},
+          {"unit", std::string(parameters[0].unit)},
+          {"size", number(d.size)},
+          {"usual", number(d.usual)},
+          {"at", at}};
+}
+
+json moved_number_json(const MovedNumber& n) {
+  return {{"number", n.name},
+          {"unit", n.unit},
+          {"file", number(n.file)},
+          {"fitted", number(n.fitted)},
+          {"believed_within", {number(n.low), number(n.high)}}};
+}
+
+json score_json(const ModelScore& score) {
+  return {{"gap", number(score.gap)},
+          {"cart_rmse_m", number(score.cart_rmse_m)},
+          {"theta_rmse_rad", number(score.theta_rmse_rad)}};
+}
+
+json validated_json(const ValidatedRun& run) {
+  return {{"file", run.name},
+          {"given", score_json(run.given)},
+          {"found", score_json(run.found)},
+          {"found_is_worse", run.is_worse()}};
+}
+
+/// Every element of a list, by its own function.
+template <class T, class F>
+json list_json(const std::vector<T>& list, const F& as_json) {
+  json items = json::array();
+  for (const T& item : list) items.push_back(as_json(item));
+  return items;
+}
+
 json effect_json(const Diagnosis& diagnosis, const FoundEffect& effect) {
   json confusable = json::array();
   for (const std::size_t other : effect.indistinguishable_from) confusable.push_back(kind_of(other));
@@ -67,7 +136,9 @@ json effect_json(const Diagnosis& diagnosis, const FoundEffect& effect) {
           {"parameters", parameters_json(effect.parameters)},
           {"confusable_with", confusable},
           {"next_best", next_best_json(next_best(diagnosis, effect))},
-          {"where", effect.where}};
+          {"where", effect.where},
+          {"shown_on", shown_on_json(diagnosis, effect.shown_on)},
+          {"shows_most", shows_most_json(diagnosis, effect)}};
 }
 
 }  // namespace
@@ -90,19 +161,25 @@ json diagnosis_json(const Diagnosis& diagnosis) {
             {"description", diagnosis.next_experiment->description},
             {"file", diagnosis.next_experiment->file},
             {"distance", number(diagnosis.next_experiment->distance)}};
-  json document = {{"verdict", std::string(name_of(diagnosis.verdict))},
-                   {"gap",
-                    {{"measure", "held-out simulation error / noise floor"},
-                     {"before", number(diagnosis.gap_before)},
-                     {"after", number(diagnosis.gap_after)}}},
-                   {"effects", effects},
-                   {"candidates", candidates},
-                   {"next_experiment", next},
-                   {"residual", diagnosis.residual},
-                   {"noise", noise_json(diagnosis.noise)},
-                   {"steps", steps},
-                   {"trials", trials},
-                   {"notes", diagnosis.notes}};
+  json document = {
+      {"verdict", std::string(name_of(diagnosis.verdict))},
+      {"gap",
+       {{"measure", "held-out simulation error / noise floor"},
+        {"before", number(diagnosis.gap_before)},
+        {"after", number(diagnosis.gap_after)}}},
+      {"effects", effects},
+      {"helps_here_only", list_json(diagnosis.helps_here_only,
+                                    [&](const LocalEffect& local) { return local_json(diagnosis, local); })},
+      {"numbers", list_json(diagnosis.numbers, moved_number_json)},
+      {"detectable", list_json(diagnosis.detectable, detectable_json)},
+      {"validation", list_json(diagnosis.validation, validated_json)},
+      {"candidates", candidates},
+      {"next_experiment", next},
+      {"residual", diagnosis.residual},
+      {"noise", noise_json(diagnosis.noise)},
+      {"steps", steps},
+      {"trials", trials},
+      {"notes", diagnosis.notes}};
   // Of a search that was not finished only.
   if (diagnosis.interrupted) document["interrupted"] = true;
   if (diagnosis.bound_reached) document["bound_reached"] = true;

@@ -49,10 +49,13 @@ Plant without(const Hypothesis& h, Eigen::Index place) {
   return plant;
 }
 
+bool grows_from_nothing(std::size_t effect) {
+  return std::isfinite(effect_registry()[effect].parameters[0].neutral);
+}
+
+/// A force that repeats is another one with every pitch, which would have to be known.
 bool is_proportional(std::size_t effect) {
-  const EffectInfo& info = effect_registry()[effect];
-  const bool repeats = info.kind == "cogging_force";  // its pitch would have to be known
-  return std::isfinite(info.parameters[0].neutral) && !repeats;
+  return effect_registry()[effect].kind != "cogging_force";
 }
 
 }  // namespace
@@ -67,16 +70,26 @@ bool is_indistinguishable(double evidence_lost, double t_value, const Distinctio
          (evidence_lost < policy.most_scattered_evidence && t_value < policy.scattered_t);
 }
 
+std::vector<OpenedEffect> open_effects(const Search& search, const Hypothesis& h,
+                                       const std::vector<std::size_t>& listed) {
+  std::vector<std::size_t> effects = candidate_effects(h.train.point.plant, search.range());
+  effects.insert(effects.end(), search.nuisances().begin(), search.nuisances().end());
+  std::vector<OpenedEffect> opened;
+  for (const std::size_t effect : effects) {
+    if (!grows_from_nothing(effect)) continue;
+    if (std::find(listed.begin(), listed.end(), effect) != listed.end()) continue;
+    Hypothesis with = search.with_effect_free(h, effect);
+    if (with.valid) opened.push_back({effect, std::move(with)});
+  }
+  return opened;
+}
+
 std::vector<Alternative> linear_alternatives(const Search& search, const Hypothesis& h,
-                                             const std::vector<std::size_t>& listed) {
+                                             const std::vector<std::size_t>& listed,
+                                             const std::vector<OpenedEffect>& opened) {
   std::vector<Alternative> alternatives;
-  std::vector<std::size_t> others = candidate_effects(h.train.point.plant, search.range());
-  others.insert(others.end(), search.nuisances().begin(), search.nuisances().end());
-  for (const std::size_t other : others) {
+  for (const auto& [other, open] : opened) {
     if (!is_proportional(other)) continue;
-    if (std::find(listed.begin(), listed.end(), other) != listed.end()) continue;
-    const Hypothesis open = search.with_effect_free(h, other);
-    if (!open.valid) continue;
     for (const std::size_t effect : listed) {
       const Eigen::Index before = size_place(h, effect), after = size_place(open, effect);
       if (before < 0 || after < 0 || !std::isfinite(absent_value(h, before))) continue;

@@ -238,7 +238,7 @@ double certainty_of(const std::vector<Score>& scores) {
   }
   const double t = std::abs(sum.score) / std::sqrt(std::max(spread, sum.information));
   const double freedom = std::max(1.0 / concentration - 1.0, 1.0);
-  return std::sqrt(freedom * std::log1p(t * t / freedom)) * (8.0 * freedom + 1.0) / (8.0 * freedom + 3.0);
+  return normal_deviate(t, freedom);
 }
 
 /// Share of the innovations' power that a probe accounts for.

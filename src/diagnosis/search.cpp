@@ -1,14 +1,15 @@
 #include "search.hpp"
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <functional>
 #include <limits>
 #include <numeric>
 
+#include "belief.hpp"
 #include "effect_starts.hpp"
+#include "phases.hpp"
 #include "plausibility.hpp"
 
 namespace upright {
@@ -33,24 +34,13 @@ std::set<std::size_t> effects_of_both(const Hypothesis& first, const Hypothesis&
 /// What a fit says of its parameters, as a belief. What it says nothing of is believed to be where it is.
 GaussianPrior posterior_of(const Hypothesis& h) {
   const auto n = static_cast<Eigen::Index>(h.free.size());
-  GaussianPrior posterior{Eigen::VectorXd(n), Eigen::MatrixXd::Zero(n, n)};
-  if (n == 0) return posterior;
-  Eigen::VectorXd scale(n);
+  Eigen::VectorXd mean(n), least_sigma(n);
   for (Eigen::Index j = 0; j < n; ++j) {
     const FreeParameter& p = h.free[static_cast<std::size_t>(j)];
-    posterior.mean[j] = h.train.point.plant.find(p.effect)->values[p.index];
-    scale[j] = std::sqrt(h.train.covariance(j, j));
-    if (!(scale[j] > 0.0)) scale[j] = 1e-6 * p.scale;
+    mean[j] = h.train.point.plant.find(p.effect)->values[p.index];
+    least_sigma[j] = 1e-6 * p.scale;
   }
-  const Eigen::MatrixXd unscale = scale.cwiseInverse().asDiagonal();
-  const Eigen::MatrixXd correlation = unscale * h.train.covariance * unscale;
-  // Nearly the same force twice makes this singular; rounding must not make it a belief in the impossible.
-  constexpr double least = 1e-9;
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(0.5 * (correlation + correlation.transpose()));
-  const Eigen::VectorXd inverse = solver.eigenvalues().cwiseMax(least).cwiseInverse();
-  posterior.information =
-      unscale * solver.eigenvectors() * inverse.asDiagonal() * solver.eigenvectors().transpose() * unscale;
-  return posterior;
+  return belief_of(mean, h.train.covariance, least_sigma);
 }
 
 double log_determinant(const Eigen::MatrixXd& information) {
@@ -93,6 +83,7 @@ std::vector<ParameterEstimate> estimates_of(std::size_t effect, const Hypothesis
     e.name = info.parameters[i].name;
     e.unit = info.parameters[i].unit;
     e.value = h.train.point.plant.find(effect)->values[i];
+    if (is_phase(info.parameters[i])) e.value = wrapped_phase(e.value);
     e.low = e.high = e.value;
     for (std::size_t j = 0; j < h.free.size(); ++j) {
       if (h.free[j].effect != effect || h.free[j].index != i) continue;

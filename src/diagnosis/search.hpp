@@ -51,6 +51,8 @@ class Search {
   const SelectionPolicy& policy() const { return policy_; }
   const SearchBudget& budget() const { return budget_; }
   const DataRange& range() const { return range_; }
+  /// The plant file.
+  const Plant& given() const { return given_; }
   /// The plant file's own effects and the corrections of its numbers: in every hypothesis, within what is
   /// believed of them.
   const std::vector<std::size_t>& nuisances() const { return nuisances_; }

@@ -16,6 +16,7 @@
 
 #include <array>
 #include <cstddef>
+#include <string_view>
 
 #include "estimation/smoother.hpp"
 
@@ -127,6 +128,30 @@ struct DistinctionPolicy {
   double next_best_share = 1.0 / 3.0;
 };
 
+/// When an effect does not reproduce.
+struct ReproducibilityPolicy {
+  /// [standard errors] An effect is contradicted if what one part of the data says of it costs another part
+  /// more than this, compared with no such effect. By chance, three occurs once in 700 times. Chosen.
+  double least_t = 3.0;
+};
+
+/// What the data would have shown.
+struct PowerPolicy {
+  /// [standard errors] An effect of the size that is stated would be accepted with a probability of 95 %: so
+  /// far above the least accepted size.
+  double power_z = 1.645;
+  /// [1] The usual friction of a pivot, as a share of gravity's largest torque (at the natural rate, of what
+  /// grows with the rate). Chosen.
+  double share_of_gravity_torque = 0.01;
+  /// [noise floors] A larger gap is clearly above the floor: nothing is explained, and "no discrepancy" would
+  /// be wrong. Chosen.
+  double clear_gap = 2.0;
+  /// [kinds] Every rig has this friction. If the data would not have shown it at its usual size, they do not
+  /// show that nothing is missing.
+  std::array<std::string_view, 4> everywhere = {"viscous_friction", "coulomb_friction",
+                                                "pivot_viscous_friction", "pivot_coulomb_friction"};
+};
+
 /// Which motion counts as motion, and what an unmodelled force may depend on. Speeds, rates and voltages hold
 /// for a small cart and are scaled to other plants (plant_scale.hpp). All are chosen.
 struct MotionPolicy {
@@ -227,6 +252,9 @@ struct LocationPolicy {
   /// [rows] The least number of rows for each feature. With fewer, nothing is reported. Chosen.
   std::size_t rows_per_feature = 4;
 
+  /// [s] The length of the stretch in which an effect shows most. Chosen for the reader.
+  double shown_s = 0.2;
+
   ResidualWalk walk;  ///< of the smoother that estimates the residual force
 };
 
@@ -308,6 +336,8 @@ struct SelectionPolicy {
   AcceptancePolicy acceptance;
   CorrectionPolicy correction;
   DistinctionPolicy distinction;
+  ReproducibilityPolicy reproducibility;
+  PowerPolicy power;
   MotionPolicy motion;
   ResidualPolicy residual;
   LocationPolicy location;

@@ -11,8 +11,6 @@
 
 namespace upright {
 
-namespace {}  // namespace
-
 StepwiseSelection::StepwiseSelection(Search& search, const DiagnosisOptions& options, Diagnosis& record)
     : search_(search),
       policy_(search.policy()),
@@ -64,10 +62,31 @@ bool StepwiseSelection::find_thoroughly(bool certainly_missing) {
   return true;
 }
 
+std::vector<std::size_t> StepwiseSelection::withdraw(std::size_t effect) {
+  std::vector<std::size_t> gone = {effect};
+  if (is_found(effect)) {
+    Hypothesis h = search_.without(current_, effect);
+    for (auto other = found_.rbegin(); other != found_.rend() && !std::isfinite(h.train.objective); ++other) {
+      if (*other == effect) continue;
+      const Hypothesis independent = search_.without(current_, *other);
+      if (!std::isfinite(independent.train.objective)) continue;
+      h = search_.without(independent, effect);
+      gone = {effect, *other};
+    }
+    current_ = std::move(h);
+    std::erase_if(found_,
+                  [&](std::size_t of) { return std::find(gone.begin(), gone.end(), of) != gone.end(); });
+    record_step();
+  }
+  withdrawn_.insert(gone.begin(), gone.end());
+  return gone;
+}
+
 std::vector<std::size_t> StepwiseSelection::open_candidates() const {
   std::vector<std::size_t> candidates = candidate_effects(current_.train.point.plant, search_.range());
   for (const std::size_t effect : search_.nuisances())
     if (!current_.added.contains(effect)) candidates.push_back(effect);
+  std::erase_if(candidates, [&](std::size_t effect) { return withdrawn_.contains(effect); });
   return candidates;
 }
 

@@ -36,6 +36,9 @@ class StepwiseSelection {
   /// changed.
   bool find_thoroughly(bool certainly_missing);
 
+  /// Takes an effect out, for good, and before it what cannot be without it. What went.
+  std::vector<std::size_t> withdraw(std::size_t effect);
+
   const Hypothesis& given() const { return given_; }
   const Hypothesis& current() const { return current_; }
   /// In the order in which they were found.
@@ -160,6 +163,7 @@ class StepwiseSelection {
   std::vector<std::size_t> found_;
   std::optional<Checkpoint> checkpoint_;
   bool contradicted_ = false;
+  std::set<std::size_t> withdrawn_;
   std::set<std::pair<std::size_t, std::size_t>> exchanged_;   ///< tried already
   std::set<std::pair<std::size_t, std::size_t>> simplified_;  ///< tried already, beside so many
   std::map<std::size_t, std::vector<std::size_t>> similar_effects_;

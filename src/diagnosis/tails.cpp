@@ -5,6 +5,10 @@
 
 namespace upright {
 
+double normal_deviate(double t, double freedom) {
+  return std::sqrt(freedom * std::log1p(t * t / freedom)) * (8.0 * freedom + 1.0) / (8.0 * freedom + 3.0);
+}
+
 Tails tails_of(const std::vector<double>& values) {
   const auto n = static_cast<double>(values.size());
   constexpr double least_count = 30.0;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <utility>
 
 namespace upright {
 
@@ -68,6 +69,31 @@ DataSplit split(const std::vector<Measurement>& runs, HeldOut which, double arm_
     train.pop_back();
   }
   return result;
+}
+
+std::array<std::vector<std::size_t>, 2> halves(const FitData& data, double arm_m, double speed_window_s) {
+  const std::vector<Measurement>& runs = *data.runs;
+  const std::vector<Segment>& segments = data.segments;
+  std::vector<std::size_t> order(segments.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+    return std::pair(segments[a].run, segments[a].first) < std::pair(segments[b].run, segments[b].first);
+  });
+  std::array<std::vector<std::size_t>, 2> parts;
+  if (order.empty()) return parts;
+  if (segments[order.front()].run == segments[order.back()].run) {
+    for (std::size_t i = 0; i < order.size(); ++i) parts[i % 2].push_back(order[i]);
+    return parts;
+  }
+  std::vector<std::pair<double, std::size_t>> excitation;
+  for (std::size_t r = 0; r < runs.size(); ++r)
+    if (std::any_of(order.begin(), order.end(), [&](std::size_t s) { return segments[s].run == r; }))
+      excitation.emplace_back(excitation_of(runs[r], {r, 0, runs[r].size() - 1}, arm_m, speed_window_s), r);
+  std::stable_sort(excitation.begin(), excitation.end());
+  std::vector<std::size_t> part_of(runs.size(), 0);
+  for (std::size_t i = 0; i < excitation.size(); ++i) part_of[excitation[i].second] = i % 2;
+  for (const std::size_t s : order) parts[part_of[segments[s].run]].push_back(s);
+  return parts;
 }
 
 }  // namespace upright

@@ -1,6 +1,7 @@
 // The choice of held-out data: complete runs, or segments of a single run.
 #pragma once
 
+#include <array>
 #include <vector>
 
 #include "upright/estimation/segments.hpp"
@@ -21,5 +22,10 @@ enum class HeldOut { middle, other, end };
 /// Holds out a third. The excitation is the RMS of the speeds of the cart and of the tip of a pendulum of
 /// length `arm_m`, computed as differences over `speed_window_s`.
 DataSplit split(const std::vector<Measurement>& runs, HeldOut which, double arm_m, double speed_window_s);
+
+/// The places of the segments of two disjoint parts of the data that excite the plant alike: every second
+/// run, sorted by excitation; of a single run every second segment. The second part is empty where there is
+/// one segment only.
+std::array<std::vector<std::size_t>, 2> halves(const FitData& data, double arm_m, double speed_window_s);
 
 }  // namespace upright

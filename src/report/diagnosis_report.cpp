@@ -41,11 +41,12 @@ std::string joined(const json& names) {
 void add_answer(HtmlPage& page, const json& d, const std::filesystem::path& file) {
   const std::string verdict = d.at("verdict");
   const std::map<std::string, std::pair<Tone, std::string>> headlines = {
-      {"explained", {Tone::good, "Explained: the model lacked the effects listed below"}},
+      {"explained",
+       {Tone::good, d.at("effects").empty() ? "Explained: numbers of the plant file moved, as listed below"
+                                            : "Explained: the model lacked the effects listed below"}},
       {"no_discrepancy", {Tone::good, "No discrepancy: the model agrees with the data"}},
       {"unexplained", {Tone::warning, "Unexplained: something is missing that no known effect accounts for"}},
-      {"not_excited",
-       {Tone::neutral, "Not excited: these data contain too little motion to show an effect"}}};
+      {"not_excited", {Tone::neutral, "Not excited: these data could not show what the model may lack"}}};
   const auto known = headlines.find(verdict);
   if (known == headlines.end())
     throw ConfigError(file.string() + " has an unknown verdict: repeat the diagnosis");
@@ -69,6 +70,19 @@ void add_gap(HtmlPage& page, const json& d) {
       "above it. The bars are logarithmic and begin at 1, the noise floor.");
 }
 
+/// Where an effect shows: the runs with their evidence, and the stretch that shows it most.
+std::string shown_sentence(const json& effect) {
+  const json most = effect.value("shows_most", json());
+  if (most.is_null()) return "";
+  std::string runs;
+  for (const json& of : effect.at("shown_on"))
+    runs += (runs.empty() ? "" : ", ") + of.at("run").get<std::string>() + " " +
+            number_text(number(of.at("evidence")));
+  return "It shows most in " + most.at("run").get<std::string>() + " from " +
+         number_text(number(most.at("from_s"))) + " to " + number_text(number(most.at("to_s"))) +
+         " s. Evidence by run: " + runs + ".";
+}
+
 void add_effects(HtmlPage& page, const json& d) {
   if (d.at("effects").empty()) return;
   page.section("Effects found");
@@ -86,6 +100,8 @@ void add_effects(HtmlPage& page, const json& d) {
     const std::string kind = effect.at("kind"), where = effect.at("where");
     if (!where.empty())
       page.paragraph("Residual before " + kind + " was added: " + in_plain_words(where) + ".");
+    const std::string shown = shown_sentence(effect);
+    if (!shown.empty()) page.paragraph(shown);
     if (!effect.at("confusable_with").empty())
       page.note(Tone::warning, "These data do not distinguish " + kind + " from " +
                                    joined(effect.at("confusable_with")) + ".");
@@ -94,6 +110,72 @@ void add_effects(HtmlPage& page, const json& d) {
   if (!next.is_null())
     page.note(Tone::neutral, "Next run, to distinguish them: " + next.at("name").get<std::string>() + " (" +
                                  next.at("description").get<std::string>() + ").");
+}
+
+void add_local(HtmlPage& page, const json& d) {
+  const json local = d.value("helps_here_only", json::array());
+  if (local.empty()) return;
+  page.section("Effects that help only on a part of the data");
+  HtmlTable table{{"effect", "parameter", "value", "unit", "where"},
+                  {},
+                  "These effects did not reproduce, so they are not in model.yaml. The values fit all runs."};
+  for (const json& effect : local)
+    for (const auto& [name, p] : effect.at("parameters").items())
+      table.rows.push_back(
+          {effect.at("kind"), name, number_text(number(p.at("value"))), p.at("unit"), effect.at("where")});
+  page.table(table);
+}
+
+void add_numbers(HtmlPage& page, const json& d) {
+  const json numbers = d.value("numbers", json::array());
+  if (numbers.empty()) return;
+  page.section("Numbers of the plant file that moved");
+  HtmlTable table{{"number", "file", "fitted", "believed from", "to", "unit"},
+                  {},
+                  "The interval is what is believed of the number before the measurement (95 %)."};
+  for (const json& n : numbers)
+    table.rows.push_back({n.at("number"), number_text(number(n.at("file"))),
+                          number_text(number(n.at("fitted"))),
+                          number_text(number(n.at("believed_within").at(0))),
+                          number_text(number(n.at("believed_within").at(1))), n.at("unit")});
+  page.table(table);
+}
+
+void add_validation(HtmlPage& page, const json& d) {
+  const json validation = d.value("validation", json::array());
+  if (validation.empty()) return;
+  page.section("Validation on runs that were not fitted");
+  HtmlTable table{{"run", "model", "gap", "RMS error [m]", "RMS error [rad]"},
+                  {},
+                  "Open-loop simulation in segments of at most 2 s."};
+  for (const json& run : validation) {
+    for (const char* model : {"given", "found"}) {
+      const auto cell = [&](const char* key) {
+        const double value = number(run.at(model).at(key));
+        return std::isfinite(value) ? number_text(value) : std::string();
+      };
+      table.rows.push_back({run.at("file"), model, cell("gap"), cell("cart_rmse_m"), cell("theta_rmse_rad")});
+    }
+    if (run.at("found_is_worse").get<bool>())
+      page.note(Tone::bad, "On " + run.at("file").get<std::string>() +
+                               " the model that was found is further off than the one that was given.");
+  }
+  page.table(table);
+}
+
+void add_power(HtmlPage& page, const json& d) {
+  const json detectable = d.value("detectable", json::array());
+  if (detectable.empty()) return;
+  page.section("What these data would have shown");
+  HtmlTable table{
+      {"effect", "parameter", "shown above", "usual size", "unit"},
+      {},
+      "A larger effect would have been found with a probability of 95 %. Of a number of the plant file, how "
+      "far it may be off."};
+  for (const json& each : detectable)
+    table.rows.push_back({each.at("kind"), each.at("parameter"), number_text(number(each.at("size"))),
+                          number_text(number(each.at("usual"))), each.at("unit")});
+  page.table(table);
 }
 
 /// The cells of a CSV file without its header, `width` in each row. Empty if there is no file.
@@ -345,8 +427,12 @@ std::filesystem::path write_diagnosis_report(const std::filesystem::path& folder
     add_answer(page, d, diagnosis);
     add_gap(page, d);
     add_effects(page, d);
+    add_local(page, d);
+    add_numbers(page, d);
+    add_validation(page, d);
     add_traces(page, folder / "traces.csv");
     add_residuals(page, folder / "residuals.csv");
+    add_power(page, d);
     add_candidates(page, d);
     add_trials(page, d.value("trials", json::array()));
     add_model(page, folder);

@@ -27,6 +27,16 @@ class Diagnose : public ::testing::Test {
   }
   void TearDown() override { fs::remove_all(folder_); }
   std::string in_folder(const std::string& name) const { return (folder_ / name).string(); }
+  /// Records a run that is not among those of the README.
+  std::string recorded_run(const std::string& gains, const std::string& theta0_deg,
+                           const std::string& delay_s) const {
+    const CommandResult result =
+        run_upright("run --rig " + source + "/config/rigs/simulated.yaml --gains " + source +
+                    "/config/gains/" + gains + ".yaml --fast --theta0-deg " + theta0_deg + " --delay " +
+                    delay_s + " --duration 6 --out " + in_folder("unseen"));
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    return fs::directory_iterator(folder_ / "unseen")->path().string();
+  }
   /// Records the runs of the README's demonstration; the command that diagnoses them.
   std::string diagnose_recorded() const {
     struct Run {
@@ -51,7 +61,9 @@ class Diagnose : public ::testing::Test {
 
 TEST_F(Diagnose, NamesCoulombAndStribeckInThePapersOwnCase) {
   const std::string command = diagnose_recorded();
-  const CommandResult result = run_upright(command + " --out " + in_folder("out") + " --json");
+  const std::string unseen = recorded_run("exponential", "4", "0.02");
+  const CommandResult result =
+      run_upright(command + " --validate " + unseen + " --out " + in_folder("out") + " --json");
   ASSERT_EQ(result.exit_code, 0) << result.err;
   const Json d = Json::parse(result.out);
   EXPECT_EQ(d, Json::parse(std::ifstream(folder_ / "out" / "diagnosis.json")));
@@ -62,6 +74,21 @@ TEST_F(Diagnose, NamesCoulombAndStribeckInThePapersOwnCase) {
   EXPECT_EQ(d.at("verdict"), "explained");
   EXPECT_GT(d.at("gap").at("before"), 5.0);
   EXPECT_LT(d.at("gap").at("after"), 1.1);
+  double gap = d.at("gap").at("before");
+  for (const Json& effect : d.at("effects")) {
+    EXPECT_EQ(effect.at("gap_before"), gap) << "the gap of the effects before it";
+    EXPECT_LE(effect.at("gap_after"), gap) << effect.at("kind") << " raises the gap";
+    EXPECT_EQ(effect.at("shown_on").size(), 3u);
+    gap = effect.at("gap_after");
+  }
+  EXPECT_EQ(gap, d.at("gap").at("after"));
+  EXPECT_GE(gap, 1.0);
+  EXPECT_TRUE(d.at("helps_here_only").empty());
+  EXPECT_FALSE(d.at("detectable").empty());
+  ASSERT_EQ(d.at("validation").size(), 1u);
+  EXPECT_LT(d.at("validation")[0].at("found").at("gap"),
+            0.2 * d.at("validation")[0].at("given").at("gap").get<double>());
+  EXPECT_FALSE(d.at("validation")[0].at("found_is_worse"));
   EXPECT_EQ(run_upright("check " + in_folder("out/model.yaml")).exit_code, 0);
   EXPECT_EQ(run_upright("report " + in_folder("out")).exit_code, 0);
   std::ostringstream page;

@@ -147,8 +147,31 @@ TEST_F(ReportPages, OfADiagnosisAreReadableOnATelephone) {
                  {{"coefficient_nms2_per_rad2",
                    {{"value", 0.0123456}, {"ci95", {0.012, 0.0127}}, {"unit", "N m s^2/rad^2"}}}}},
                 {"confusable_with", {"position_dependent_friction"}},
-                {"where", "the residual force goes with the direction of motion"}};
+                {"where", "the residual force goes with the direction of motion"},
+                {"shown_on", {{{"run", "20261123T090248Z-demo5"}, {"evidence", 11061.4}}}},
+                {"shows_most",
+                 {{"run", "20261123T090248Z-demo5"}, {"from_s", 1.25}, {"to_s", 1.45}, {"evidence", 812.3}}}};
   };
+  const Json local = {{"kind", "cogging_force"},
+                      {"parameters", {{"amplitude_n", {{"value", 1.9}, {"unit", "N"}}}}},
+                      {"where", "what 20261123T090248Z-demo4 says of it makes 20261123T090248Z-demo5 worse"}};
+  const Json moved = {{"number", "pendulum.inertia_about_pivot_kgm2"},
+                      {"unit", "kg m^2"},
+                      {"file", 0.0225},
+                      {"fitted", 0.0231},
+                      {"believed_within", {0.0176, 0.0274}}};
+  const auto score = [](double gap) {
+    return Json{{"gap", gap}, {"cart_rmse_m", 0.0012}, {"theta_rmse_rad", nullptr}};
+  };
+  const Json validated = {{"file", "20261123T090248Z-demo6"},
+                          {"given", score(2.0)},
+                          {"found", score(3.0)},
+                          {"found_is_worse", true}};
+  const Json detectable = {{"kind", "position_dependent_friction"},
+                           {"parameter", "slope_n_per_m"},
+                           {"unit", "N/m"},
+                           {"size", 0.061},
+                           {"usual", 1.0}};
   const Json trial = {{"round", 1},          {"kind", "position_dependent_friction"},
                       {"evidence", 11061.4}, {"held_out", -7512.1},
                       {"t", 12345.678},      {"standard_errors", 1e9},
@@ -160,6 +183,10 @@ TEST_F(ReportPages, OfADiagnosisAreReadableOnATelephone) {
       {"candidates",
        {{{"kind", "position_dependent_friction"}, {"evidence", 11061.4}, {"gap_after", 7512.0}}}},
       {"trials", {trial}},
+      {"helps_here_only", {local}},
+      {"numbers", {moved}},
+      {"validation", {validated}},
+      {"detectable", {detectable}},
       {"residual", "what is left is the sensors' own noise"},
       {"next_experiment", nullptr},
       {"notes", Json::array()}};
@@ -184,6 +211,10 @@ TEST_F(ReportPages, OfADiagnosisAreReadableOnATelephone) {
   for (const char* bar : {">model as given<", ">with pivot_quadratic_drag<", ">with coulomb_friction<"})
     EXPECT_NE(html.find(bar), std::string::npos) << "no bar for " << bar;
   EXPECT_FALSE(std::regex_search(html, std::regex("[0-9]e[+-][0-9]+</"))) << "a number is not for people";
+  for (const char* part : {"It shows most in 20261123T090248Z-demo5 from 1.25 to 1.45 s", ">cogging_force<",
+                           ">pendulum.inertia_about_pivot_kgm2<", ">slope_n_per_m<",
+                           "On 20261123T090248Z-demo6 the model that was found is further off"})
+    EXPECT_NE(html.find(part), std::string::npos) << "the page does not say: " << part;
   for (const char* rule : {">shown_throughout<", "accepted: evidence and t value are above their limits"})
     EXPECT_NE(html.find(rule), std::string::npos) << "the page does not explain the decision: " << rule;
 }

@@ -21,6 +21,19 @@ std::string kind_of(std::size_t effect);
 enum class Verdict { explained, no_discrepancy, unexplained, not_excited };
 std::string_view name_of(Verdict verdict);  ///< "explained", "no_discrepancy", ..
 
+/// What an effect saves on one run: the fall of minus twice the log likelihood.
+struct RunEvidence {
+  std::size_t run = 0;
+  double evidence = 0.0;
+};
+
+/// A stretch of a run, and what an effect saves there.
+struct ShownStretch {
+  std::size_t run = 0;
+  double from_s = 0.0, to_s = 0.0;
+  double evidence = 0.0;
+};
+
 /// An effect that the data require.
 struct FoundEffect {
   std::size_t effect = 0;                     ///< number in the registry
@@ -29,7 +42,48 @@ struct FoundEffect {
   std::vector<ParameterEstimate> parameters;  ///< values in the resulting model
   /// Numbers of the effects that the data cannot tell from it.
   std::vector<std::size_t> indistinguishable_from;
-  std::string where;  ///< where in time and state the disagreement is, in words
+  std::string where;                  ///< where in time and state the disagreement is, in words
+  std::vector<RunEvidence> shown_on;  ///< by run; empty if it was not measured
+  ShownStretch shows_most;            ///< the 0.2 s that show it most
+};
+
+/// An effect that helps a part of the data only, so that it is not named.
+struct LocalEffect {
+  std::size_t effect = 0;                     ///< number in the registry
+  std::vector<ParameterEstimate> parameters;  ///< fitted to all runs
+  std::string where;                          ///< where it holds and where not
+  std::vector<RunEvidence> shown_on;          ///< each run fitted with its own part of the data
+};
+
+/// The smallest size of an effect that the data would have shown.
+struct Detectable {
+  std::size_t effect = 0;  ///< number in the registry
+  double size = 0.0;       ///< of its first parameter; of a number of the plant file, how far it may be off
+  double usual = 0.0;      ///< order of magnitude on such a rig
+  std::vector<double> at;  ///< its further parameters
+};
+
+/// A number of the plant file that the data moved.
+struct MovedNumber {
+  std::string name, unit;        ///< as in the plant file
+  double file = 0.0;             ///< its value there
+  double fitted = 0.0;           ///< its value in the model
+  double low = 0.0, high = 0.0;  ///< what is believed of it, from the file: 95 percent
+};
+
+/// An open-loop simulation of a run. Quantities that are not measured are NaN.
+struct ModelScore {
+  double gap = 0.0;             ///< error divided by the noise floor
+  double cart_rmse_m = 0.0;     ///< of the cart's position
+  double theta_rmse_rad = 0.0;  ///< of the pendulum's angle
+};
+
+/// A run that was never fitted, simulated with the plant file as given and with the model that was found.
+struct ValidatedRun {
+  std::string name;         ///< its file
+  ModelScore given, found;  ///< the plant file, and the model found
+  /// Whether the model found is further off than the plant file.
+  bool is_worse() const { return found.gap > given.gap; }
 };
 
 /// What one candidate achieved.
@@ -85,6 +139,10 @@ struct Diagnosis {
   double gap_before = 0.0;           ///< held-out error over the noise floor, of the plant file as given
   double gap_after = 0.0;            ///< the same of the model found
   std::vector<FoundEffect> effects;  ///< in the order of discovery
+  std::vector<LocalEffect> helps_here_only;       ///< not in `effects`, and not in `model`
+  std::vector<Detectable> detectable;             ///< what the data would have shown
+  std::vector<MovedNumber> numbers;               ///< numbers of the plant file that moved
+  std::vector<ValidatedRun> validation;           ///< filled by the caller, after the answer
   std::vector<CandidateScore> candidates;         ///< of the first round, best first
   std::vector<Trial> trials;                      ///< all complete fits of the search, in order
   std::vector<Step> steps;                        ///< the model after each step
@@ -94,6 +152,7 @@ struct Diagnosis {
   std::vector<std::string> notes;                 ///< how the data were read and split
   std::string residual;                           ///< description of the remaining residual
   std::vector<std::size_t> held_out_runs;         ///< runs that no fit saw
+  std::vector<std::string> run_names;             ///< of all runs, in their order
   std::vector<ResidualTrace> residual_before;     ///< on held-out segments, with the plant file as given
   std::vector<ResidualTrace> residual_after;      ///< the same with the model found
 };

@@ -1,0 +1,77 @@
+#include "detectable.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace upright {
+
+namespace {
+
+/// The standard error of the size of an effect once it is left open: infinite where the data say nothing of
+/// it, 0 where it is held at the end of its range.
+double standard_error(const Hypothesis& open, std::size_t effect) {
+  for (std::size_t j = 0; j < open.free.size(); ++j) {
+    if (open.free[j].effect != effect || open.free[j].index != 0) continue;
+    const auto at = static_cast<Eigen::Index>(j);
+    if (!(open.train.information(at, at) > 0.0)) return std::numeric_limits<double>::infinity();
+    return std::sqrt(std::max(open.train.covariance(at, at), 0.0));
+  }
+  return 0.0;
+}
+
+/// The size that an effect has on such a rig: of friction in the pivot a share of gravity's torque.
+double usual_size(std::size_t effect, const Search& search) {
+  const double usual = free_parameters(effect, search.range(), search.policy().prior).front().scale;
+  const Plant& plant = search.given();
+  if (effect_registry()[effect].enters != Enters::pendulum || !plant.pendulum) return usual;
+  const Pendulum& pendulum = *plant.pendulum;
+  const double gravity_nm = pendulum.mass_kg * plant.gravity_mps2 * pendulum.length_to_com_m;
+  const double torque_nm = search.policy().power.share_of_gravity_torque * gravity_nm;
+  const std::string_view unit = effect_registry()[effect].parameters[0].unit;
+  if (unit == "N m") return std::max(usual, torque_nm);
+  if (unit == "N m s/rad")
+    return std::max(usual, torque_nm / std::sqrt(gravity_nm / pendulum.inertia_about_pivot_kgm2()));
+  return usual;
+}
+
+}  // namespace
+
+double standard_errors_to_be_shown(std::size_t effect, bool is_correction, const SelectionPolicy& policy) {
+  if (is_correction) return policy.correction.least_z + policy.power.power_z;
+  const AcceptancePolicy& p = policy.acceptance;
+  const auto more = static_cast<double>(effect_registry()[effect].parameters.size() - 1);
+  // The evidence of an effect is the square of its size in standard errors.
+  return std::max(p.least_certainty, std::sqrt(p.least_evidence + p.parameter_penalty * more)) +
+         policy.power.power_z;
+}
+
+std::vector<Detectable> detectable_sizes(const Search& search, const std::vector<OpenedEffect>& opened) {
+  std::vector<Detectable> sizes;
+  for (const auto& [effect, open] : opened) {
+    const double sigma = standard_error(open, effect);
+    if (!(sigma > 0.0)) continue;
+    const EffectInfo& info = effect_registry()[effect];
+    Detectable d;
+    d.effect = effect;
+    d.size = sigma * standard_errors_to_be_shown(effect, search.is_nuisance(effect), search.policy());
+    d.usual = usual_size(effect, search);
+    const PlantEffect* at = open.train.point.plant.find(effect);
+    for (std::size_t i = 1; i < info.parameters.size(); ++i) d.at.push_back(at->values[i]);
+    sizes.push_back(d);
+  }
+  return sizes;
+}
+
+std::vector<Detectable> may_hide(const std::vector<Detectable>& detectable, const Plant& given,
+                                 const PowerPolicy& policy) {
+  std::vector<Detectable> hidden;
+  for (const Detectable& d : detectable) {
+    const bool everywhere = std::find(policy.everywhere.begin(), policy.everywhere.end(),
+                                      effect_registry()[d.effect].kind) != policy.everywhere.end();
+    if (everywhere && given.find(d.effect) == nullptr && d.size > d.usual) hidden.push_back(d);
+  }
+  return hidden;
+}
+
+}  // namespace upright

@@ -1,0 +1,212 @@
+// What makes an answer one to trust: parts of the data that agree, the power of the data, numbers that moved.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+#include <optional>
+#include <set>
+
+#include "blind_case.hpp"
+#include "diagnosis/base_numbers.hpp"
+#include "diagnosis/detectable.hpp"
+#include "diagnosis/listing.hpp"
+#include "diagnosis/phases.hpp"
+#include "diagnosis/reproducibility.hpp"
+#include "diagnosis/validation.hpp"
+#include "estimation/held_out.hpp"
+
+namespace upright {
+namespace {
+
+const std::size_t force = effect_number("constant_force");
+
+Plant file_plant() {
+  Plant plant;
+  plant.cart_mass_kg = 0.8;
+  plant.motor = {1.7, 7.7};
+  plant.set("viscous_friction", {3.0});
+  return plant;
+}
+
+/// One run of the rig of the file with a constant force beside it.
+Measurement run_with(double force_n, unsigned seed, double amplitude_v = 2.0) {
+  blind::Rig rig{.plant = file_plant()};
+  if (force_n != 0.0) rig.plant.set("constant_force", {force_n});
+  blind::Plan plan;
+  plan.rate_hz = 200.0;
+  plan.duration_s = 6.0;
+  plan.amplitude_v = amplitude_v;
+  plan.seed = seed;
+  return measure(rig, plan, "run" + std::to_string(seed));
+}
+
+/// Two runs, the first fitted and the second held out, and a constant force in the model of both.
+class Fitted {
+ public:
+  explicit Fitted(std::vector<Measurement> runs)
+      : runs_(std::move(runs)), train_{&runs_, {}}, held_{&runs_, {}} {
+    for (const Segment& segment : cut_segments(runs_))
+      (segment.run == 0 ? train_ : held_).segments.push_back(segment);
+    search_.emplace(file_plant(), runs_, train_, held_, policy_, budget_);
+    Hypothesis base = search_->baseline();
+    base.train.point.plant.set(force, std::vector<double>{0.1});
+    final_ = search_->fitted_separately({force}, base, nullptr, true);
+    search_->filter_held_out(final_, final_.train.point.noise);
+    known_ = search_->fitted_to_all_runs(final_);
+  }
+  Reproduction reproduction() const { return reproduce(*search_, known_, {force}).front(); }
+  bool is_contradicted() const { return upright::is_contradicted(reproduction(), policy_.reproducibility); }
+  Listing listing() { return list_effects(*search_, final_, {force}); }
+
+ private:
+  const SelectionPolicy policy_;
+  const SearchBudget budget_;
+  std::vector<Measurement> runs_;
+  FitData train_, held_;
+  std::optional<Search> search_;
+  Hypothesis final_, known_;
+};
+
+TEST(Reproducibility, OfAForceThatBothRunsHave) {
+  const Fitted fitted({run_with(0.3, 1), run_with(0.3, 2)});
+  const Reproduction r = fitted.reproduction();
+  EXPECT_FALSE(fitted.is_contradicted()) << r.where;
+  EXPECT_GT(r.transferred_evidence, 25.0);
+  ASSERT_EQ(r.runs.size(), 2u);
+  for (const RunEvidence& of : r.runs) EXPECT_GT(of.evidence, 25.0);
+  EXPECT_GT(r.shows_most.evidence, 0.0);
+  EXPECT_NEAR(r.shows_most.to_s - r.shows_most.from_s, 0.2, 0.006);
+}
+
+TEST(Reproducibility, OfAForceThatIsOfAnotherSizeElsewhere) {
+  EXPECT_FALSE(Fitted({run_with(0.3, 1), run_with(0.2, 2)}).is_contradicted());
+}
+
+TEST(Reproducibility, IsMissingWhereTheForceIsReversed) {
+  const Fitted fitted({run_with(0.4, 1), run_with(-0.2, 2)});
+  EXPECT_TRUE(fitted.is_contradicted()) << fitted.reproduction().where;
+}
+
+TEST(Reproducibility, IsMissingWhereOneRunHasNoSuchForce) {
+  const Fitted fitted({run_with(0.4, 1), run_with(0.0, 2)});
+  EXPECT_TRUE(fitted.is_contradicted()) << fitted.reproduction().where;
+}
+
+TEST(Listing, LowersTheErrorOfTheHeldOutRun) {
+  const Listing listing = Fitted({run_with(0.3, 1), run_with(0.3, 2)}).listing();
+  EXPECT_FALSE(listing.raises);
+  EXPECT_LT(listing.after, 0.5 * listing.before);
+}
+
+TEST(Listing, NamesAnEffectThatRaisesTheError) {
+  const Listing listing = Fitted({run_with(0.4, 1), run_with(-0.4, 2)}).listing();
+  EXPECT_EQ(listing.raises, force);
+  for (const Listing::Row& row : listing.rows) EXPECT_LE(row.after, row.before);
+}
+
+TEST(Halves, TakeEverySecondSegmentOfOneRun) {
+  const std::vector<Measurement> runs = {run_with(0.0, 1)};
+  const FitData data{&runs, cut_segments(runs)};
+  const auto [first, second] = halves(data, 0.3, 0.02);
+  ASSERT_EQ(first.size() + second.size(), data.segments.size());
+  for (const std::size_t place : first) EXPECT_EQ(place % 2, 0u);
+  for (const std::size_t place : second) EXPECT_EQ(place % 2, 1u);
+}
+
+TEST(Halves, DoNotDependOnTheOrderOfRuns) {
+  const std::vector<Measurement> runs = {run_with(0.0, 1, 0.5), run_with(0.0, 2, 1.0), run_with(0.0, 3, 2.0)};
+  const std::vector<Measurement> turned = {runs[2], runs[1], runs[0]};
+  const auto names = [](const std::vector<Measurement>& of) {
+    const FitData data{&of, cut_segments(of)};
+    std::set<std::string> first;
+    const auto parts = halves(data, 0.3, 0.02);
+    for (const std::size_t place : parts[0]) first.insert(of[data.segments[place].run].name);
+    return first;
+  };
+  EXPECT_EQ(names(runs), (std::set<std::string>{"run1", "run3"}));
+  EXPECT_EQ(names(turned), names(runs));
+}
+
+TEST(Pitch, IsShownByOneRunNotByPlacesFarApart) {
+  Measurement here, far;
+  for (int k = 0; k < 200; ++k) {
+    const double t = 0.01 * k, x = 0.03 * std::sin(3.0 * t);
+    for (Measurement* run : {&here, &far}) {
+      run->time_s.push_back(t);
+      run->voltage_v.push_back(0.0);
+      run->cart_m.push_back(run == &far ? x + 0.5 : x);
+    }
+  }
+  const SelectionPolicy policy;
+  const auto longest_pitch = [&](const std::vector<Measurement>& runs) {
+    const DataRange range = range_of(runs, file_plant(), policy.excitation);
+    return free_parameters(effect_number("cogging_force"), range, policy.prior)[1].high;
+  };
+  EXPECT_DOUBLE_EQ(longest_pitch({here, far}), longest_pitch({here}));
+  EXPECT_NEAR(longest_pitch({here}), 0.06 / policy.prior.crests_of_pitch, 1e-4);
+}
+
+TEST(Phase, IsWithinHalfATurn) {
+  constexpr double pi = std::numbers::pi;
+  EXPECT_DOUBLE_EQ(wrapped_phase(-pi), pi);
+  EXPECT_NEAR(wrapped_phase(25.0), 25.0 - 8.0 * pi, 1e-12);
+  EXPECT_DOUBLE_EQ(wrapped_phase(1.0), 1.0);
+  Plant plant = file_plant();
+  plant.set("cogging_force", {0.3, 0.01, -7.0});
+  wrap_phases(plant);
+  EXPECT_NEAR(plant.find("cogging_force")->values[2], 2.0 * pi - 7.0, 1e-12);
+  EXPECT_EQ(plant.find("cogging_force")->values[1], 0.01);
+}
+
+TEST(Power, GrowsWithTheParametersThatHaveToBePaidFor) {
+  const SelectionPolicy policy;
+  const double one = standard_errors_to_be_shown(force, false, policy);
+  EXPECT_DOUBLE_EQ(one, std::sqrt(policy.acceptance.least_evidence) + policy.power.power_z);
+  EXPECT_GT(standard_errors_to_be_shown(effect_number("cogging_force"), false, policy), one);
+  EXPECT_DOUBLE_EQ(standard_errors_to_be_shown(effect_number("cart_mass"), true, policy),
+                   policy.correction.least_z + policy.power.power_z);
+}
+
+TEST(Power, LetsHideOnlyTheFrictionThatThePlantLacks) {
+  const auto detectable = [](const char* kind, double size) {
+    return Detectable{effect_number(kind), size, 1.0, {}};
+  };
+  const std::vector<Detectable> sizes = {
+      detectable("viscous_friction", 2.0), detectable("coulomb_friction", 2.0),
+      detectable("pivot_coulomb_friction", 0.5), detectable("input_delay", 2.0)};
+  const std::vector<Detectable> hidden = may_hide(sizes, file_plant(), {});
+  ASSERT_EQ(hidden.size(), 1u);
+  EXPECT_EQ(kind_of(hidden[0].effect), "coulomb_friction");
+}
+
+TEST(MovedNumbers, AreThoseOfTheFileThatTheModelHasOtherwise) {
+  const Plant given = file_plant();
+  Plant model = given;
+  model.set("cart_mass", {1.2});
+  model.set("viscous_friction", {3.2});
+  model.motor.back_emf_n_per_mps *= 1.0005;
+  const std::vector<MovedNumber> moved = moved_numbers(given, model, {}, {});
+  ASSERT_EQ(moved.size(), 2u);
+  EXPECT_EQ(moved[0].name, "cart_mass_kg");
+  EXPECT_DOUBLE_EQ(moved[0].fitted, 0.96);
+  EXPECT_NEAR(moved[0].high, 0.8 * (1.0 + 1.96 * PriorPolicy{}.base_parameter), 1e-12);
+  EXPECT_EQ(moved[1].name, "viscous_friction.coefficient_n_per_mps");
+  EXPECT_DOUBLE_EQ(moved[1].fitted, 3.2);
+}
+
+TEST(Validation, SaysWhichModelIsFurtherOff) {
+  Diagnosis right, wrong;
+  right.model = wrong.model = file_plant();
+  right.model.set("constant_force", {0.3});
+  wrong.model.set("constant_force", {-0.3});
+  const std::vector<Measurement> runs = {run_with(0.3, 5)};
+  const ValidatedRun better = validate(file_plant(), right, runs).front();
+  EXPECT_FALSE(better.is_worse());
+  EXPECT_LT(better.found.cart_rmse_m, 0.1 * better.given.cart_rmse_m);
+  EXPECT_GE(better.found.gap, 1.0);
+  EXPECT_TRUE(std::isnan(better.found.theta_rmse_rad));
+  EXPECT_TRUE(validate(file_plant(), wrong, runs).front().is_worse());
+}
+
+}  // namespace
+}  // namespace upright
