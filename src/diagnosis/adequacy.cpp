@@ -22,19 +22,22 @@ ResidualTests examine_fit(const FitData& data, const FitPoint& fitted, const Sel
   return tests;
 }
 
-SimulationFloor held_out_floor(const Search& search, const Hypothesis& judged, const ResidualTests& tests) {
+SimulationFloor held_out_floor(const Search& search, const Hypothesis& judged, const Noise& noise,
+                               const ResidualTests& tests) {
   if (search.held_data().segments.empty()) return {};
   FitPoint point = judged.held.point;
-  point.noise = low_frequency_equivalent(judged.train.point.noise, tests);
+  point.noise = low_frequency_equivalent(noise, tests);
   return simulation_floor(search.held_data(), point, search.budget().floor_draws);
 }
 
-void compare_held_out(const Search& search, const Hypothesis& judged, ResidualTests& tests) {
+void compare_held_out(const Search& search, const Hypothesis& judged, const Noise& noise,
+                      ResidualTests& tests) {
   if (search.held_data().segments.empty()) return;
   Hypothesis conditioned = search.conditioned_on_held_out(judged);
   // What is left need not be such noise: all runs together may be further off than such noise makes them, and
   // held-out ones by as much again.
-  const double excess = search.simulate(conditioned).gap / held_out_floor(search, conditioned, tests).highest;
+  const double excess =
+      search.simulate(conditioned).gap / held_out_floor(search, conditioned, noise, tests).highest;
   if (!is_held_out_too_far_off(excess, tests.excess, search.policy().residual)) return;
   tests.structured = true;
   std::ostringstream text;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <set>
 #include <sstream>
 #include <tuple>
@@ -49,7 +50,7 @@ class Diagnostician {
       if (left.structured && selection_.renew_initial_states()) left = settle();
       if (left.structured && selection_.find_pairs_of_all()) left = settle();
       if (left.beyond_sensors && selection_.find_thoroughly(left.structured)) left = settle();
-      conclude(without_local_effects(left));
+      conclude(beside_coloured_noise(without_local_effects(left)));
     } catch (const Interrupted&) {
       result_.interrupted = true;
     } catch (const BoundReached&) {
@@ -96,7 +97,7 @@ class Diagnostician {
     if (decided_) return;
     bound_.grant(budget_.examination_share * work_samples_);
     try {
-      conclude(without_local_effects(settle()));
+      conclude(beside_coloured_noise(without_local_effects(settle())));
     } catch (const Interrupted&) {
       result_.interrupted = true;
     } catch (const BoundReached&) {
@@ -146,13 +147,34 @@ class Diagnostician {
   ResidualTests settle() {
     settle_corrections();
     options_.tell(0.92, "measuring the gap");
-    FitData all = data_.train;
-    all.segments.insert(all.segments.end(), data_.held.segments.begin(), data_.held.segments.end());
     // At what all runs say, so that what few training runs left uncertain is not taken for something missing.
-    ResidualTests left = examine_fit(all, known_.train.point, policy_, budget_);
-    if (!left.structured) compare_held_out(search_, final_, left);
+    return tests_of(known_.train.point, final_.train.point.noise);
+  }
+
+  /// What is left at a fit to all runs, with this noise in held-out ones.
+  ResidualTests tests_of(const FitPoint& fitted, const Noise& noise) const {
+    ResidualTests left = examine_fit(search_.all_data(), fitted, policy_, budget_);
+    if (!left.structured) compare_held_out(search_, final_, noise, left);
     if (!left.structured) flag_scale_at_bound(left);
     return left;
+  }
+
+  /// The noise of the search is white. A disturbance that lasts looks like something missing beside it: the
+  /// last word has noise with a coloured part, where that accounts for the residual better.
+  ResidualTests beside_coloured_noise(const ResidualTests& left) {
+    noise_ = known_.train.point.noise;
+    if (!left.structured) return left;
+    options_.tell(0.945, "estimating a coloured disturbance");
+    const FitResult coloured = search_.with_coloured_noise(known_);
+    if (!(likelihood_of(known_.train) - likelihood_of(coloured) > policy_.acceptance.least_evidence))
+      return left;
+    noise_ = coloured.point.noise;
+    return tests_of(coloured.point, noise_);
+  }
+
+  /// Minus twice its logarithm, without priors.
+  static double likelihood_of(const FitResult& fitted) {
+    return std::accumulate(fitted.segment_objective.begin(), fitted.segment_objective.end(), 0.0);
   }
 
   /// Which of the corrections that every fit was left room for are really there.
@@ -262,11 +284,11 @@ class Diagnostician {
   void conclude(const ResidualTests& tests) {
     options_.tell(0.95, "measuring the noise floor");
     note_runs();
-    result_.noise = known_.train.point.noise;
+    result_.noise = noise_;
     const std::vector<std::size_t> all = all_found();
     // The same floor whatever the verdict: nearly equal fits are measured in the same unit. An error that was
     // reached is no less than the floor.
-    const double usual = held_out_floor(search_, final_, tests).usual;
+    const double usual = held_out_floor(search_, final_, noise_, tests).usual;
     // Without an effect the numbers of the file stand, unless they are what is clearly off.
     const bool numbers_only = all.empty() && listing_.numbers_moved < listing_.before &&
                               listing_.before > policy_.power.clear_gap * usual;
@@ -401,7 +423,7 @@ class Diagnostician {
   /// Other effects that do as well in the place of one that was found: from sensitivities, or fitted where an
   /// effect does not act in proportion to its size.
   void find_indistinguishable() {
-    options_.tell(0.94, "searching for confusable effects");
+    options_.tell(0.96, "searching for confusable effects");
     std::vector<std::pair<std::size_t, Plant>> alternatives;
     for (const Alternative& alternative : linear_alternatives(search_, final_, all_found(), opened_)) {
       declare(alternative.instead_of, alternative.effect);
@@ -412,7 +434,7 @@ class Diagnostician {
       std::optional<Hypothesis> without;
       for (const std::size_t other : selection_.similar_effects(effect)) {
         if (is_listed(other) || is_declared(effect, other)) continue;
-        options_.tell(0.95, "fitting " + kind_of(other) + " in place of " + kind_of(effect));
+        options_.tell(0.97, "fitting " + kind_of(other) + " in place of " + kind_of(effect));
         if (!without) without = search_.without(selection_.current(), effect);
         if (!std::isfinite(without->train.objective)) break;
         Hypothesis alternative = search_.screened(*without, other);
@@ -466,6 +488,7 @@ class Diagnostician {
   StepwiseSelection selection_;
   Hypothesis final_;  ///< fitted to the training runs, judged on the others
   Hypothesis known_;  ///< the same effects fitted to all runs: what the model says in the end
+  Noise noise_;       ///< of all runs beside that model
   std::vector<std::size_t> corrections_;
   std::set<std::size_t> withdrawn_;  ///< found, and not named
   std::vector<Reproduction> reproductions_;

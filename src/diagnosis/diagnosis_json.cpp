@@ -23,6 +23,9 @@ json parameters_json(const std::vector<ParameterEstimate>& estimates) {
 json noise_json(const Noise& noise) {
   return {{"force_n_sqrt_s", number(noise.force)},
           {"torque_nm_sqrt_s", number(noise.torque)},
+          {"coloured_force_n", number(noise.coloured_force_n)},
+          {"coloured_torque_nm", number(noise.coloured_torque_nm)},
+          {"correlation_s", number(noise.correlation_s)},
           {"jitter_s", number(noise.jitter_s)},
           {"sensors", number(noise.sensors)}};
 }

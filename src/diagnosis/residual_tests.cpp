@@ -87,28 +87,31 @@ class ProbeState {
   Reversal motion_, voltage_, pendulum_;
 };
 
-constexpr int states = LinearStep::states;
+constexpr int states = LinearStep::states, disturbances = LinearStep::disturbances;
 
 /// How an unmodelled force of unit size would show in the innovations: the error it makes, less what the
 /// filter corrects of it.
 struct Response {
-  std::array<double, states> error{};
+  std::array<double, states + disturbances> error{};
 
   /// Carries the error over a sample period in which the force or torque was `size`.
   void advance(const LinearStep& step, ActsOn on, double size) {
     const double* by = on == ActsOn::pendulum ? step.by_torque : step.by_force;
     const double impulse = is_sensor(on) ? 0.0 : step.period_s * size;
-    std::array<double, states> next{};
-    for (int i = 0; i < states; ++i) {
-      next[i] = (step.transition[i][2] * by[0] + step.transition[i][3] * by[1]) * impulse;
-      for (int j = 0; j < states; ++j) next[i] += step.transition[i][j] * error[j];
+    for (int i = 0; i < 2; ++i) {
+      error[2 + i] += by[i] * impulse;
+      for (int d = 0; d < disturbances; ++d) error[2 + i] += step.impulse[d][i] * error[states + d];
     }
+    std::array<double, states + disturbances> next{};
+    for (int i = 0; i < states; ++i)
+      for (int j = 0; j < states; ++j) next[i] += step.transition[i][j] * error[j];
+    for (int d = states; d < states + disturbances; ++d) next[d] = step.keeps * error[d];
     error = next;
   }
   /// What it shows in one channel, which the filter then corrects; the sensor itself may be off by `shift`.
   double show(const LinearStep& step, int channel, double shift = 0.0) {
     const double shown = step.gain[channel] * error[channel] + shift;
-    for (int i = 0; i < states; ++i) error[i] -= step.update[channel][i] * shown;
+    for (int i = 0; i < states + disturbances; ++i) error[i] -= step.update[channel][i] * shown;
     return shown;
   }
 };
@@ -133,9 +136,14 @@ struct Blocks {
 /// Whether a white force or torque moves its sensor within a block.
 bool is_visible(const Measurement& run, const LinearStep& step, const Noise& noise, int channel,
                 const ResidualPolicy& policy) {
-  const double push = channel == 0 ? noise.force * step.by_force[0] : noise.torque * step.by_torque[1];
-  const double sensor = channel == 0 ? run.cart_noise_m() : run.theta_noise_rad();
   const double block_s = policy.block_s;
+  const double white = channel == 0 ? noise.force : noise.torque;
+  const double coloured = channel == 0 ? noise.coloured_force_n : noise.coloured_torque_nm;
+  // Both parts, as the white noise that is as strong over a block.
+  const double intensity =
+      std::sqrt(white * white + 2.0 * coloured * coloured * std::min(noise.correlation_s, block_s));
+  const double push = intensity * (channel == 0 ? step.by_force[0] : step.by_torque[1]);
+  const double sensor = channel == 0 ? run.cart_noise_m() : run.theta_noise_rad();
   return push * std::sqrt(block_s * block_s * block_s / 3.0) > policy.visible_push * sensor;
 }
 
@@ -294,7 +302,9 @@ ResidualTests examine_residuals(const FitData& data, const FitPoint& point, cons
 
 Noise low_frequency_equivalent(Noise noise, const ResidualTests& tests) {
   noise.force *= tests.slow_force;
+  noise.coloured_force_n *= tests.slow_force;
   noise.torque *= tests.slow_torque;
+  noise.coloured_torque_nm *= tests.slow_torque;
   return noise;
 }
 

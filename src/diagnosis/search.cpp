@@ -484,9 +484,20 @@ Hypothesis Search::fitted_separately(const std::vector<std::size_t>& effects, co
   return fitted({effects.begin(), effects.end()}, point, options, free);
 }
 
-Hypothesis Search::fitted_to_all_runs(const Hypothesis& h) const {
+FitData Search::all_data() const {
   FitData all = train_;
   all.segments.insert(all.segments.end(), held_.segments.begin(), held_.segments.end());
+  return all;
+}
+
+FitResult Search::with_coloured_noise(const Hypothesis& known) const {
+  FitOptions options;
+  options.coloured_noise = true;
+  return fit(all_data(), known.train.point, {}, options);
+}
+
+Hypothesis Search::fitted_to_all_runs(const Hypothesis& h) const {
+  const FitData all = all_data();
   FitPoint point = h.train.point;
   point.starts.insert(point.starts.end(), h.held.point.starts.begin(), h.held.point.starts.end());
   Hypothesis result = h;
@@ -536,8 +547,11 @@ FitPoint Search::pair_point(const Hypothesis& base, const Hypothesis& first, con
   Plant plant = base.train.point.plant;
   Noise noise = base.train.point.noise;
   for (const Hypothesis* h : {&first, &second}) {
-    noise.force = std::min(noise.force, h->train.point.noise.force);
-    noise.torque = std::min(noise.torque, h->train.point.noise.torque);
+    const Noise& other = h->train.point.noise;
+    noise.force = std::min(noise.force, other.force);
+    noise.torque = std::min(noise.torque, other.torque);
+    noise.coloured_force_n = std::min(noise.coloured_force_n, other.coloured_force_n);
+    noise.coloured_torque_nm = std::min(noise.coloured_torque_nm, other.coloured_torque_nm);
     for (const std::size_t effect : h->added) plant.set(effect, h->train.point.plant.find(effect)->values);
   }
   FitPoint point = moved_to(base.train.point, plant);

@@ -59,6 +59,8 @@ class Search {
   bool is_nuisance(std::size_t effect) const;
   const FitData& train_data() const { return train_; }
   const FitData& held_data() const { return held_; }
+  /// Both.
+  FitData all_data() const;
 
   /// All of the training data are looked at from now on, not a part of them first.
   void screen_on_all();
@@ -103,6 +105,8 @@ class Search {
   Hypothesis with_effect_free(const Hypothesis& h, std::size_t effect) const;
   /// The same effects fitted to all runs, held-out ones too: what is known once the choice is made.
   Hypothesis fitted_to_all_runs(const Hypothesis& h) const;
+  /// All runs followed with the plant as it is and noise whose coloured part is estimated too.
+  FitResult with_coloured_noise(const Hypothesis& known) const;
   /// Adds two effects at once to a hypothesis and fits to convergence.
   Hypothesis with_pair(const Hypothesis& base, const Hypothesis& first, const Hypothesis& second);
   /// A hypothesis with its parameters moved to what the held-out data say too, as far as the training runs

@@ -27,10 +27,18 @@ EkfCovariance::EkfCovariance(const Measurement& run, const Plant& plant, const N
       present_{has_channel(run, plant, 0), has_channel(run, plant, 1)},
       sensor_variance_{square(run.has_cart() ? run.cart_noise_m() : 1.0),
                        square(run.has_theta() ? run.theta_noise_rad() : 1.0)},
-      bristles_(plant.find(bristle_effect()) != nullptr) {}
+      bristles_(plant.find(bristle_effect()) != nullptr),
+      disturbed_(noise.coloured_force_n > 0.0 || noise.coloured_torque_nm > 0.0) {
+  p_[states][states] = square(noise.coloured_force_n);
+  p_[states + 1][states + 1] = square(noise.coloured_torque_nm);
+}
+
+double EkfCovariance::keeps(double period_s) const {
+  return std::exp(-period_s / noise_.correlation_s);
+}
 
 void EkfCovariance::predict(const LinearStep& step) {
-  if (noise_.force == 0.0 && noise_.torque == 0.0) return;
+  if (noise_.force == 0.0 && noise_.torque == 0.0 && !disturbed_) return;
   active_ = true;
   if (step.holds[0] > 0.0 || step.holds[1] > 0.0) {
     propagate_creeping(step);
@@ -48,10 +56,12 @@ void EkfCovariance::update(const LinearStep& step, int channel) {
   const double spread = c * c * p_[channel][channel];
   variance_ += spread;
   const double with_weight = sensor / step.weight[channel] + spread;
+  if (disturbed_) return correct<all>(c, channel, with_weight);
   bristles_ ? correct<states>(c, channel, with_weight) : correct<states - 1>(c, channel, with_weight);
 }
 
-/// `Moving` states, the last one only with bristles. Inner loops run along rows, which SIMD likes.
+/// `Moving` states, the last one only with bristles; or all, with disturbances. Inner loops run along rows,
+/// which SIMD likes.
 template <int Moving>
 void EkfCovariance::correct(double c, int channel, double variance) {
   double seen[Moving];
@@ -62,7 +72,35 @@ void EkfCovariance::correct(double c, int channel, double variance) {
 }
 
 void EkfCovariance::propagate(const LinearStep& step) {
+  if (disturbed_) push_by_disturbances(step);
   bristles_ ? propagate<states>(step) : propagate<states - 1>(step);
+  if (disturbed_) decay_disturbances(step);
+}
+
+/// The velocities change by what the disturbances push: P goes to M P M', where M adds their impulses.
+void EkfCovariance::push_by_disturbances(const LinearStep& step) {
+  for (int d = 0; d < LinearStep::disturbances; ++d)
+    for (int i = 0; i < 2; ++i)
+      for (int j = 0; j < all; ++j) p_[2 + i][j] += step.impulse[d][i] * p_[states + d][j];
+  for (int d = 0; d < LinearStep::disturbances; ++d)
+    for (int j = 0; j < all; ++j)
+      for (int i = 0; i < 2; ++i) p_[j][2 + i] += step.impulse[d][i] * p_[j][states + d];
+}
+
+/// Covariances of states with disturbances follow the transition; the disturbances forget, and are renewed so
+/// that they stay as large as they are.
+void EkfCovariance::decay_disturbances(const LinearStep& step) {
+  for (int d = states; d < all; ++d) {
+    double carried[states] = {};
+    for (int i = 0; i < states; ++i)
+      for (int j = 0; j < states; ++j) carried[i] += step.transition[i][j] * p_[j][d];
+    for (int i = 0; i < states; ++i) p_[i][d] = p_[d][i] = step.keeps * carried[i];
+  }
+  const double forgets = square(step.keeps);
+  for (int d = states; d < all; ++d)
+    for (int e = states; e < all; ++e) p_[d][e] *= forgets;
+  p_[states][states] += (1.0 - forgets) * square(noise_.coloured_force_n);
+  p_[states + 1][states + 1] += (1.0 - forgets) * square(noise_.coloured_torque_nm);
 }
 
 template <int Moving>

@@ -28,10 +28,15 @@ class EkfCovariance {
   void update(const LinearStep& step, int channel);
 
   double variance() const { return variance_; }
+  /// Of all states and disturbances.
   const double* gain() const { return gain_; }
+  /// Whether the noise has a coloured part.
+  bool disturbed() const { return disturbed_; }
+  /// What of a disturbance remains after so long.
+  double keeps(double period_s) const;
 
  private:
-  static constexpr int states = LinearStep::states;
+  static constexpr int states = LinearStep::states, all = states + LinearStep::disturbances;
 
   /// Dry friction under white force: a contact that rests in the model creeps randomly in reality.
   struct Creep {
@@ -46,6 +51,8 @@ class EkfCovariance {
   template <int Moving>
   void propagate(const LinearStep& step);
   void propagate(const LinearStep& step);
+  void push_by_disturbances(const LinearStep& step);
+  void decay_disturbances(const LinearStep& step);
   void propagate_creeping(LinearStep step);
   Creep creep_of(const LinearStep& step, int contact, double push) const;
 
@@ -53,9 +60,10 @@ class EkfCovariance {
   bool present_[2];
   double sensor_variance_[2];
   bool bristles_;
+  bool disturbed_;
   bool active_ = false;
-  double p_[states][states] = {};
-  double gain_[states] = {}, variance_ = 1.0;
+  double p_[all][all] = {};
+  double gain_[all] = {}, variance_ = 1.0;
 };
 
 /// Minus twice the log likelihood of innovations.

@@ -19,7 +19,7 @@ void iterate(const FitData& data, const FitOptions& options, GaussNewton& solver
     return noise_objective(data, solver.point().plant, solver.linearised(), noise);
   };
   const auto estimate = [&](const std::vector<double>& factors) {
-    return estimate_noise(data, solver.linearised(), factors, solver.point());
+    return estimate_noise(data, solver.linearised(), factors, options.coloured_noise, solver.point());
   };
   double objective = solver.evaluate();
   if (options.alternative_noise &&

@@ -151,10 +151,12 @@ class SegmentLineariser {
       LinearStep& step = steps[k - segment_.first];
       const Outputs<Jet> outputs = simulate_to(k, step);
       if (k != segment_.first) {
+        set_impulse(step, steps[k - 1 - segment_.first]);
         covariance_.predict(step);
         if (normal != nullptr) carry_sensitivity(step);
       }
       if (!update(step, outputs, normal)) return;
+      if (k != segment_.last) push_by_disturbances(run_.time_s[k + 1] - run_.time_s[k], step);
       correct_state(simulator_.engine(), step.correction);
       if (normal != nullptr) blocks.reach(run_.time_s[k], sums.likelihood.objective());
     }
@@ -202,6 +204,10 @@ class SegmentLineariser {
   Outputs<Jet> simulate_to(std::size_t k, LinearStep& step) {
     const bool first = k == segment_.first;
     step.period_s = first ? 0.0 : run_.time_s[k] - run_.time_s[k - 1];
+    if (first) {
+      step.keeps = 0.0;
+      for (auto& by : step.impulse) by[0] = by[1] = 0.0;
+    }
     // Each sample starts with fresh unit derivatives.
     simulator_.engine().seed();
     if (!first) {
@@ -228,6 +234,28 @@ class SegmentLineariser {
     return outputs;
   }
 
+  /// Velocities that a unit of force and of torque give over a period that begins at a step. What dry
+  /// friction holds they do not move: friction balances them.
+  static double impulse_of(const LinearStep& from, int disturbance, int moved, double period_s) {
+    if (from.holds[moved] > 0.0) return 0.0;
+    return (disturbance == 0 ? from.by_force[moved] : from.by_torque[moved]) * period_s;
+  }
+
+  void set_impulse(LinearStep& step, const LinearStep& from) const {
+    step.keeps = covariance_.disturbed() ? covariance_.keeps(step.period_s) : 0.0;
+    for (int d = 0; d < LinearStep::disturbances; ++d)
+      for (int i = 0; i < 2; ++i) step.impulse[d][i] = impulse_of(from, d, i, step.period_s);
+  }
+
+  /// Adds what the estimated disturbances give until the next sample to the correction of a step.
+  void push_by_disturbances(double period_s, LinearStep& step) {
+    if (!covariance_.disturbed()) return;
+    for (int d = 0; d < LinearStep::disturbances; ++d)
+      for (int i = 0; i < 2; ++i)
+        step.correction[2 + i] +=
+            impulse_of(step, d, i, period_s) * disturbance_[static_cast<std::size_t>(d)];
+  }
+
   void set_holds(LinearStep& step) const {
     const EventEngine<Jet>& engine = simulator_.engine();
     step.holds[0] = step.holds[1] = 0.0;
@@ -239,6 +267,14 @@ class SegmentLineariser {
 
   void carry_sensitivity(const LinearStep& step) {
     const std::array<const Jet*, state_count> end = reached_state();
+    if (covariance_.disturbed()) {
+      for (std::size_t d = 0; d < disturbance_sensitivity_.size(); ++d) {
+        for (std::size_t i = 0; i < 2; ++i)
+          if (step.impulse[d][i] != 0.0)
+            sensitivity_[2 + i] += step.impulse[d][i] * disturbance_sensitivity_[d];
+        disturbance_sensitivity_[d] *= step.keeps;
+      }
+    }
     const std::array<Row, state_count> former = sensitivity_;
     for (std::size_t i = 0; i < state_count; ++i) {
       Row moved = end[i]->v;
@@ -252,14 +288,18 @@ class SegmentLineariser {
   /// Updates the filter with each channel in turn. False for a value that is not finite.
   bool update(LinearStep& step, const Outputs<Jet>& outputs, NormalEquations* normal) {
     std::fill(step.correction, step.correction + state_count, 0.0);
+    for (double& d : disturbance_) d *= step.keeps;
     for (int channel = 0; channel < 2; ++channel) {
       if (!covariance_.present(channel)) continue;
       covariance_.update(step, channel);
       step.variance[channel] = covariance_.variance();
-      std::copy(covariance_.gain(), covariance_.gain() + state_count, step.update[channel]);
+      std::copy(covariance_.gain(), covariance_.gain() + state_count + LinearStep::disturbances,
+                step.update[channel]);
       const double e = step.residual[channel] - step.gain[channel] * step.correction[channel];
       step.innovation[channel] = e;
       for (int i = 0; i < state_count; ++i) step.correction[i] += covariance_.gain()[i] * e;
+      for (std::size_t d = 0; d < disturbance_.size(); ++d)
+        disturbance_[d] += covariance_.gain()[state_count + d] * e;
       if (normal == nullptr) continue;
       normal->likelihood.add(e, covariance_.variance(), step.weight[channel]);
       if (!std::isfinite(e)) return false;
@@ -288,6 +328,9 @@ class SegmentLineariser {
       const std::size_t sensor = i % 2 == 0 ? 0 : 1;  // x, v and the bristles; theta and omega
       sensitivity_[i] -= covariance_.gain()[i] * e * worth_less_[sensor];
     }
+    if (!covariance_.disturbed()) return;
+    for (std::size_t d = 0; d < disturbance_sensitivity_.size(); ++d)
+      disturbance_sensitivity_[d] -= covariance_.gain()[state_count + d] * row;
   }
 
   const Measurement& run_;
@@ -299,7 +342,9 @@ class SegmentLineariser {
   double shown_of_speed_s_;
   NoiseInput noise_input_;
   EkfCovariance covariance_;
-  std::array<Row, state_count> sensitivity_;  ///< of the state that the filter estimates
+  std::array<Row, state_count> sensitivity_;                    ///< of the state that the filter estimates
+  std::array<double, LinearStep::disturbances> disturbance_{};  ///< estimated force and torque
+  std::array<Row, LinearStep::disturbances> disturbance_sensitivity_{Row::Zero(), Row::Zero()};
   Eigen::Matrix<double, N, N> information_ = Eigen::Matrix<double, N, N>::Zero();
   Row score_ = Row::Zero();
 };

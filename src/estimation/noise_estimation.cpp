@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 
 #include "base/parallel.hpp"
 #include "extended_kalman_filter.hpp"
@@ -17,11 +18,16 @@ Likelihood likelihood_with_noise(const std::vector<LinearStep>& steps, const Mea
                                  const Plant& plant, const Noise& noise) {
   EkfCovariance covariance(run, plant, noise);
   Likelihood sum;
-  double shift[state_count] = {}, moved[state_count];
+  double shift[state_count] = {}, moved[state_count], disturbance[LinearStep::disturbances] = {};
   for (std::size_t k = 0; k < steps.size(); ++k) {
-    const LinearStep& step = steps[k];
+    LinearStep step = steps[k];
     if (k > 0) {
+      step.keeps = covariance.disturbed() ? covariance.keeps(step.period_s) : 0.0;
       covariance.predict(step);
+      for (int d = 0; d < LinearStep::disturbances; ++d) {
+        for (int i = 0; i < 2; ++i) shift[2 + i] += step.impulse[d][i] * disturbance[d];
+        disturbance[d] *= step.keeps;
+      }
       for (int i = 0; i < state_count; ++i) {
         moved[i] = 0.0;
         for (int j = 0; j < state_count; ++j) moved[i] += step.transition[i][j] * shift[j];
@@ -36,6 +42,8 @@ Likelihood likelihood_with_noise(const std::vector<LinearStep>& steps, const Mea
       const double e = step.residual[channel] - c * (shift[channel] + update[channel]);
       sum.add(e, covariance.variance(), step.weight[channel]);
       for (int i = 0; i < state_count; ++i) update[i] += covariance.gain()[i] * e;
+      for (int d = 0; d < LinearStep::disturbances; ++d)
+        disturbance[d] += covariance.gain()[state_count + d] * e;
     }
     for (int i = 0; i < state_count; ++i) shift[i] += update[i] - step.correction[i];
   }
@@ -48,35 +56,53 @@ struct NoiseParameter {
   double smallest, largest;  ///< below the smallest it is `least`
   double least;
   bool used;
-  int tried_at = -1;  ///< after so many changes of the noise neither way was better
-  bool off = false;   ///< nothing, and better so then: the step from there is the same whatever the factor
+  double Noise::*white = nullptr;  ///< of a coloured part: the white part beside it
+  int tried_at = -1;               ///< after so many changes of the noise neither way was better
+  bool off = false;  ///< nothing, and better so then: the step from there is the same whatever the factor
 
-  double moved(double now, double move) const {
-    const double to = now == 0.0 ? (move > 1.0 ? smallest * 10.0 : 0.0) : now * move;
+  double moved(const Noise& noise, double move) const {
+    const double now = noise.*value;
+    const double to = now == 0.0 ? (move > 1.0 ? from_nothing(noise) : 0.0) : now * move;
     return to < smallest ? least : std::min(to, largest);
+  }
+
+ private:
+  /// A coloured part is tried where it is as strong at low frequencies as the white one.
+  double from_nothing(const Noise& noise) const {
+    if (white == nullptr) return smallest * 10.0;
+    return std::max(noise.*white / std::sqrt(2.0 * noise.correlation_s), smallest * 10.0);
   }
 };
 
-std::array<NoiseParameter, 4> noise_parameters(const FitData& data, const Plant& plant) {
+constexpr std::size_t noise_parameter_count = 7;
+
+std::array<NoiseParameter, noise_parameter_count> noise_parameters(const FitData& data, const Plant& plant,
+                                                                   bool coloured) {
   bool cart = false, pendulum = false;
   for (const Measurement& run : *data.runs) {
     cart = cart || run.has_cart();
     pendulum = pendulum || (run.has_theta() && plant.pendulum);
   }
+  constexpr double shortest_correlation_s = 0.01, longest_correlation_s = 3.0;
   return {NoiseParameter{&Noise::force, 1e-5, 10.0, 0.0, cart},
           NoiseParameter{&Noise::torque, 1e-7, 1.0, 0.0, pendulum},
           NoiseParameter{&Noise::jitter_s, 1e-6, 1e-2, 0.0, true},
-          NoiseParameter{&Noise::sensors, 1.0, 1e3, 1.0, true}};
+          NoiseParameter{&Noise::sensors, 1.0, 1e3, 1.0, true},
+          NoiseParameter{&Noise::coloured_force_n, 1e-5, 1e4, 0.0, coloured && cart, &Noise::force},
+          NoiseParameter{&Noise::coloured_torque_nm, 1e-7, 1e3, 0.0, coloured && pendulum, &Noise::torque},
+          NoiseParameter{&Noise::correlation_s, shortest_correlation_s, longest_correlation_s,
+                         shortest_correlation_s, coloured}};
 }
 
 /// A pattern search for the noise of a point.
 class PatternSearch {
  public:
-  PatternSearch(const FitData& data, const std::vector<LinearisedSegment>& linearised, FitPoint& point)
+  PatternSearch(const FitData& data, const std::vector<LinearisedSegment>& linearised, bool coloured,
+                FitPoint& point)
       : data_(data),
         linearised_(linearised),
         point_(point),
-        parameters_(noise_parameters(data, point.plant)),
+        parameters_(noise_parameters(data, point.plant, coloured)),
         objective_(objective_of(point.noise)) {}
 
   double objective() const { return objective_; }
@@ -89,7 +115,7 @@ class PatternSearch {
     for (int sweep = 0; sweep < 3 && changes_ != so_far; ++sweep) {
       so_far = changes_;
       for (NoiseParameter& parameter : parameters_) {
-        if (!parameter.used || parameter.tried_at == changes_) continue;
+        if (!parameter.used || parameter.tried_at == changes_ || means_nothing(parameter)) continue;
         int moves = line_search(parameter, factor);
         if (moves == 0) moves = line_search(parameter, 1.0 / factor);
         parameter.tried_at = changes_ += moves;
@@ -98,6 +124,12 @@ class PatternSearch {
   }
 
  private:
+  /// A correlation time of nothing.
+  bool means_nothing(const NoiseParameter& parameter) const {
+    return parameter.value == &Noise::correlation_s && point_.noise.coloured_force_n == 0.0 &&
+           point_.noise.coloured_torque_nm == 0.0;
+  }
+
   double objective_of(const Noise& noise) const {
     return noise_objective(data_, point_.plant, linearised_, noise);
   }
@@ -108,7 +140,7 @@ class PatternSearch {
     for (int moves = 0;; ++moves) {
       Noise next = point_.noise;
       const double now = next.*parameter.value;
-      next.*parameter.value = parameter.moved(now, move);
+      next.*parameter.value = parameter.moved(next, move);
       if (next.*parameter.value == now) return moves;
       const double reached = objective_of(next);
       if (!(reached < objective_ - falls)) {
@@ -123,7 +155,7 @@ class PatternSearch {
   const FitData& data_;
   const std::vector<LinearisedSegment>& linearised_;
   FitPoint& point_;
-  std::array<NoiseParameter, 4> parameters_;
+  std::array<NoiseParameter, noise_parameter_count> parameters_;
   double objective_;
   int changes_ = 0;
 };
@@ -143,8 +175,8 @@ double noise_objective(const FitData& data, const Plant& plant,
 }
 
 double estimate_noise(const FitData& data, const std::vector<LinearisedSegment>& linearised,
-                      const std::vector<double>& factors, FitPoint& point) {
-  PatternSearch pattern(data, linearised, point);
+                      const std::vector<double>& factors, bool coloured, FitPoint& point) {
+  PatternSearch pattern(data, linearised, coloured, point);
   const double before = pattern.objective();
   for (const double factor : factors) pattern.search(factor);
   return before - pattern.objective();

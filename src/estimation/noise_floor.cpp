@@ -42,11 +42,26 @@ struct Shown {
   double residual, weight;
 };
 
+/// Pushes with the coloured disturbances over a period, and draws those of the next one.
+template <class Normal>
+void advance_coloured(const LinearStep& step, const Noise& noise, double (&coloured)[2], State& error,
+                      Normal normal) {
+  const double sigma[] = {noise.coloured_force_n, noise.coloured_torque_nm};
+  const double keeps = std::exp(-step.period_s / noise.correlation_s);
+  for (int d = 0; d < LinearStep::disturbances; ++d) {
+    if (sigma[d] == 0.0) continue;
+    error[2] += step.impulse[d][0] * coloured[d];
+    error[3] += step.impulse[d][1] * coloured[d];
+    coloured[d] = keeps * coloured[d] + sigma[d] * std::sqrt(1.0 - keeps * keeps) * normal();
+  }
+}
+
 /// One draw of the noise along a segment: the sum of squares that is left, and of how many numbers.
 std::array<double, 2> draw(const std::vector<LinearStep>& steps, const std::array<bool, 2>& present,
                            const Noise& noise, std::mt19937_64& random) {
   std::normal_distribution<double> normal;
   State error = State::Zero();
+  double coloured[] = {noise.coloured_force_n * normal(random), noise.coloured_torque_nm * normal(random)};
   Transition since_start = Transition::Identity();
   InitialStateFit start;
   std::vector<Shown> all;
@@ -55,6 +70,7 @@ std::array<double, 2> draw(const std::vector<LinearStep>& steps, const std::arra
     const double force = noise.force * root * normal(random), torque = noise.torque * root * normal(random);
     error[2] += step.by_force[0] * force + step.by_torque[0] * torque;
     error[3] += step.by_force[1] * force + step.by_torque[1] * torque;
+    advance_coloured(step, noise, coloured, error, [&] { return normal(random); });
     const Eigen::Map<const Transition> transition(&step.transition[0][0]);
     error = transition * error;
     since_start = transition * since_start;

@@ -145,8 +145,9 @@ class Identifier {
     }
     ResidualTests left = examine_fit(whole_, model.fit.point, policy_, budget_);
     search.filter_held_out(judged, sensors_only(judged.train.point.noise));
-    if (!left.structured) compare_held_out(search, judged, left);
-    const SimulationFloor noise = left.structured ? SimulationFloor{} : held_out_floor(search, judged, left);
+    if (!left.structured) compare_held_out(search, judged, judged.train.point.noise, left);
+    const SimulationFloor noise =
+        left.structured ? SimulationFloor{} : held_out_floor(search, judged, judged.train.point.noise, left);
     const double floor = noise.usual;
     result_.gap_after = search.gap_of(judged) / floor;
     if (!left.structured) {

@@ -78,6 +78,7 @@ struct FitOptions {
   std::optional<Noise> alternative_noise;  ///< second starting point of the noise search, used where it gives
                                            ///< the better result
   bool noise_at_end = false;               ///< without rounds: one coarse noise estimation after the descent
+  bool coloured_noise = false;  ///< estimate the coloured part of the noise too; else it stays as it is
   std::optional<GaussianPrior> joint_prior;  ///< replaces the priors of the free parameters
   double tolerance = 1e-4;                   ///< stop at this relative reduction of the objective per sample
 };
