@@ -123,11 +123,11 @@ std::string gap_text(double gap) {
 /// On which runs an effect shows, and in which stretch most.
 void print_shown(const Diagnosis& d, const FoundEffect& effect) {
   if (effect.shown_on.empty()) return;
-  std::printf("      evidence by run:");
+  std::printf("      shown by");
   for (const RunEvidence& of : effect.shown_on)
-    std::printf(" %s %.4g%s", d.run_names[of.run].c_str(), of.evidence,
+    std::printf(" %s (%.0f %%)%s", d.run_names[of.run].c_str(), 100.0 * share_of(of, effect.shown_on),
                 &of == &effect.shown_on.back() ? "" : ",");
-  std::printf("; shows most in %s from %.4g to %.4g s\n", d.run_names[effect.shows_most.run].c_str(),
+  std::printf("; most in %s from %.4g to %.4g s\n", d.run_names[effect.shows_most.run].c_str(),
               effect.shows_most.from_s, effect.shows_most.to_s);
 }
 

@@ -516,6 +516,12 @@ std::string_view name_of(Verdict verdict) {
   return "";
 }
 
+double share_of(const RunEvidence& run, const std::vector<RunEvidence>& all) {
+  double sum = 0.0;
+  for (const RunEvidence& of : all) sum += std::max(of.evidence, 0.0);
+  return sum > 0.0 ? std::max(run.evidence, 0.0) / sum : 0.0;
+}
+
 NextBest next_best(const Diagnosis& diagnosis, const FoundEffect& effect) {
   const double near = SelectionPolicy{}.distinction.next_best_share;
   const std::size_t most = SearchBudget{}.most_next_best;

@@ -68,7 +68,9 @@ std::string run_name(const Diagnosis& diagnosis, std::size_t run) {
 json shown_on_json(const Diagnosis& diagnosis, const std::vector<RunEvidence>& shown_on) {
   json runs = json::array();
   for (const RunEvidence& of : shown_on)
-    runs.push_back({{"run", run_name(diagnosis, of.run)}, {"evidence", number(of.evidence)}});
+    runs.push_back({{"run", run_name(diagnosis, of.run)},
+                    {"evidence", number(of.evidence)},
+                    {"share", number(share_of(of, shown_on))}});
   return runs;
 }
 

@@ -1,6 +1,7 @@
 #include "listing.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 namespace upright {
 
@@ -24,16 +25,16 @@ class HeldOutError {
   const Noise noise_;
 };
 
-/// The effects among those from `first` on without which the error is lowest, if it is lower than with it.
+/// The suspect without which the error is lowest, if that is below `to_beat`.
 std::optional<std::size_t> raising_effect(const HeldOutError& error, const std::vector<std::size_t>& effects,
-                                          std::vector<std::size_t> suspects, double with_all) {
+                                          const std::vector<std::size_t>& suspects, double to_beat) {
   std::optional<std::size_t> raises;
   for (const std::size_t suspect : suspects) {
     std::vector<std::size_t> others = effects;
     std::erase(others, suspect);
     const double without = error.of(others, true);
-    if (!(without < with_all)) continue;
-    with_all = without;
+    if (!(without < to_beat)) continue;
+    to_beat = without;
     raises = suspect;
   }
   return raises;
@@ -47,17 +48,25 @@ Listing list_effects(Search& search, const Hypothesis& judged, const std::vector
   listing.before = listing.after = error.of({}, false);
   if (effects.empty()) listing.numbers_moved = error.of({}, true);
   std::vector<std::size_t> added, raised;
+  double lowest = listing.before;
   for (const std::size_t effect : effects) {
     added.push_back(effect);
-    const double now = error.of(added, added.size() == effects.size());
-    const double before = listing.after;
-    if (now > before) raised.push_back(effect);
-    listing.after = std::min(now, before);
-    listing.rows.push_back({effect, before, listing.after});
-    if (added.size() < effects.size() || raised.empty()) continue;
-    listing.raises = raising_effect(error, effects, raised, now);
-    if (!listing.raises && now > before) listing.raises = raised.back();
+    listing.after = error.of(added, added.size() == effects.size());
+    if (listing.after > lowest) raised.push_back(effect);
+    const double before = lowest;
+    lowest = std::min(lowest, listing.after);
+    listing.rows.push_back({effect, before, lowest});
   }
+  // No step ends below the complete model.
+  for (Listing::Row& row : listing.rows) {
+    row.before = std::max(row.before, listing.after);
+    row.after = std::max(row.after, listing.after);
+  }
+  const bool worse = listing.after > listing.before;
+  const double by_chance = std::exp(-search.policy().acceptance.worse_simulation_by_chance);
+  if (!raised.empty())
+    listing.raises = raising_effect(error, effects, raised, listing.after * (worse ? 1.0 : by_chance));
+  if (!listing.raises && worse) listing.raises = raised.back();
   return listing;
 }
 

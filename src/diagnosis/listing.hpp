@@ -18,9 +18,11 @@ struct Listing {
   double after = 0.0;   ///< of the model with all effects
   /// Without an effect: of the numbers of the plant file within what is believed of them.
   std::optional<double> numbers_moved;
-  /// The lowest error so far: an effect that helps only together with a later one lowers nothing by itself.
+  /// The lowest error so far, and not below that of all effects: an effect that helps only together with a
+  /// later one lowers nothing by itself.
   std::vector<Row> rows;
-  /// An effect without which the error is lower.
+  /// An effect without which the error is lower by more than chance, or at all where all effects together
+  /// raise it.
   std::optional<std::size_t> raises;
 };
 

@@ -77,10 +77,10 @@ std::string shown_sentence(const json& effect) {
   std::string runs;
   for (const json& of : effect.at("shown_on"))
     runs += (runs.empty() ? "" : ", ") + of.at("run").get<std::string>() + " " +
-            number_text(number(of.at("evidence")));
+            std::to_string(std::lround(100.0 * number(of.at("share")))) + " %";
   return "It shows most in " + most.at("run").get<std::string>() + " from " +
          number_text(number(most.at("from_s"))) + " to " + number_text(number(most.at("to_s"))) +
-         " s. Evidence by run: " + runs + ".";
+         " s. Share of each run in what shows it: " + runs + ".";
 }
 
 void add_effects(HtmlPage& page, const json& d) {

@@ -148,7 +148,7 @@ TEST_F(ReportPages, OfADiagnosisAreReadableOnATelephone) {
                    {{"value", 0.0123456}, {"ci95", {0.012, 0.0127}}, {"unit", "N m s^2/rad^2"}}}}},
                 {"confusable_with", {"position_dependent_friction"}},
                 {"where", "the residual force goes with the direction of motion"},
-                {"shown_on", {{{"run", "20261123T090248Z-demo5"}, {"evidence", 11061.4}}}},
+                {"shown_on", {{{"run", "20261123T090248Z-demo5"}, {"evidence", 11061.4}, {"share", 1.0}}}},
                 {"shows_most",
                  {{"run", "20261123T090248Z-demo5"}, {"from_s", 1.25}, {"to_s", 1.45}, {"evidence", 812.3}}}};
   };

@@ -21,11 +21,15 @@ std::string kind_of(std::size_t effect);
 enum class Verdict { explained, no_discrepancy, unexplained, not_excited };
 std::string_view name_of(Verdict verdict);  ///< "explained", "no_discrepancy", ..
 
-/// What an effect saves on one run: the fall of minus twice the log likelihood.
+/// What an effect saves on one run: the fall of minus twice the log likelihood, with the noise of the model
+/// that has the effect.
 struct RunEvidence {
   std::size_t run = 0;
   double evidence = 0.0;
 };
+
+/// The share of a run in what all runs save that save something; 0 if none does.
+double share_of(const RunEvidence& run, const std::vector<RunEvidence>& all);
 
 /// A stretch of a run, and what an effect saves there.
 struct ShownStretch {
