@@ -34,6 +34,9 @@ struct PlantEffect {
   std::array<double, most_effect_parameters> values{};
 };
 
+/// Whether an effect is a level of dry friction. Of a force table its values decide.
+bool is_dry(const PlantEffect& effect);
+
 struct Plant {
   double cart_mass_kg = 0.0;
   std::optional<Pendulum> pendulum;  ///< absent: the cart alone
