@@ -15,14 +15,26 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 Json json_of(const ParameterInfo& parameter) {
-  return {{"name", parameter.name},
-          {"unit", parameter.unit},
-          {"minimum", finite_or_null(parameter.range.low)},
-          {"maximum", finite_or_null(parameter.range.high)},
-          {"minimum_excluded", parameter.range.low_open},
-          {"neutral", finite_or_null(parameter.neutral)},
-          {"typical", finite_or_null(parameter.typical)},
-          {"meaning", parameter.meaning}};
+  Json json = {{"name", parameter.name},
+               {"unit", parameter.unit},
+               {"minimum", finite_or_null(parameter.range.low)},
+               {"maximum", finite_or_null(parameter.range.high)},
+               {"minimum_excluded", parameter.range.low_open},
+               {"neutral", finite_or_null(parameter.neutral)},
+               {"typical", finite_or_null(parameter.typical)},
+               {"meaning", parameter.meaning}};
+  if (!parameter.words.empty()) json["words"] = parameter.words;
+  return json;
+}
+
+/// Which values are allowed.
+std::string values_of(const ParameterInfo& parameter) {
+  std::string words;
+  for (const std::string_view word : parameter.words)
+    words += (words.empty() ? "" : ", ") + std::string(word);
+  if (!words.empty()) return words;
+  const bool bounded = std::isfinite(parameter.range.low) || std::isfinite(parameter.range.high);
+  return bounded ? parameter.range.text() : "any value";
 }
 
 Json json_of(const EffectInfo& effect) {
@@ -38,9 +50,7 @@ void print(const EffectInfo& effect) {
   for (const ParameterInfo& parameter : effect.parameters) {
     std::cout << "    " << parameter.name;
     if (!parameter.unit.empty()) std::cout << " [" << parameter.unit << "]";
-    const bool bounded = std::isfinite(parameter.range.low) || std::isfinite(parameter.range.high);
-    std::cout << ", " << (bounded ? parameter.range.text() : "any value") << ": " << parameter.meaning
-              << "\n";
+    std::cout << ", " << values_of(parameter) << ": " << parameter.meaning << "\n";
   }
   std::cout << "\n";
 }

@@ -73,7 +73,8 @@ std::vector<UncertainParameter> uncertain_parameters(const Plant& plant) {
   for (std::size_t i = 0; i < plant.effects.size(); ++i) {
     const auto& entry = effect_registry()[plant.effects[i].number];
     for (std::size_t j = 0; j < entry.parameters.size(); ++j)
-      parameters.push_back({std::string(entry.kind) + " " + std::string(entry.parameters[j].name),
+      if (entry.parameters[j].words.empty())
+        parameters.push_back({std::string(entry.kind) + " " + std::string(entry.parameters[j].name),
                             [i, j](Plant& p, double by) { p.effects[i].values[j] *= by; }});
   }
   return parameters;

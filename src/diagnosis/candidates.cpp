@@ -13,6 +13,11 @@ bool is_named(std::size_t effect, std::string_view kind) {
   return effect_registry()[effect].kind == kind;
 }
 
+/// A table fits anything, so it is no name: the search leaves it out, and holds one that the plant file has.
+bool is_table(std::size_t effect) {
+  return effect == effect_index<effects::ForceTable>();
+}
+
 /// Of the forces at work in these runs, whatever the size of the rig: a few percent of the motor's.
 double order_of_magnitude(const ParameterInfo& info, const DataRange& range, const PriorPolicy& prior) {
   const double force = prior.share_of_motor_force * range.largest_force_n;
@@ -93,6 +98,7 @@ std::vector<FreeParameter> free_parameters(std::size_t effect, const DataRange& 
                                            const PriorPolicy& prior) {
   const EffectInfo& info = effect_registry()[effect];
   std::vector<FreeParameter> free;
+  if (is_table(effect)) return free;
   for (std::size_t i = 0; i < info.parameters.size(); ++i) {
     FreeParameter p = free_parameter(effect, i, range, prior);
     const std::string_view name = info.parameters[i].name;
@@ -152,6 +158,7 @@ std::vector<FreeParameter> correction_parameters(const Plant& plant, std::size_t
   const EffectInfo& info = effect_registry()[effect];
   const PlantEffect* have = plant.find(effect);
   std::vector<FreeParameter> free;
+  if (is_table(effect)) return free;
   for (std::size_t i = 0; i < info.parameters.size(); ++i) {
     FreeParameter p = free_parameter(effect, i, range, prior);
     p.prior_mean = have != nullptr ? have->values[i] : info.parameters[i].neutral;
@@ -198,7 +205,7 @@ std::vector<std::size_t> candidate_effects(const Plant& plant, const DataRange& 
   std::vector<std::size_t> effects;
   for (std::size_t i = 0; i < effect_count; ++i) {
     const EffectInfo& info = effect_registry()[i];
-    if (plant.find(i) != nullptr || info.enters == Enters::parameter) continue;
+    if (plant.find(i) != nullptr || info.enters == Enters::parameter || is_table(i)) continue;
     const bool angle = info.kind.starts_with("angle_");
     if ((info.enters == Enters::pendulum || angle) && !plant.pendulum) continue;
     if ((info.enters == Enters::pendulum || angle) && !range.theta_measured) continue;

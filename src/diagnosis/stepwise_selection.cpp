@@ -441,7 +441,7 @@ std::vector<StepwiseSelection::Simpler> StepwiseSelection::simpler_forms() const
     forms.push_back({one_way, {{level, {0.5 * std::abs(size)}}, {force, {-0.5 * size}}}});
   }
   if (is_new(spring)) {
-    const auto [stiffness, center_m, unused] = plant.find(spring)->values;
+    const double stiffness = plant.find(spring)->values[0], center_m = plant.find(spring)->values[1];
     const DataRange& range = search_.range();
     const double off_m = center_m - range.cart_mean_m;
     if (std::abs(off_m) > range.cart_high_m - range.cart_low_m)

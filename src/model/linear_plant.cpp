@@ -124,8 +124,7 @@ std::string matrix_text(std::string_view name, const Eigen::MatrixXd& matrix) {
 
 Plant sliding_plant(const Plant& plant) {
   Plant sliding = plant;
-  for (std::size_t effect = 0; effect < effect_count; ++effect)
-    if (effect_registry()[effect].dry) sliding.remove(effect);
+  std::erase_if(sliding.effects, is_dry);
   sliding.remove(effect_number("bristle_friction"));
   return sliding;
 }

@@ -1,6 +1,7 @@
 #include "upright/model/plant.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 namespace upright {
 
@@ -26,7 +27,28 @@ void Plant::remove(std::size_t effect) {
   std::erase_if(effects, [&](const auto& e) { return e.number == effect; });
 }
 
+namespace {
+
+std::string fault_of_table(const PlantEffect& table) {
+  const double over = table.values[0];
+  if (!(over >= 0.0 && over < static_cast<double>(effects::ForceTable::over_count) && over == std::floor(over)))
+    return "force_table lies over no quantity: set over to one of its words";
+  if (!(table.values[1] < table.values[2]))
+    return "force_table ends where it begins or before: set to above from";
+  return "";
+}
+
+}  // namespace
+
+bool is_dry(const PlantEffect& effect) {
+  if (effect.number == effect_index<effects::ForceTable>())
+    return effects::ForceTable::has_cart_dry_level(effect.values.data());
+  return effect_registry()[effect.number].dry;
+}
+
 std::string fault_of(const Plant& plant) {
+  if (const PlantEffect* table = plant.find(effect_index<effects::ForceTable>()))
+    if (std::string fault = fault_of_table(*table); !fault.empty()) return fault;
   const PlantEffect* coulomb = plant.find("coulomb_friction");
   const PlantEffect* stribeck = plant.find("stribeck_friction");
   const bool level =

@@ -1,5 +1,6 @@
 #include "upright/model/plant_file.hpp"
 
+#include <algorithm>
 #include <fstream>
 
 #include "upright/base/error.hpp"
@@ -8,13 +9,20 @@ namespace upright {
 
 namespace {
 
+double read_parameter(const YamlMap& map, const ParameterInfo& info) {
+  const std::string key(info.name);
+  if (info.words.empty()) return map.number(key, info.range);
+  const std::string word = map.choice(key, {info.words.begin(), info.words.end()});
+  return static_cast<double>(std::find(info.words.begin(), info.words.end(), word) - info.words.begin());
+}
+
 PlantEffect read_effect(const YamlMap& map) {
   std::vector<std::string> kinds;
   for (const EffectInfo& info : effect_registry()) kinds.emplace_back(info.kind);
   PlantEffect effect{effect_number(map.choice("kind", kinds)), {}};
   const EffectInfo& info = effect_registry()[effect.number];
   for (std::size_t i = 0; i < info.parameters.size(); ++i)
-    effect.values[i] = map.number(std::string(info.parameters[i].name), info.parameters[i].range);
+    effect.values[i] = read_parameter(map, info.parameters[i]);
   map.finish();
   return effect;
 }
@@ -86,7 +94,7 @@ std::string plant_text(const Plant& plant, const std::vector<std::string>& comme
     const EffectInfo& info = effect_registry()[effect.number];
     text += "    - {kind: " + std::string(info.kind);
     for (std::size_t i = 0; i < info.parameters.size(); ++i)
-      text += ", " + std::string(info.parameters[i].name) + ": " + exact_text(effect.values[i]);
+      text += ", " + std::string(info.parameters[i].name) + ": " + value_text(info.parameters[i], effect.values[i]);
     text += "}\n";
   }
   return text;

@@ -37,6 +37,10 @@ class RandomPlants {
   std::vector<double> values_of_effect(std::size_t number) {
     std::vector<double> values;
     for (const ParameterInfo& parameter : effect_registry()[number].parameters) {
+      if (!parameter.words.empty()) {
+        values.push_back(static_cast<double>(generator_() % parameter.words.size()));
+        continue;
+      }
       double value = any();
       for (int tries = 0; tries < 50 && !parameter.range.contains(value); ++tries)
         value = any() / (1 + tries);
@@ -90,7 +94,7 @@ std::string effect_file(const EffectInfo& info, std::size_t changed, const std::
   for (std::size_t i = 0; i < info.parameters.size(); ++i) {
     const std::string own_name(info.parameters[i].name);
     if (i != changed) {
-      item += ", " + own_name + ": " + exact_text(info.parameters[i].typical);
+      item += ", " + own_name + ": " + value_text(info.parameters[i], info.parameters[i].typical);
     } else if (!value.empty()) {
       item += ", " + (name.empty() ? own_name : name) + ": " + value;
     }
@@ -106,11 +110,14 @@ TEST(PlantFile, EachParameterOfEachEffectIsRequiredKnownAndInRange) {
   for (const EffectInfo& info : effect_registry())
     for (std::size_t i = 0; i < info.parameters.size(); ++i) {
       const ParameterInfo& parameter = info.parameters[i];
-      const std::string typical = exact_text(parameter.typical);
+      const std::string typical = value_text(parameter, parameter.typical);
       EXPECT_NO_THROW(read_text(effect_file(info, i, "", typical))) << info.kind;
       EXPECT_THROW(read_text(effect_file(info, i, "", "")), ConfigError) << info.kind;
       EXPECT_THROW(read_text(effect_file(info, i, std::string(parameter.name) + "x", typical)), ConfigError);
       EXPECT_THROW(read_text(effect_file(info, i, "", "some")), ConfigError) << info.kind;
+      if (!parameter.words.empty()) {
+        EXPECT_THROW(read_text(effect_file(info, i, "", "0")), ConfigError) << info.kind;
+      }
       EXPECT_THROW(read_text(effect_file(info, i, "", ".inf")), ConfigError) << info.kind;
       EXPECT_THROW(read_text(effect_file(info, i, "", ".nan")), ConfigError) << info.kind;
       for (const double outside : {-1e9, 0.0, 1e9})

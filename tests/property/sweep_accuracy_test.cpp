@@ -1,6 +1,6 @@
 // The bar of the sweep engine: on 240 runs over starting angle and delay the lanes are within 1e-6 of a
-// reference with steps fifty times shorter, sampled and continuous, with smooth friction, true stick-slip and
-// bristles.
+// reference with steps fifty times shorter, sampled and continuous, with smooth friction, true stick-slip,
+// bristles and a force table.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -21,14 +21,19 @@ struct Friction {
   const char* name;
   const char* plant;
   double smoothing;
+  bool table = false;  ///< with a force table beside it
 };
 
 class SweepAccuracy : public testing::TestWithParam<Friction> {
  protected:
   static LoopSetup setup(bool sampled) {
     LoopSetup made;
-    made.model = make_model<double>(
-        read_plant_file(std::string(UPRIGHT_SOURCE_DIR) + "/config/plants/" + GetParam().plant + ".yaml"));
+    Plant plant =
+        read_plant_file(std::string(UPRIGHT_SOURCE_DIR) + "/config/plants/" + GetParam().plant + ".yaml");
+    if (GetParam().table)
+      plant.set("force_table",
+                {0.0, -0.6, 0.6, 0.3, 0.1, -0.2, 0.1, 0.3, 0.2, 0.0, -0.2, -0.3, -0.1, 0.2, -0.1, -0.3});
+    made.model = make_model<double>(plant);
     made.model.smoothing = GetParam().smoothing;
     made.control.gains = {70.7107, 304.9273, 143.3152, 61.0833};
     made.sampled = sampled;
@@ -106,7 +111,8 @@ TEST_P(SweepAccuracy, ContinuousLoops) {
 INSTANTIATE_TEST_SUITE_P(Frictions, SweepAccuracy,
                          testing::Values(Friction{"smooth", "exponential", 100.0},
                                          Friction{"stick_slip", "exponential", 0.0},
-                                         Friction{"bristles", "dynamic", 0.0}),
+                                         Friction{"bristles", "dynamic", 0.0},
+                                         Friction{"table", "viscous", 0.0, true}),
                          [](const auto& friction) { return std::string(friction.param.name); });
 
 }  // namespace

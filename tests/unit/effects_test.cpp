@@ -173,6 +173,13 @@ const std::map<std::string, std::function<void()>>& answers() {
          EXPECT_NEAR(p.base().inertia_about_pivot_kgm2,
                      1.21 * paper_plant().pendulum->inertia_about_pivot_kgm2(), 1e-15);
        }},
+      {"force_table",
+       [] {
+         const Physics p = with("force_table", {0.0, -0.6, 0.6, 0, 0, 0, 0, 0, 0, 0, 0.5, 0, 0, 0, 0, 0});
+         EXPECT_NEAR(cart_force(p, 0.3, 0.1), 0.5, 1e-12);
+         EXPECT_EQ(cart_force(p, 0.3, 0.0), 0.0);
+         EXPECT_NEAR(cart_force(p, 0.3, 0.05), 0.5 * 0.5625, 1e-12);
+       }},
       {"back_emf", [] { EXPECT_DOUBLE_EQ(with("back_emf", {0.9}).base().back_emf_n_per_mps, 0.9 * 7.682); }},
   };
   return all;
@@ -212,7 +219,7 @@ INSTANTIATE_TEST_SUITE_P(All, Effect, testing::Range(std::size_t{0}, effect_coun
 });
 
 TEST(Registry, IsWhole) {
-  EXPECT_EQ(effect_count, 28u);
+  EXPECT_EQ(effect_count, 29u);
   std::set<std::string_view> kinds;
   std::size_t offset = 0;
   for (std::size_t i = 0; i < effect_count; ++i) {

@@ -3,9 +3,12 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <random>
+
+#include "upright/model/effects/force_table.hpp"
 
 namespace upright {
 namespace {
@@ -28,6 +31,23 @@ TEST(Lanes, FunctionsAreThoseOfTheLibrary) {
         EXPECT_NEAR(q[i] * x[i], 1.0, 1e-12);
       }
     }
+  }
+}
+
+TEST(Lanes, ForceTableIsThatOfSingleRuns) {
+  using effects::ForceTable;
+  std::mt19937_64 random(2);
+  std::uniform_real_distribution<double> any(-1.0, 1.0);
+  std::array<double, std::size(ForceTable::parameters)> p{ForceTable::velocity, -0.8, 0.7};
+  std::generate(p.begin() + ForceTable::first_node, p.end(), [&] { return any(random); });
+  std::array<Lanes, p.size()> on_lanes;
+  for (std::size_t i = 0; i < p.size(); ++i) on_lanes[i] = p[i];
+  for (int repeat = 0; repeat < 200; ++repeat) {
+    std::array<double, lane_count> v;
+    for (double& value : v) value = any(random);
+    const auto force = ForceTable::cart_force(on_lanes.data(), Lanes(0.0), Lanes::load(v.data())).values();
+    for (std::size_t i = 0; i < lane_count; ++i)
+      EXPECT_NEAR(force[i], ForceTable::cart_force(p.data(), 0.0, v[i]), 1e-12);
   }
 }
 

@@ -61,7 +61,7 @@ class Dynamics {
       using E = EffectAt<I>;
       if (!present_.template has<I>()) return;
       if constexpr (has_bristles<E, S>) bristles_ = true;
-      if constexpr (has_cart_level<E, S>) cart_dry_ = true;
+      if constexpr (has_cart_level<E, S>) cart_dry_ = cart_dry_ || acts_as_cart_level<E>(p<I>());
       if constexpr (has_pivot_level<E, S>) pivot_dry_ = model.has_pendulum;
       if constexpr (requires { E::kink_at_cart_rest; }) cart_kink_ = true;
       if constexpr (requires { E::kink_at_pivot_rest; }) pivot_kink_ = model.has_pendulum;
@@ -322,6 +322,14 @@ class Dynamics {
   static constexpr bool has_cart_level = requires(const T* q, const T& x) {
     E::cart_dry_level(q, x, x, x);
   };
+  template <class E>
+  static bool acts_as_cart_level(const S* own) {
+    if constexpr (requires { E::has_cart_dry_level(own); }) {
+      return E::has_cart_dry_level(own);
+    } else {
+      return true;
+    }
+  }
   template <class E, class T>
   static constexpr bool has_pivot_level = requires(const T* q) {
     E::pivot_dry_level(q);

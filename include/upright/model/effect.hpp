@@ -7,6 +7,8 @@
 //   S cart_force(p, x, v)                           force on the cart [N]
 //   S cart_dry_level(p, x, speed, direction)        its share of the dry level [N] in direction +1 or -1,
 //                                                   speed = |v|
+//   bool has_cart_dry_level(p)                      whether it has one with these parameters (without
+//                                                   this hook: always)
 //   S pivot_torque(p, omega)                        torque on the pendulum about the pivot [N m]
 //   S pivot_dry_level(p)                            dry level of the pivot [N m]
 //   S actuate(p, volts)                             one stage of the static actuator chain [V], by
@@ -58,6 +60,8 @@ struct ParameterInfo {
   double neutral;  ///< value at which the effect vanishes; NaN where there is none (a shape, a position)
   double typical;  ///< order of magnitude on a laboratory cart; start of a search
   std::string_view meaning;  ///< with its symbol in the equation
+  /// Of a choice: the words that stand in a plant file for the values 0, 1, ...; else empty.
+  std::span<const std::string_view> words = {};
 };
 
 /// For a parameter that makes the effect vanish at no value.

@@ -36,6 +36,9 @@ struct PlantEffect {
   std::array<double, most_effect_parameters> values{};  ///< in declared order; the rest is unused
 };
 
+/// Whether an effect is a level of dry friction. Of a force table its values decide.
+bool is_dry(const PlantEffect& effect);
+
 /// Rigid body, motor and effects.
 struct Plant {
   double cart_mass_kg = 0.0;         ///< of the cart alone [kg]

@@ -16,7 +16,7 @@
 namespace upright {
 
 constexpr std::size_t effect_count = std::tuple_size_v<AllEffects>;  ///< the number of effects
-constexpr std::size_t most_effect_parameters = 3;                    ///< no effect has more parameters
+constexpr std::size_t most_effect_parameters = 16;                   ///< no effect has more parameters
 
 /// The type of effect I.
 template <std::size_t I>
@@ -64,6 +64,9 @@ std::size_t effect_number(std::string_view kind);
 
 /// Offset of the parameters of an effect in the array of all parameters.
 std::size_t effect_parameter_offset(std::size_t effect);
+
+/// A value as it stands in a plant file: of a choice its word, else the number.
+std::string value_text(const ParameterInfo& parameter, double value);
 
 /// A set of effects known at run time.
 struct EffectSet {

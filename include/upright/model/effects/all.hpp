@@ -14,6 +14,7 @@
 #include "upright/model/effects/constant_force.hpp"
 #include "upright/model/effects/coulomb_friction.hpp"
 #include "upright/model/effects/drive_compliance.hpp"
+#include "upright/model/effects/force_table.hpp"
 #include "upright/model/effects/friction_asymmetry.hpp"
 #include "upright/model/effects/input_delay.hpp"
 #include "upright/model/effects/motor_lag.hpp"
@@ -64,7 +65,8 @@ using AllEffects =
                effects::CartMass,
                effects::PendulumMass,
                effects::PendulumLength,
-               effects::BackEmf>;
+               effects::BackEmf,
+               effects::ForceTable>;
 // clang-format on
 
 }  // namespace upright
