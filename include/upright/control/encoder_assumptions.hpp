@@ -48,8 +48,8 @@ struct StatedAssumptions {
 /// 1 +- `uncertainty`. Without a pendulum its bounds keep their defaults.
 EncoderAssumptions encoder_assumptions(const Plant& plant, double track_limit_m, double amplifier_limit_v,
                                        double uncertainty = 0.5);
-/// The stated bounds for a rig without a plant. What is not stated is taken from an IP02 with up to 2 N of dry
-/// friction, an actuator that is up to 30 ms late, and each of Quanser's pendulums.
+/// The stated bounds for a rig without a plant. What is not stated is taken from an IP02 with up to 2 N of
+/// dry friction, an actuator that is up to 30 ms late, and each of Quanser's pendulums.
 EncoderAssumptions encoder_assumptions(const StatedAssumptions& stated, double track_limit_m);
 /// The keys that only a plant could replace, and that are not stated.
 std::vector<std::string> missing_assumptions(const StatedAssumptions& stated);
