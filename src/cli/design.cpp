@@ -242,7 +242,7 @@ void add_design(CommandLine& line) {
   command
       .option("--q", options->q,
               "Weights on x, theta, x_dot, theta_dot (default: 5000,3000,20,20; with --estimator "
-              "2500,1000,20,20)")
+              "2250,2500,10,20)")
       .list_of(4)
       .in(Range::not_negative());
   command.option("--r", options->r, "Weight on the voltage (default: 1)").in(Range::positive());

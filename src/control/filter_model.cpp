@@ -135,7 +135,9 @@ Eigen::Matrix<double, filter_states, 2> kalman_gain(const ContinuousModel& model
   // In units of the encoders' steps, so that the equation's terms are of like size.
   const MatrixXd shows = step.cwiseInverse().asDiagonal() * shown_positions()(Eigen::all, at);
   const MatrixXd sampled = hold_input(a, MatrixXd::Zero(a.rows(), 0), period_s).a;
-  const MatrixXd rounding = MatrixXd::Identity(2, 2) / 12.0;
+  constexpr double rounding_counts2 = 1.0 / 12.0;
+  const MatrixXd rounding =
+      Eigen::Vector2d(rounding_counts2, config.angle_noise_counts2.value_or(rounding_counts2)).asDiagonal();
   const DiscreteRiccatiSolution solution =
       solve_discrete_riccati(sampled.transpose(), shows.transpose(), sampled_noise(a, w, period_s),
                              MatrixXd::Zero(a.rows(), 2), rounding);

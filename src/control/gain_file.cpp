@@ -40,6 +40,7 @@ constexpr OptionalNumber estimator_numbers[] = {
     {"pendulum_noise_rad2_per_s3", &StateEstimatorConfig::pendulum_noise_rad2_per_s3, false},
     {"cart_resolution_m", &StateEstimatorConfig::cart_resolution_m, false},
     {"angle_resolution_rad", &StateEstimatorConfig::angle_resolution_rad, false},
+    {"angle_noise_counts2", &StateEstimatorConfig::angle_noise_counts2, false},
 };
 
 StateEstimatorConfig read_state_estimator(const YamlMap& map) {

@@ -15,13 +15,20 @@ namespace {
 /// Dry friction is gone from the plants that margins are taken of.
 constexpr double any_smoothing = 100.0;
 
+/// Variance of the angle's reading. At rest the error of a rounded angle keeps its sign for many periods, so
+/// that, as the white noise of the filter, it counts as much more than 1/12. Of the values tried, 1/12 to 2,
+/// this one let the cart hunt least on the paper's plants; see docs/explanation/quiet-control.md.
+constexpr double angle_noise_counts2 = 0.6;
+/// The zero of the angle is found within some ten seconds. Quicker, it follows the hunting of the pendulum.
+constexpr double angle_zero_noise_rad2_per_s = 2e-7;
+
 /// With a predictor, friction is carried forward over the delay, in which it may turn round: it is followed
 /// less eagerly, and fades. Measured on the paper's plants at 10 to 300 ms; see
 /// docs/results/quiet-control.md.
 constexpr double predicted_force_share = 0.25;
-constexpr double predicted_force_decay_s = 0.1;
-/// Beyond this delay it fades the quicker the longer the delay.
-constexpr double long_prediction_s = 0.15;
+constexpr double predicted_force_decay_s = 0.115;
+/// With a long delay it fades the quicker the longer the delay: decay times delay is at most this.
+constexpr double decay_times_delay_s2 = 0.015;
 
 double borne_s(const Plant& plant, const ControlConfig& config, ExtraDelay extra) {
   const LoopMargin margin = sampled_margin(plant, config, any_smoothing, false, extra);
@@ -36,11 +43,13 @@ ControlConfig first_config(const Plant& plant, const EstimatorRequest& request,
   config.sample_rate_hz = request.rate_hz;
   config.state_estimator.kind = request.kind;
   config.state_estimator.plant = request.plant_file;
+  config.state_estimator.angle_noise_counts2 = angle_noise_counts2;
+  config.state_estimator.angle_zero_noise_rad2_per_s = angle_zero_noise_rad2_per_s;
   double noise = process_noise_of(config.state_estimator, plant).cart_force_n2_per_s;
   if (request.delay_s) {
     config.compensation = {CompensationKind::predictor, request.plant_file};
     config.rejection.decay_s =
-        predicted_force_decay_s * std::min(1.0, long_prediction_s / std::max(*request.delay_s, 1e-9));
+        std::min(predicted_force_decay_s, decay_times_delay_s2 / std::max(*request.delay_s, 1e-9));
     config.state_estimator.angle_zero_noise_rad2_per_s = 0.0;  // it costs falls at long delays
     noise *= predicted_force_share;
   }

@@ -13,9 +13,9 @@
 namespace upright {
 
 /// What `--estimator` designs with where `--q` and `--r` do not say otherwise. Half the weight on the
-/// position and a third on the angle of the paper's: lower gains tolerate a slower actuator, and the
-/// estimated force, not the gain, keeps the cart in its place.
-inline constexpr DesignWeights quiet_weights{{2500.0, 1000.0, 20.0, 20.0}, 1.0};
+/// position of the paper's, and less on the angle: lower gains tolerate a slower actuator, and the estimated
+/// force, not the gain, keeps the cart in its place.
+inline constexpr DesignWeights quiet_weights{{2250.0, 2500.0, 10.0, 20.0}, 1.0};
 
 /// How much slower an actuator may be than its model [s], sampled and sliding: about what a servo
 /// amplifier and its link add.

@@ -87,6 +87,8 @@ TEST_P(QuietControl, HuntsAndChattersLittle) {
     const Quietness q = run_of(plant, config, model, theta0_deg, 30.0);
     EXPECT_FALSE(q.fell);
     hunting_mm.push_back(q.cart_mm);
+    const bool promised = theta0_deg == 1.0 || theta0_deg == 3.0 || theta0_deg == 5.0;
+    if (promised) EXPECT_LE(q.cart_mm, 2.0) << theta0_deg;
     EXPECT_LE(q.angle_deg, 0.25) << theta0_deg;
     EXPECT_LE(q.volts_rms, 0.9) << theta0_deg;
     EXPECT_LE(q.step_rms_v, 0.3) << theta0_deg;
@@ -102,11 +104,13 @@ TEST_P(QuietControl, BearsAnActuatorSlowerThanItsModel) {
   for (const auto& [effect, value] : {std::pair("input_delay", 0.005), std::pair("motor_lag", 0.010)}) {
     Plant slow = plant;
     slow.set(effect, {value});
-    const Quietness q = run_of(slow, config, model, 3.0, 30.0);
-    EXPECT_FALSE(q.fell);
-    EXPECT_LE(q.cart_mm, 3.0) << effect;
-    EXPECT_LE(q.angle_deg, 0.3) << effect;
-    EXPECT_LE(q.volts_rms, 1.2) << effect;
+    for (const double theta0_deg : {1.0, 3.0, 5.0}) {
+      const Quietness q = run_of(slow, config, model, theta0_deg, 30.0);
+      EXPECT_FALSE(q.fell);
+      EXPECT_LE(q.cart_mm, 3.0) << effect << " from " << theta0_deg;
+      EXPECT_LE(q.angle_deg, 0.3) << effect << " from " << theta0_deg;
+      EXPECT_LE(q.volts_rms, 1.2) << effect << " from " << theta0_deg;
+    }
   }
 }
 

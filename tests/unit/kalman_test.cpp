@@ -78,7 +78,7 @@ TEST(KalmanFilter, FindsAWrongZeroOfTheAngle) {
   Plant plant = viscous();
   plant.set("angle_offset", {0.0087});
   FilterBesidePlant run(plant, quiet_config(viscous()), viscous());
-  run.go_on(20000);
+  run.go_on(60000);
   EXPECT_NEAR(run.truth().cart_m, 0.0, 1e-3);
 }
 
@@ -137,7 +137,9 @@ TEST(KalmanFilter, GainIsThatOfTheRiccatiEquationIterated) {
   const auto shows = shown_positions();
   const Resolution q = resolution_of(config.state_estimator);
   const Eigen::Matrix2d rounding =
-      Eigen::Vector2d(q.cart_m * q.cart_m / 12.0, q.angle_rad * q.angle_rad / 12.0).asDiagonal();
+      Eigen::Vector2d(q.cart_m * q.cart_m / 12.0,
+                      q.angle_rad * q.angle_rad * config.state_estimator.angle_noise_counts2.value())
+          .asDiagonal();
   Eigen::Matrix<double, filter_states, 2> iterated;
   const FilterMatrix half_noise = 1.25e-4 * FilterMatrix(w.asDiagonal());
   for (int i = 0; i < 60000; ++i) {
@@ -204,6 +206,17 @@ TEST(EstimatorDesign, NamesTheParameterThatALoopDoesNotBear) {
   EXPECT_NE(parameter_not_borne(viscous(), config, 0.9), "");
 }
 
+TEST(GainFile, AngleNoiseWithoutAKeyIsThatOfRounding) {
+  StateEstimatorConfig absent, given;
+  given.angle_noise_counts2 = 1.0 / 12.0;
+  const ContinuousModel model = continuous_model(viscous());
+  const ProcessNoise noise = process_noise_of(absent, viscous());
+  EXPECT_EQ(kalman_gain(model, noise, absent, 1e-3), kalman_gain(model, noise, given, 1e-3));
+  given.angle_noise_counts2 = 0.6;
+  EXPECT_LT(kalman_gain(model, noise, given, 1e-3)(filter_theta, 1),
+            kalman_gain(model, noise, absent, 1e-3)(filter_theta, 1));
+}
+
 TEST(GainFile, HoldsAStateEstimatorToTheSameBits) {
   ControlConfig config = quiet_config(viscous(), 0.05);
   config.state_estimator.cart_resolution_m = 1.0 / 3.0e4;
@@ -213,6 +226,7 @@ TEST(GainFile, HoldsAStateEstimatorToTheSameBits) {
   EXPECT_EQ(back.state_estimator.cart_force_noise_n2_per_s, config.state_estimator.cart_force_noise_n2_per_s);
   EXPECT_EQ(back.state_estimator.cart_resolution_m, config.state_estimator.cart_resolution_m);
   EXPECT_EQ(back.state_estimator.angle_resolution_rad, std::nullopt);
+  EXPECT_EQ(back.state_estimator.angle_noise_counts2, config.state_estimator.angle_noise_counts2);
   EXPECT_EQ(back.rejection.share, 0.7);
   EXPECT_EQ(back.rejection.decay_s, config.rejection.decay_s);
 }

@@ -51,6 +51,9 @@ struct StateEstimatorConfig {
   std::optional<double> pendulum_noise_rad2_per_s3;  ///< white acceleration noise of the pendulum
   std::optional<double> cart_resolution_m;           ///< resolution of the cart's encoder
   std::optional<double> angle_resolution_rad;        ///< resolution of the pendulum's encoder
+  /// Variance of the angle's reading in squared counts; absent: 1/12, that of a rounding that changes with
+  /// every reading. Near rest the angle stays within a count for many readings, whose errors then add up.
+  std::optional<double> angle_noise_counts2;
 };
 
 /// Share of the estimated disturbance force on the cart that the voltage cancels, 0 to 1.
