@@ -11,6 +11,7 @@
 #include <memory>
 
 #include "commands.hpp"
+#include "replace_all.hpp"
 #include "upright/model/registry.hpp"
 
 namespace upright::cli {
@@ -131,6 +132,7 @@ std::vector<Candidate> candidates(const CommandLine& line, const std::vector<std
   if (words.size() == 1) {
     if (begun.starts_with('-')) return options_of(line.text());
     std::vector<Candidate> found;
+    found.reserve(commands.size());
     for (const CommandText& command : commands) found.push_back({command.name, command.summary});
     return found;
   }
@@ -161,11 +163,6 @@ constexpr std::array scripts = {
     },
 };
 
-void replace_all(std::string& text, const std::string& from, const std::string& to) {
-  for (std::size_t at = 0; (at = text.find(from, at)) != std::string::npos; at += to.size())
-    text.replace(at, from.size(), to);
-}
-
 std::string script_for(const std::string& shell, const std::string& program) {
   const auto* const script = std::find_if(scripts.begin(), scripts.end(),
                                           [&](const ShellScript& known) { return known.shell == shell; });
@@ -193,6 +190,7 @@ void add_completion(CommandLine& line) {
       "options and effects of its version, and offer files of the kind that an option takes.");
   const auto shell = std::make_shared<std::string>();
   std::vector<std::string> shells;
+  shells.reserve(scripts.size());
   for (const ShellScript& script : scripts) shells.emplace_back(script.shell);
   command.option("shell", *shell, "Shell").required().one_of(shells);
   command.does([shell, program = line.name()] {
