@@ -20,16 +20,18 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Options and words in their place that take a YAML file of one kind, and the key that tells this kind. All
-/// others are left to the shell, which offers files of any kind.
+/// Options, and words in their place in a command, that take a YAML file of one kind, and the key that tells
+/// this kind. All others are left to the shell, which offers files of any kind.
 struct TakesFile {
   const char* option;
   const char* key;
 };
 constexpr std::array takes_file = {
-    TakesFile{"--rig", "backend"}, TakesFile{"--gains", "gains"},   TakesFile{"--plant", "plant"},
-    TakesFile{"--model", "plant"}, TakesFile{"plant", "plant"},     TakesFile{"gains", "gains"},
-    TakesFile{"sweep", "sweep"},   TakesFile{"file", "experiment"},
+    TakesFile{"--rig", "backend"},      TakesFile{"--gains", "gains"},
+    TakesFile{"--plant", "plant"},      TakesFile{"--model", "plant"},
+    TakesFile{"design plant", "plant"}, TakesFile{"margin plant", "plant"},
+    TakesFile{"margin gains", "gains"}, TakesFile{"simulate plant", "plant"},
+    TakesFile{"sweep sweep", "sweep"},  TakesFile{"experiment file", "experiment"},
 };
 
 struct Candidate {
@@ -63,12 +65,14 @@ std::vector<Candidate> files_of(const std::string& begun, const std::string& key
   return found;
 }
 
-std::vector<Candidate> values_of(const OptionText& option, const std::string& begun) {
+std::vector<Candidate> values_of(const CommandText& command, const OptionText& option,
+                                 const std::string& begun) {
   std::vector<Candidate> found;
   for (const std::string& word : option.words) found.push_back({word, ""});
   for (const std::string& name : option.names) {
+    const std::string known_as = option.in_place ? command.name + " " + name : name;
     for (const TakesFile& takes : takes_file)
-      if (name == takes.option) return files_of(begun, takes.key);
+      if (known_as == takes.option) return files_of(begun, takes.key);
     if (name == "effect")
       for (const EffectInfo& info : effect_registry())
         found.push_back({std::string(info.kind), std::string(info.meaning)});
@@ -118,12 +122,12 @@ std::vector<Candidate> candidates_in(const CommandText& command, const std::vect
       const OptionText* const option = option_named(command, before[i]);
       if (option == nullptr) continue;
       if (!option->value.empty() && (option->many || i + 1 == before.size()) && !begun.starts_with('-'))
-        return values_of(*option, begun);
+        return values_of(command, *option, begun);
       break;
     }
   if (begun.starts_with('-')) return options_of(command);
   const OptionText* const place = place_of(command, before);
-  return place == nullptr ? options_of(command) : values_of(*place, begun);
+  return place == nullptr ? options_of(command) : values_of(command, *place, begun);
 }
 
 std::vector<Candidate> candidates(const CommandLine& line, const std::vector<std::string>& words) {
