@@ -11,6 +11,7 @@
 #include <memory>
 
 #include "commands.hpp"
+#include "replace_all.hpp"
 #include "upright/model/registry.hpp"
 
 namespace upright::cli {
@@ -19,16 +20,18 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Options and words in their place that take a YAML file of one kind, and the key that tells this kind. All
-/// others are left to the shell, which offers files of any kind.
+/// Options, and words in their place in a command, that take a YAML file of one kind, and the key that tells
+/// this kind. All others are left to the shell, which offers files of any kind.
 struct TakesFile {
   const char* option;
   const char* key;
 };
 constexpr std::array takes_file = {
-    TakesFile{"--rig", "backend"}, TakesFile{"--gains", "gains"},   TakesFile{"--plant", "plant"},
-    TakesFile{"--model", "plant"}, TakesFile{"plant", "plant"},     TakesFile{"gains", "gains"},
-    TakesFile{"sweep", "sweep"},   TakesFile{"file", "experiment"},
+    TakesFile{"--rig", "backend"},      TakesFile{"--gains", "gains"},
+    TakesFile{"--plant", "plant"},      TakesFile{"--model", "plant"},
+    TakesFile{"design plant", "plant"}, TakesFile{"margin plant", "plant"},
+    TakesFile{"margin gains", "gains"}, TakesFile{"simulate plant", "plant"},
+    TakesFile{"sweep sweep", "sweep"},  TakesFile{"experiment file", "experiment"},
 };
 
 struct Candidate {
@@ -62,12 +65,14 @@ std::vector<Candidate> files_of(const std::string& begun, const std::string& key
   return found;
 }
 
-std::vector<Candidate> values_of(const OptionText& option, const std::string& begun) {
+std::vector<Candidate> values_of(const CommandText& command, const OptionText& option,
+                                 const std::string& begun) {
   std::vector<Candidate> found;
   for (const std::string& word : option.words) found.push_back({word, ""});
   for (const std::string& name : option.names) {
+    const std::string known_as = option.in_place ? command.name + " " + name : name;
     for (const TakesFile& takes : takes_file)
-      if (name == takes.option) return files_of(begun, takes.key);
+      if (known_as == takes.option) return files_of(begun, takes.key);
     if (name == "effect")
       for (const EffectInfo& info : effect_registry())
         found.push_back({std::string(info.kind), std::string(info.meaning)});
@@ -117,12 +122,12 @@ std::vector<Candidate> candidates_in(const CommandText& command, const std::vect
       const OptionText* const option = option_named(command, before[i]);
       if (option == nullptr) continue;
       if (!option->value.empty() && (option->many || i + 1 == before.size()) && !begun.starts_with('-'))
-        return values_of(*option, begun);
+        return values_of(command, *option, begun);
       break;
     }
   if (begun.starts_with('-')) return options_of(command);
   const OptionText* const place = place_of(command, before);
-  return place == nullptr ? options_of(command) : values_of(*place, begun);
+  return place == nullptr ? options_of(command) : values_of(command, *place, begun);
 }
 
 std::vector<Candidate> candidates(const CommandLine& line, const std::vector<std::string>& words) {
@@ -131,6 +136,7 @@ std::vector<Candidate> candidates(const CommandLine& line, const std::vector<std
   if (words.size() == 1) {
     if (begun.starts_with('-')) return options_of(line.text());
     std::vector<Candidate> found;
+    found.reserve(commands.size());
     for (const CommandText& command : commands) found.push_back({command.name, command.summary});
     return found;
   }
@@ -161,11 +167,6 @@ constexpr std::array scripts = {
     },
 };
 
-void replace_all(std::string& text, const std::string& from, const std::string& to) {
-  for (std::size_t at = 0; (at = text.find(from, at)) != std::string::npos; at += to.size())
-    text.replace(at, from.size(), to);
-}
-
 std::string script_for(const std::string& shell, const std::string& program) {
   const auto* const script = std::find_if(scripts.begin(), scripts.end(),
                                           [&](const ShellScript& known) { return known.shell == shell; });
@@ -193,6 +194,7 @@ void add_completion(CommandLine& line) {
       "options and effects of its version, and offer files of the kind that an option takes.");
   const auto shell = std::make_shared<std::string>();
   std::vector<std::string> shells;
+  shells.reserve(scripts.size());
   for (const ShellScript& script : scripts) shells.emplace_back(script.shell);
   command.option("shell", *shell, "Shell").required().one_of(shells);
   command.does([shell, program = line.name()] {

@@ -12,6 +12,7 @@
 
 #include "check.hpp"
 #include "commands.hpp"
+#include "replace_all.hpp"
 #include "upright/base/error.hpp"
 
 namespace upright::cli {
@@ -131,11 +132,6 @@ const FileTemplate& template_for(const std::string& kind) {
                     "': copy a rig file of config/rigs, or use another backend");
 }
 
-void replace_all_in(std::string& line, const std::string& from, const std::string& to) {
-  for (std::size_t at = 0; (at = line.find(from, at)) != std::string::npos; at += to.size())
-    line.replace(at, from.size(), to);
-}
-
 /// The text of the file, with the answers of whoever types.
 std::string text_from(const FileTemplate& chosen, const fs::path& out) {
   std::istringstream lines(chosen.text);
@@ -150,7 +146,7 @@ std::string text_from(const FileTemplate& chosen, const fs::path& out) {
       answers[question.name] = answer;
       continue;
     }
-    for (const auto& [name, answer] : answers) replace_all_in(line, "@" + name + "@", answer);
+    for (const auto& [name, answer] : answers) replace_all(line, "@" + name + "@", answer);
     text += line + "\n";
   }
   return text;
@@ -172,7 +168,7 @@ void write_new(const std::string& kind, const fs::path& out, bool force) {
   if (fault.empty()) fs::rename(partial, out, problem);
   if (fault.empty() && !problem) return;
   fs::remove(partial, problem);
-  replace_all_in(fault, partial.string(), out.string());
+  replace_all(fault, partial.string(), out.string());
   throw ConfigError((fault.empty() ? "cannot write " + out.string() + ": check its folder" : fault) +
                     " (nothing was written)");
 }

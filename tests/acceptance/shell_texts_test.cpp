@@ -42,6 +42,8 @@ TEST(Completion, OffersFilesOfTheKindThatTheOptionTakes) {
   EXPECT_EQ(offered("margin config/plants/viscous.yaml config/gains/vis"),
             Words{"config/gains/viscous.yaml"});
   EXPECT_EQ(offered("margin --smoothing 3 config/plants/vis"), Words{"config/plants/viscous.yaml"});
+  EXPECT_EQ(offered("experiment config/experiments/pi"), Words{"config/experiments/pivot.yaml"});
+  EXPECT_EQ(offered("experiment config/gains/"), Words{});
   EXPECT_EQ(offered("check config/ri"), Words{}) << "any kind of file: left to the shell";
 }
 
