@@ -75,7 +75,7 @@ std::vector<UncertainParameter> uncertain_parameters(const Plant& plant) {
     for (std::size_t j = 0; j < entry.parameters.size(); ++j)
       if (entry.parameters[j].words.empty())
         parameters.push_back({std::string(entry.kind) + " " + std::string(entry.parameters[j].name),
-                            [i, j](Plant& p, double by) { p.effects[i].values[j] *= by; }});
+                              [i, j](Plant& p, double by) { p.effects[i].values[j] *= by; }});
   }
   return parameters;
 }

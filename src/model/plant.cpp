@@ -31,7 +31,8 @@ namespace {
 
 std::string fault_of_table(const PlantEffect& table) {
   const double over = table.values[0];
-  if (!(over >= 0.0 && over < static_cast<double>(effects::ForceTable::over_count) && over == std::floor(over)))
+  if (!(over >= 0.0 && over < static_cast<double>(effects::ForceTable::over_count) &&
+        over == std::floor(over)))
     return "force_table lies over no quantity: set over to one of its words";
   if (!(table.values[1] < table.values[2]))
     return "force_table ends where it begins or before: set to above from";

@@ -42,6 +42,11 @@ Pendulum read_pendulum(const YamlMap& map) {
 
 }  // namespace
 
+std::string value_text(const ParameterInfo& parameter, double value) {
+  const auto place = static_cast<std::size_t>(std::max(value, 0.0));
+  return place < parameter.words.size() ? std::string(parameter.words[place]) : exact_text(value);
+}
+
 Plant read_plant(const YamlMap& document) {
   const YamlMap map = document.map("plant");
   Plant plant;
@@ -94,7 +99,8 @@ std::string plant_text(const Plant& plant, const std::vector<std::string>& comme
     const EffectInfo& info = effect_registry()[effect.number];
     text += "    - {kind: " + std::string(info.kind);
     for (std::size_t i = 0; i < info.parameters.size(); ++i)
-      text += ", " + std::string(info.parameters[i].name) + ": " + value_text(info.parameters[i], effect.values[i]);
+      text += ", " + std::string(info.parameters[i].name) + ": " +
+              value_text(info.parameters[i], effect.values[i]);
     text += "}\n";
   }
   return text;

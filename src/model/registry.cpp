@@ -1,7 +1,5 @@
 #include "upright/model/registry.hpp"
 
-#include <algorithm>
-
 namespace upright {
 
 namespace {
@@ -26,11 +24,6 @@ std::size_t effect_number(std::string_view kind) {
   for (std::size_t i = 0; i < effect_count; ++i)
     if (infos[i].kind == kind) return i;
   return effect_count;
-}
-
-std::string value_text(const ParameterInfo& parameter, double value) {
-  const auto place = static_cast<std::size_t>(std::max(value, 0.0));
-  return place < parameter.words.size() ? std::string(parameter.words[place]) : exact_text(value);
 }
 
 std::size_t effect_parameter_offset(std::size_t effect) {

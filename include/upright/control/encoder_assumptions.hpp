@@ -39,9 +39,13 @@ struct EncoderAssumptions {
 
 /// The bounds that the section `encoder_watch` of a rig file states.
 struct StatedAssumptions {
-  std::optional<Bounds> breakaway_v;
-  std::optional<double> largest_lag_s, acceleration_mps2_per_v, damping_v_per_mps, unseen_travel_m,
-      longest_pendulum_m, pivot_friction_mps2;
+  std::optional<Bounds> breakaway_v;              ///< as in EncoderAssumptions, like the following
+  std::optional<double> largest_lag_s;            ///< [s]
+  std::optional<double> acceleration_mps2_per_v;  ///< [m/s^2/V]
+  std::optional<double> damping_v_per_mps;        ///< [V s/m]
+  std::optional<double> unseen_travel_m;          ///< [m]
+  std::optional<double> longest_pendulum_m;       ///< [m]
+  std::optional<double> pivot_friction_mps2;      ///< [m/s^2]
 };
 
 /// The bounds that a plant implies over the whole track and amplifier range: each number within a factor

@@ -24,8 +24,8 @@ std::string_view name_of(Verdict verdict);  ///< "explained", "no_discrepancy", 
 /// What an effect saves on one run: the fall of minus twice the log likelihood, with the noise of the model
 /// that has the effect.
 struct RunEvidence {
-  std::size_t run = 0;
-  double evidence = 0.0;
+  std::size_t run = 0;    ///< its place among the runs
+  double evidence = 0.0;  ///< of the effect on it
 };
 
 /// The share of a run in what all runs save that save something; 0 if none does.
@@ -33,9 +33,10 @@ double share_of(const RunEvidence& run, const std::vector<RunEvidence>& all);
 
 /// A stretch of a run, and what an effect saves there.
 struct ShownStretch {
-  std::size_t run = 0;
-  double from_s = 0.0, to_s = 0.0;
-  double evidence = 0.0;
+  std::size_t run = 0;    ///< its place among the runs
+  double from_s = 0.0;    ///< begin, in the record's time
+  double to_s = 0.0;      ///< end, in the record's time
+  double evidence = 0.0;  ///< of the effect there
 };
 
 /// An effect that the data require.
@@ -69,10 +70,12 @@ struct Detectable {
 
 /// A number of the plant file that the data moved.
 struct MovedNumber {
-  std::string name, unit;        ///< as in the plant file
-  double file = 0.0;             ///< its value there
-  double fitted = 0.0;           ///< its value in the model
-  double low = 0.0, high = 0.0;  ///< what is believed of it, from the file: 95 percent
+  std::string name;     ///< as in the plant file
+  std::string unit;     ///< of the number
+  double file = 0.0;    ///< its value there
+  double fitted = 0.0;  ///< its value in the model
+  double low = 0.0;     ///< the least that is believed of it, from the file: 95 percent
+  double high = 0.0;    ///< the most
 };
 
 /// An open-loop simulation of a run. Quantities that are not measured are NaN.
@@ -84,8 +87,9 @@ struct ModelScore {
 
 /// A run that was never fitted, simulated with the plant file as given and with the model that was found.
 struct ValidatedRun {
-  std::string name;         ///< its file
-  ModelScore given, found;  ///< the plant file, and the model found
+  std::string name;  ///< its file
+  ModelScore given;  ///< with the plant file as given
+  ModelScore found;  ///< with the model found
   /// Whether the model found is further off than the plant file.
   bool is_worse() const { return found.gap > given.gap; }
 };

@@ -23,4 +23,7 @@ std::string plant_text(const Plant& plant, const std::vector<std::string>& comme
 void write_plant_file(const Plant& plant, const std::filesystem::path& file,
                       const std::vector<std::string>& comments = {});
 
+/// A value as it stands in a plant file: of a choice its word, else the number.
+std::string value_text(const ParameterInfo& parameter, double value);
+
 }  // namespace upright

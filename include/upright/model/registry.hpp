@@ -65,9 +65,6 @@ std::size_t effect_number(std::string_view kind);
 /// Offset of the parameters of an effect in the array of all parameters.
 std::size_t effect_parameter_offset(std::size_t effect);
 
-/// A value as it stands in a plant file: of a choice its word, else the number.
-std::string value_text(const ParameterInfo& parameter, double value);
-
 /// A set of effects known at run time.
 struct EffectSet {
   std::uint64_t mask = 0;  ///< bit I: effect I is in the set

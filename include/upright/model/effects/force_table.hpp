@@ -15,15 +15,17 @@ namespace upright::effects {
 /// passes through the nodes, has a continuous slope, and reproduces straight lines. At the first and the
 /// last node the slope is that of the neighbouring interval; beyond them the force is constant.
 struct ForceTable {
-  static constexpr std::size_t node_count = 13;
-  static constexpr std::size_t first_node = 3;  ///< place of the first node among the parameters
+  static constexpr std::size_t node_count = 13;  ///< the number of nodes
+  static constexpr std::size_t first_node = 3;   ///< place of the first node among the parameters
 
   /// The quantity over which the force stands, by its number. Over `position_and_direction` the force is the
   /// level of dry friction, which a contact makes act against the motion. So the table itself never jumps.
   enum Over { velocity, position, position_and_direction, position_and_velocity, over_count };
+  /// These words stand in a plant file.
   static constexpr std::string_view over_words[] = {"velocity", "position", "position_and_direction",
                                                     "position_and_velocity"};
 
+  /// Its parameters, in the order of a plant file.
   static constexpr ParameterInfo parameters[] = {
       {"over", "1", Range::within(0.0, 3.0), no_neutral, 0.0, "the quantity over which the nodes lie",
        over_words},
@@ -43,6 +45,7 @@ struct ForceTable {
       {"force_12_n", "N", Range::any(), 0.0, 0.3, "f at node 12"},
       {"force_13_n", "N", Range::any(), 0.0, 0.3, "f at node 13"},
   };
+  /// Its entry in the registry.
   static constexpr EffectInfo info{
       "force_table",
       Enters::cart,
@@ -52,6 +55,7 @@ struct ForceTable {
       parameters};
   static_assert(std::size(parameters) == first_node + node_count);
 
+  /// Whether the force lies over this quantity.
   template <class S>
   static bool is_over(const S* p, Over over) {
     if constexpr (requires { value_of(p[0]); }) {
@@ -61,11 +65,13 @@ struct ForceTable {
     }
   }
 
+  /// Whether it is a level of dry friction.
   template <class S>
   static bool has_cart_dry_level(const S* p) {
     return is_over(p, position_and_direction);
   }
 
+  /// Force on the cart [N].
   template <class S>
   static S cart_force(const S* p, const S& x, const S& v) {
     if (is_over(p, velocity)) return curve(p, v);
@@ -74,6 +80,7 @@ struct ForceTable {
     return S(0.0);
   }
 
+  /// Level of dry friction [N].
   template <class S>
   static S cart_dry_level(const S* p, const S& x, const S& /*speed*/, const S& /*direction*/) {
     return has_cart_dry_level(p) ? curve(p, x) : S(0.0);
@@ -101,6 +108,7 @@ struct ForceTable {
     }
   }
 
+  /// Its greatest rate [1/s].
   static double rate_radps(const double* p, double v, double mass) {
     const double cell = (p[2] - p[1]) / static_cast<double>(node_count - 1);
     const double* f = p + first_node;
