@@ -9,7 +9,7 @@ install(TARGETS upright RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
 install(DIRECTORY config examples DESTINATION ${CMAKE_INSTALL_DATADIR}/upright)
 # The engines are compiled for a fixed list of effects: who adds one builds from this (examples/own-effect).
 install(DIRECTORY src sim hal studies include cmake packaging config examples
-        DESTINATION ${CMAKE_INSTALL_DATADIR}/upright/source)
+        DESTINATION ${CMAKE_INSTALL_DATADIR}/upright/source USE_SOURCE_PERMISSIONS)
 install(FILES CMakeLists.txt CHANGELOG.md LICENSE DESTINATION ${CMAKE_INSTALL_DATADIR}/upright/source)
 
 set(texts ${PROJECT_BINARY_DIR}/texts)
