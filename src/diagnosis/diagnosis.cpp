@@ -390,20 +390,23 @@ class Diagnostician {
   void decide(const ResidualTests& tests) {
     const bool clear_gap = result_.gap_after > policy_.power.clear_gap;
     const std::vector<Detectable> hidden = may_hide(result_.detectable, plant_, policy_.power);
-    const bool nothing_found = result_.effects.empty() && result_.numbers.empty();
-    if (tests.structured || (clear_gap && !result_.effects.empty())) {
-      result_.verdict = Verdict::unexplained;
-    } else if (!clear_gap && !nothing_found) {
-      result_.verdict = Verdict::explained;
-    } else if (!result_.helps_here_only.empty()) {
-      result_.verdict = Verdict::unexplained;
-    } else if (clear_gap || !hidden.empty() || !moves_enough(runs_, policy_.excitation)) {
-      result_.verdict = Verdict::not_excited;
-    } else {
-      result_.verdict = Verdict::no_discrepancy;
-    }
+    result_.verdict = verdict_of(tests.structured, clear_gap, !hidden.empty());
     if (result_.verdict == Verdict::not_excited) note_power(clear_gap, hidden);
     decided_ = true;
+  }
+
+  /// `structured`: what is left is more than noise. `clear_gap`: held-out data are clearly further off than
+  /// noise. `may_hide`: usual friction would not have been shown.
+  Verdict verdict_of(bool structured, bool clear_gap, bool may_hide) const {
+    if (structured) return Verdict::unexplained;
+    const bool found = !result_.effects.empty();
+    if (found || !result_.numbers.empty()) {
+      if (!clear_gap) return Verdict::explained;
+      if (found) return Verdict::unexplained;
+    }
+    if (!result_.helps_here_only.empty()) return Verdict::unexplained;
+    const bool shows_nothing = clear_gap || may_hide || !moves_enough(runs_, policy_.excitation);
+    return shows_nothing ? Verdict::not_excited : Verdict::no_discrepancy;
   }
 
   /// Why data in which nothing is found do not show that nothing is missing.
