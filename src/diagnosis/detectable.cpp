@@ -8,6 +8,9 @@ namespace upright {
 
 namespace {
 
+/// Of the usual size of friction: so little that the simulated motion stays the same.
+constexpr double small_share = 1e-3;
+
 /// The standard error of the size of an effect once it is left open: infinite where the data say nothing of
 /// it, 0 where it is held at the end of its range.
 double standard_error(const Hypothesis& open, std::size_t effect) {
@@ -46,10 +49,14 @@ double standard_errors_to_be_shown(std::size_t effect, bool is_correction, const
          policy.power.power_z;
 }
 
-std::vector<Detectable> detectable_sizes(const Search& search, const std::vector<OpenedEffect>& opened) {
+std::vector<Detectable> detectable_sizes(const Search& search, const Hypothesis& h,
+                                         const std::vector<OpenedEffect>& opened) {
   std::vector<Detectable> sizes;
   for (const auto& [effect, open] : opened) {
-    const double sigma = standard_error(open, effect);
+    double sigma = standard_error(open, effect);
+    // A contact without a level is no contact, so nothing depends on the level there: open a small one.
+    if (std::isinf(sigma) && effect_registry()[effect].dry)
+      sigma = standard_error(search.with_effect_free(h, effect, small_share), effect);
     if (!(sigma > 0.0)) continue;
     const EffectInfo& info = effect_registry()[effect];
     Detectable d;

@@ -327,7 +327,7 @@ class Diagnostician {
                      [](const auto& a, const auto& b) { return a.evidence > b.evidence; });
     note_doubtful_numbers();
     opened_ = open_effects(search_, final_, all);
-    result_.detectable = detectable_sizes(search_, opened_);
+    result_.detectable = detectable_sizes(search_, final_, opened_);
     decide(tests);
     trace_residuals();
     find_indistinguishable();
@@ -401,12 +401,18 @@ class Diagnostician {
     if (structured) return Verdict::unexplained;
     const bool found = !result_.effects.empty();
     if (found || !result_.numbers.empty()) {
-      if (!clear_gap) return Verdict::explained;
+      if (!clear_gap || closes_excess()) return Verdict::explained;
       if (found) return Verdict::unexplained;
     }
     if (!result_.helps_here_only.empty()) return Verdict::unexplained;
     const bool shows_nothing = clear_gap || may_hide || !moves_enough(runs_, policy_.excitation);
     return shows_nothing ? Verdict::not_excited : Verdict::no_discrepancy;
+  }
+
+  /// Whether what was found closes most of what the plant file as given has above the noise floor.
+  bool closes_excess() const {
+    const double before = result_.gap_before - 1.0, after = result_.gap_after - 1.0;
+    return after < (1.0 - policy_.power.least_share_closed) * before;
   }
 
   /// Why data in which nothing is found do not show that nothing is missing.

@@ -507,7 +507,7 @@ Hypothesis Search::fitted_to_all_runs(const Hypothesis& h) const {
   return result.valid ? result : h;
 }
 
-Hypothesis Search::with_effect_free(const Hypothesis& h, std::size_t effect) const {
+Hypothesis Search::with_effect_free(const Hypothesis& h, std::size_t effect, double share_of_typical) const {
   Hypothesis result;
   result.added = h.added;
   result.free = h.free;
@@ -523,7 +523,9 @@ Hypothesis Search::with_effect_free(const Hypothesis& h, std::size_t effect) con
     if (point.plant.find(effect) == nullptr) {
       std::vector<double> values = search_starts(effect, range_, {}, policy_.prior, budget_).front();
       for (std::size_t i = 0; i < values.size(); ++i)
-        if (!std::isnan(info.parameters[i].neutral)) values[i] = info.parameters[i].neutral;
+        if (!std::isnan(info.parameters[i].neutral))
+          values[i] =
+              info.parameters[i].neutral + share_of_typical * (values[i] - info.parameters[i].neutral);
       Plant plant = point.plant;
       plant.set(effect, values);
       point = moved_to(point, plant);

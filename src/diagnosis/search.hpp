@@ -102,7 +102,7 @@ class Search {
                                const Noise* fixed_noise, bool settled = false);
   /// The same point with one effect more left open, with nothing believed of it and where it does nothing:
   /// what the data then still say of the others.
-  Hypothesis with_effect_free(const Hypothesis& h, std::size_t effect) const;
+  Hypothesis with_effect_free(const Hypothesis& h, std::size_t effect, double share_of_typical = 0.0) const;
   /// The same effects fitted to all runs, held-out ones too: what is known once the choice is made.
   Hypothesis fitted_to_all_runs(const Hypothesis& h) const;
   /// All runs followed with the plant as it is and noise whose coloured part is estimated too.

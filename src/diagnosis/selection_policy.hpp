@@ -143,9 +143,12 @@ struct PowerPolicy {
   /// [1] The usual friction of a pivot, as a share of gravity's largest torque (at the natural rate, of what
   /// grows with the rate). Chosen.
   double share_of_gravity_torque = 0.01;
-  /// [noise floors] A larger gap is clearly above the floor: nothing is explained, and "no discrepancy" would
-  /// be wrong. Chosen.
+  /// [noise floors] A larger gap is clearly above the floor: "no discrepancy" would be wrong, and what was
+  /// found explains the data only if it closes most of the excess. Chosen.
   double clear_gap = 2.0;
+  /// [1] The share of the excess above the floor that it must close then. Less than half explains less than
+  /// it leaves.
+  double least_share_closed = 0.5;
   /// [kinds] Every rig has this friction. If the data would not have shown it at its usual size, they do not
   /// show that nothing is missing.
   std::array<std::string_view, 4> everywhere = {"viscous_friction", "coulomb_friction",

@@ -40,10 +40,11 @@ std::string joined(const json& names) {
 
 void add_answer(HtmlPage& page, const json& d, const std::filesystem::path& file) {
   const std::string verdict = d.at("verdict");
+  const bool numbers_alone = d.value("effects", json::array()).empty();
   const std::map<std::string, std::pair<Tone, std::string>> headlines = {
       {"explained",
-       {Tone::good, d.at("effects").empty() ? "Explained: numbers of the plant file moved, as listed below"
-                                            : "Explained: the model lacked the effects listed below"}},
+       {Tone::good, numbers_alone ? "Explained: numbers of the plant file moved, as listed below"
+                                  : "Explained: the model lacked the effects listed below"}},
       {"no_discrepancy", {Tone::good, "No discrepancy: the model agrees with the data"}},
       {"unexplained", {Tone::warning, "Unexplained: something is missing that no known effect accounts for"}},
       {"not_excited", {Tone::neutral, "Not excited: these data could not show what the model may lack"}}};

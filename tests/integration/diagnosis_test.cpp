@@ -142,7 +142,7 @@ TEST(Diagnosis, NamesNoEffectWhereNoneIsHidden) {
 
 TEST(Diagnosis, SaysNoDiscrepancyOfAPlantThatIsRight) {
   const Diagnosis d = diagnose(believed_plant(), hanging_runs({.plant = believed_plant()}, 15));
-  EXPECT_EQ(d.verdict, Verdict::no_discrepancy);
+  EXPECT_EQ(d.verdict, Verdict::no_discrepancy) << testing::PrintToString(d.notes);
   EXPECT_TRUE(d.effects.empty());
 }
 
@@ -204,6 +204,14 @@ class Blind : public testing::TestWithParam<BlindCase> {
     return kinds;
   }
 
+  /// What did not reproduce, and where.
+  std::vector<std::string> withdrawn() const {
+    std::vector<std::string> kinds;
+    for (const LocalEffect& local : diagnosis_.helps_here_only)
+      kinds.push_back(std::string(effect_registry()[local.effect].kind) + ": " + local.where);
+    return kinds;
+  }
+
   /// The first effect and what is declared not to be told from it.
   std::vector<std::string> first_set() const {
     if (diagnosis_.effects.empty()) return {};
@@ -243,7 +251,9 @@ class BlindPair : public Blind {};
 TEST_P(BlindPair, IsNamedWhole) {
   const std::vector<std::string> found = structural();
   for (const std::string& kind : GetParam().hidden)
-    EXPECT_NE(std::find(found.begin(), found.end(), kind), found.end()) << testing::PrintToString(found);
+    EXPECT_NE(std::find(found.begin(), found.end(), kind), found.end())
+        << testing::PrintToString(found) << testing::PrintToString(withdrawn()) << name_of(diagnosis_.verdict)
+        << ": " << diagnosis_.residual << testing::PrintToString(diagnosis_.notes);
 }
 
 class BlindNothing : public Blind {};
