@@ -39,6 +39,8 @@ if [ ! -e "$cache/fresh.tar" ]; then
 else
   tar -xf "$cache/fresh.tar" -C "$root"
 fi
+# The root of a system is open to its users; the folder that mktemp makes is not.
+chmod 755 "$root"
 inside() {
   env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin LC_ALL=C.UTF-8 DEBIAN_FRONTEND=noninteractive chroot "$root" "$@"
 }
