@@ -105,9 +105,7 @@ ShownStretch best_window(const FitData& data, std::size_t s, const std::vector<L
 class Parts {
  public:
   Parts(const Search& search, const Hypothesis& h) : search_(search), free_(h.free), given_(search.given()) {
-    FitData all = search.train_data();
-    const FitData& held = search.held_data();
-    all.segments.insert(all.segments.end(), held.segments.begin(), held.segments.end());
+    FitData all = search.all_data();
     if (h.train.point.starts.size() != all.segments.size()) all = search.train_data();
     const ExcitationPolicy& excitation = search.policy().excitation;
     for (const std::vector<std::size_t>& places : halves(all, excitation.arm_m, excitation.speed_window_s)) {

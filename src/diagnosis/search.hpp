@@ -101,7 +101,7 @@ class Search {
   Hypothesis fitted_separately(const std::vector<std::size_t>& effects, const Hypothesis& from,
                                const Noise* fixed_noise, bool settled = false);
   /// The same point with one effect more left open, with nothing believed of it and where it does nothing:
-  /// what the data then still say of the others.
+  /// what the data then still say of the others. Or where it has this share of its typical size.
   Hypothesis with_effect_free(const Hypothesis& h, std::size_t effect, double share_of_typical = 0.0) const;
   /// The same effects fitted to all runs, held-out ones too: what is known once the choice is made.
   Hypothesis fitted_to_all_runs(const Hypothesis& h) const;

@@ -90,13 +90,14 @@ void EkfCovariance::push_by_disturbances(const LinearStep& step) {
 /// Covariances of states with disturbances follow the transition; the disturbances forget, and are renewed so
 /// that they stay as large as they are.
 void EkfCovariance::decay_disturbances(const LinearStep& step) {
+  const double kept = keeps(step.period_s);
   for (int d = states; d < all; ++d) {
     double carried[states] = {};
     for (int i = 0; i < states; ++i)
       for (int j = 0; j < states; ++j) carried[i] += step.transition[i][j] * p_[j][d];
-    for (int i = 0; i < states; ++i) p_[i][d] = p_[d][i] = step.keeps * carried[i];
+    for (int i = 0; i < states; ++i) p_[i][d] = p_[d][i] = kept * carried[i];
   }
-  const double forgets = square(step.keeps);
+  const double forgets = square(kept);
   for (int d = states; d < all; ++d)
     for (int e = states; e < all; ++e) p_[d][e] *= forgets;
   p_[states][states] += (1.0 - forgets) * square(noise_.coloured_force_n);

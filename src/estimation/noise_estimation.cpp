@@ -20,13 +20,12 @@ Likelihood likelihood_with_noise(const std::vector<LinearStep>& steps, const Mea
   Likelihood sum;
   double shift[state_count] = {}, moved[state_count], disturbance[LinearStep::disturbances] = {};
   for (std::size_t k = 0; k < steps.size(); ++k) {
-    LinearStep step = steps[k];
+    const LinearStep& step = steps[k];
     if (k > 0) {
-      step.keeps = covariance.disturbed() ? covariance.keeps(step.period_s) : 0.0;
       covariance.predict(step);
-      for (int d = 0; d < LinearStep::disturbances; ++d) {
+      for (int d = 0; d < LinearStep::disturbances && covariance.disturbed(); ++d) {
         for (int i = 0; i < 2; ++i) shift[2 + i] += step.impulse[d][i] * disturbance[d];
-        disturbance[d] *= step.keeps;
+        disturbance[d] *= covariance.keeps(step.period_s);
       }
       for (int i = 0; i < state_count; ++i) {
         moved[i] = 0.0;
