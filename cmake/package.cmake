@@ -32,7 +32,7 @@ set(CPACK_DEBIAN_PACKAGE_DEPENDS adduser)
 set(CPACK_DEBIAN_PACKAGE_RECOMMENDS gnuplot-nox)  # draws the plots of reports
 # What find_package(upright) looks for: for those who link the libraries only.
 set(CPACK_DEBIAN_PACKAGE_SUGGESTS "g++, cmake, pkg-config, libeigen3-dev, libyaml-cpp-dev, libsundials-dev, \
-libmodbus-dev, libcomedi-dev, libgpiod-dev, libboost-dev, nlohmann-json3-dev")
+libmodbus-dev, libcomedi-dev, libgpiod-dev, libboost-dev, libnlopt-cxx-dev, nlohmann-json3-dev")
 set(CPACK_DEBIAN_PACKAGE_CONTROL_EXTRA ${packaging}/postinst ${packaging}/conffiles)
 set(CPACK_DEBIAN_PACKAGE_CONTROL_STRICT_PERMISSION ON)
 set(CPACK_PACKAGE_DESCRIPTION "It balances an inverted pendulum on a cart, such as the Quanser IP02. It is

@@ -11,7 +11,7 @@ set -euo pipefail
 packages=(
   build-essential cmake ninja-build git ca-certificates
   libeigen3-dev libsundials-dev libmodbus-dev libcomedi-dev libgpiod-dev libyaml-cpp-dev libcli11-dev libboost-dev nlohmann-json3-dev
-  libmatio-dev libhdf5-dev libzip-dev libcpp-httplib-dev libxsimd-dev libceres-dev libopenmpi-dev openmpi-bin
+  libmatio-dev libhdf5-dev libzip-dev libcpp-httplib-dev libxsimd-dev libceres-dev libnlopt-cxx-dev libopenmpi-dev openmpi-bin
   libgtest-dev libbenchmark-dev
   gnuplot-nox python3-venv
 )

@@ -10,8 +10,10 @@
 #include <string>
 
 #include "commands.hpp"
+#include "design/delay_margin.hpp"
 #include "design/estimator_design.hpp"
 #include "design/gain_design.hpp"
+#include "design/widened_margin.hpp"
 #include "progress.hpp"
 #include "upright/base/error.hpp"
 #include "upright/control/gain_file.hpp"
@@ -33,6 +35,8 @@ struct DesignOptions {
   std::string estimator = no_estimator;
   double smoothing = 100.0;
   std::optional<double> delay_s;
+  std::optional<double> for_delay_s;
+  std::optional<double> cost_loss;
   std::optional<double> uncertainty;
   double rate_hz = 1000.0;
   double cutoff_hz = 50.0;
@@ -114,21 +118,40 @@ std::vector<std::string> comments_for(const DesignOptions& options, const Design
           "Weights on x, theta, x_dot, theta_dot and the voltage: " + text};
 }
 
-void write_gains(const DesignOptions& options, const DesignWeights& weights, const GainDesign& design) {
-  refuse_replacing(options);
+/// A gain file with the velocity filter.
+ControlConfig filtered(const DesignOptions& options, const GainDesign& design) {
   ControlConfig config;
   config.gains = {design.gains[0], design.gains[1], design.gains[2], design.gains[3]};
-  config.delay_s = options.delay_s.value_or(0.0);
+  config.delay_s = options.for_delay_s ? *options.for_delay_s : options.delay_s.value_or(0.0);
   config.sample_rate_hz = options.rate_hz;
   config.estimator.cutoff_hz = options.cutoff_hz;
   config.estimator.damping = options.damping;
+  return config;
+}
+
+void write_gains(const DesignOptions& options, const DesignWeights& weights, ControlConfig config) {
+  refuse_replacing(options);
   if (options.delay_s)
     config.compensation = {CompensationKind::predictor, path_from(options.out, options.plant)};
   write_gain_file(config, options.out, comments_for(options, weights));
 }
 
+Json json_of(const WidenedMargin& widened) {
+  return {{"cost_loss", widened.cost_loss},
+          {"lqr_critical_delay_s", widened.lqr_critical_s},
+          {"critical_delay_s", widened.critical_s}};
+}
+
+void print(const WidenedMargin& widened) {
+  std::printf(
+      "critical delay %.3g ms, sampled, while the cart slides (LQR gains: %.3g ms), for %.3g percent more "
+      "than the smallest cost\n",
+      1e3 * widened.critical_s, 1e3 * widened.lqr_critical_s, 1e2 * widened.cost_loss);
+}
+
 Json json_of(const EstimatorDesign& design) {
   Json document = json_of(design.gains.design, design.gains);
+  if (design.widened) document["margin"] = json_of(*design.widened);
   document["estimator"] = {
       {"cart_force_noise_n2_per_s", *design.config.state_estimator.cart_force_noise_n2_per_s},
       {"bears_delay_s", std::isfinite(design.bears_delay_s) ? Json(design.bears_delay_s) : Json(nullptr)},
@@ -161,6 +184,8 @@ void design_estimator(const DesignOptions& options, const Plant& plant, Progress
   request.smoothing = options.smoothing;
   request.rate_hz = options.rate_hz;
   request.delay_s = options.delay_s;
+  request.for_delay_s = options.for_delay_s;
+  request.cost_loss = options.cost_loss.value_or(accepted_cost_loss);
   const EstimatorDesign design = design_with_estimator(plant, request);
   progress.end();
   char borne[160];
@@ -184,43 +209,75 @@ void design_estimator(const DesignOptions& options, const Plant& plant, Progress
     return;
   }
   print(design.gains.design, design.gains);
+  if (design.widened) print(*design.widened);
   std::printf("estimator: force noise %.4g N^2/s; %s\n",
               *design.config.state_estimator.cart_force_noise_n2_per_s, borne);
   if (design.trials) print(*design.trials, request.uncertainty);
   std::fflush(stdout);
 }
 
+/// Gains for the velocity filter.
+struct FilteredDesign {
+  GainDesign gains;
+  std::optional<SampledDesign> sampled;
+  std::optional<WidenedMargin> widened;
+  ControlConfig config;
+};
+
+FilteredDesign design_for_filter(const DesignOptions& options, const Plant& plant,
+                                 const DesignWeights& weights) {
+  FilteredDesign design;
+  if (options.for_delay_s) {
+    const Plant sliding = large_motion_plant(plant);
+    design.gains = design_sampled_gains(sliding, weights, options.smoothing, options.rate_hz, 0.0).design;
+    design.config = filtered(options, design.gains);
+    design.widened = widen_margin(
+        sliding, {weights, options.smoothing, options.cost_loss.value_or(accepted_cost_loss)}, design.config);
+    adopt(*design.widened, design.gains);
+    return design;
+  }
+  if (options.delay_s) {
+    EstimatorConfig estimator;
+    estimator.cutoff_hz = options.cutoff_hz;
+    estimator.damping = options.damping;
+    design.sampled =
+        design_sampled_gains(plant, weights, options.smoothing, options.rate_hz, *options.delay_s, estimator);
+  }
+  design.gains = design.sampled ? design.sampled->design : design_gains(plant, weights, options.smoothing);
+  design.config = filtered(options, design.gains);
+  return design;
+}
+
+void refuse_unused(const DesignOptions& options) {
+  if (options.uncertainty && options.estimator == no_estimator)
+    throw ConfigError("--uncertainty needs an estimator: add --estimator, or remove --uncertainty");
+  if (options.for_delay_s && options.delay_s)
+    throw ConfigError("--delay designs a predictor and --for-delay does without one: give one of the two");
+  if (options.cost_loss && !options.for_delay_s)
+    throw ConfigError("--cost-loss is for --for-delay: add --for-delay, or remove --cost-loss");
+}
+
 void design(const DesignOptions& options) {
+  refuse_unused(options);
   Progress progress("design");
   const Plant plant = read_plant_file(options.plant);
   if (options.estimator != no_estimator) {
     design_estimator(options, plant, progress);
     return;
   }
-  if (options.uncertainty)
-    throw ConfigError("--uncertainty needs an estimator: add --estimator, or remove --uncertainty");
   const DesignWeights weights = weights_of(options, {});
-  std::optional<SampledDesign> sampled;
-  GainDesign gains;
-  if (options.delay_s) {
-    EstimatorConfig estimator;
-    estimator.cutoff_hz = options.cutoff_hz;
-    estimator.damping = options.damping;
-    sampled =
-        design_sampled_gains(plant, weights, options.smoothing, options.rate_hz, *options.delay_s, estimator);
-    gains = sampled->design;
-  } else {
-    gains = design_gains(plant, weights, options.smoothing);
-  }
-  if (!options.out.empty()) write_gains(options, weights, gains);
+  const FilteredDesign found = design_for_filter(options, plant, weights);
+  if (!options.out.empty()) write_gains(options, weights, found.config);
   progress.end();
   if (options.as_json) {
-    Json document = json_of(gains, sampled);
+    Json document = json_of(found.gains, found.sampled);
+    if (found.widened) document["margin"] = json_of(*found.widened);
     document["written_to"] = options.out.empty() ? Json(nullptr) : Json(options.out);
     std::cout << document.dump(2, ' ', false, Json::error_handler_t::replace) << "\n";
     return;
   }
-  print(gains, sampled);
+  print(found.gains, found.sampled);
+  if (found.widened) print(*found.widened);
   if (!options.out.empty()) std::printf("written to %s\n", options.out.c_str());
   std::fflush(stdout);
 }
@@ -235,6 +292,7 @@ void add_design(CommandLine& line) {
       "  upright design config/plants/viscous.yaml --delay 0.1 --rate 1000 --out compensated.yaml\n"
       "  upright design config/plants/viscous.yaml --estimator kalman --out quiet.yaml\n"
       "  upright design config/plants/exponential.yaml --estimator extended_kalman --out quieter.yaml\n"
+      "  upright design config/plants/viscous.yaml --estimator kalman --for-delay 0.04 --out slow-link.yaml\n"
       "With --delay, the gain file has a predictor: the gains act on the state that is predicted for the\n"
       "moment when the voltage acts.");
   const auto options = std::make_shared<DesignOptions>();
@@ -267,6 +325,16 @@ void add_design(CommandLine& line) {
       .option("--delay", options->delay_s,
               "Loop delay to compensate with a predictor [s]; the design is then discrete-time")
       .in(Range::within(0.0, 10.0));
+  command
+      .option("--for-delay", options->for_delay_s,
+              "Loop delay to tolerate without a predictor [s]: gains, and force noise of the estimator, with "
+              "the largest delay margin within --cost-loss")
+      .in(Range::within(0.0, 10.0));
+  command
+      .option("--cost-loss", options->cost_loss,
+              "With --for-delay: relative excess over the smallest LQR cost that the gains may have "
+              "(default: 0.3)")
+      .in(Range::within(0.0, 100.0));
   command
       .option("--rate", options->rate_hz,
               "Sample rate [Hz] of the gain file and of discrete-time designs (default: 1000)")

@@ -39,7 +39,7 @@ ControlConfig first_config(const Plant& plant, const EstimatorRequest& request,
                            const std::array<double, 4>& k) {
   ControlConfig config;
   config.gains = {k[0], k[1], k[2], k[3]};
-  config.delay_s = request.delay_s.value_or(0.0);
+  config.delay_s = request.delay_s ? *request.delay_s : request.for_delay_s.value_or(0.0);
   config.sample_rate_hz = request.rate_hz;
   config.state_estimator.kind = request.kind;
   config.state_estimator.plant = request.plant_file;
@@ -100,6 +100,11 @@ EstimatorDesign design_with_estimator(const Plant& plant, const EstimatorRequest
   std::optional<double>& noise = design.config.state_estimator.cart_force_noise_n2_per_s;
   // A predictor's horizon decides what it bears, hardly the force noise: one period is asked of it.
   const double wanted_s = request.delay_s ? design.config.period_s() : slow_actuator_s;
+  if (request.for_delay_s) {
+    const MarginRequest margin{request.weights, request.smoothing, request.cost_loss, slow_actuator_s};
+    design.widened = widen_margin(sliding, margin, design.config);
+    adopt(*design.widened, design.gains.design);
+  }
   constexpr int most_halvings = 12;
   for (int i = 0; i <= most_halvings; ++i) {
     design.bears_unmodelled_s = borne_s(sliding, design.config, ExtraDelay::unmodelled);

@@ -9,6 +9,7 @@
 #include "gain_design.hpp"
 #include "parameter_trials.hpp"
 #include "upright/control/gain_file.hpp"
+#include "widened_margin.hpp"
 
 namespace upright {
 
@@ -25,13 +26,18 @@ inline constexpr double slow_actuator_s = 0.005;
 /// careful identification leaves.
 inline constexpr double parameter_uncertainty = 0.05;
 
+/// By how much more than the optimal gains those for a delay may cost, where nobody says (GainCost::loss).
+inline constexpr double accepted_cost_loss = 0.3;
+
 struct EstimatorRequest {
   StateEstimatorKind kind = StateEstimatorKind::kalman;
   std::filesystem::path plant_file;
   DesignWeights weights = quiet_weights;
   double smoothing = 100.0;
   double rate_hz = 1000.0;
-  std::optional<double> delay_s;  ///< of the loop: with a predictor
+  std::optional<double> delay_s;          ///< of the loop: with a predictor
+  std::optional<double> for_delay_s;      ///< of the loop: without one
+  double cost_loss = accepted_cost_loss;  ///< for `for_delay_s`
   double uncertainty = parameter_uncertainty;
 };
 
@@ -42,6 +48,7 @@ struct EstimatorDesign {
   double bears_unmodelled_s = 0.0;  ///< in the actuator, on top of the gain file's
   /// Runs on the plant with its friction; none with a predictor, whose horizon is judged by its margin.
   std::optional<ParameterTrials> trials;
+  std::optional<WidenedMargin> widened;  ///< for a delay without a predictor
 };
 
 /// Throws ConfigError when no force noise makes a loop that holds the plant, or when it does not hold with

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <limits>
 
 #include "model/dense_algebra.hpp"
 #include "model/riccati.hpp"
@@ -215,6 +216,13 @@ SampledProblem with_estimator(const SampledProblem& line, Index coordinates, con
   return whole;
 }
 
+/// log(z) / T of the eigenvalues z of a sampled loop.
+std::vector<std::complex<double>> poles_of(const MatrixXd& closed, double rate_hz) {
+  std::vector<std::complex<double>> poles = sorted_eigenvalues(closed);
+  for (std::complex<double>& pole : poles) pole = std::log(pole) * rate_hz;
+  return poles;
+}
+
 /// The gain that feeding back `k` on the predicted state is on (state, voltages on their way, estimator).
 RowVectorXd gain_through_prediction(const RowVectorXd& k, const SampledProblem& direct, int periods,
                                     Index estimator_states) {
@@ -263,14 +271,52 @@ SampledDesign design_sampled_gains(const Plant& plant, const DesignWeights& weig
   result.design.residual = solution.residual;
   result.design.eliminated = part.eliminated;
   result.design.notes = linear.notes;
-  for (const std::complex<double>& z : sorted_eigenvalues(direct.a - direct.b * solution.gain))
-    result.design.closed_loop_poles.push_back(std::log(z) * rate_hz);
+  result.design.closed_loop_poles = poles_of(direct.a - direct.b * solution.gain, rate_hz);
   add_shares(result.design, part, solution.gain);
   if (lagging)
     result.design.notes.emplace_back("motor_lag: the gains take it as quick; the predictor follows it");
   check_with_all_states(result, direct, solution.gain, static_cast<Index>(linear.fed_back.size()) / 2,
                         make_estimator_step(estimator, period_s));
   return result;
+}
+
+GainCost::GainCost(const Plant& plant, const DesignWeights& weights, double smoothing, double rate_hz)
+    : rate_hz_(rate_hz) {
+  const LinearPlant linear = linearize(plant, smoothing);
+  refuse_unreadable(linear);
+  bool lagging = false;
+  plant_ = without_motor_lag(linear, lagging);
+  const ControllablePart part = controllable_part(plant_);
+  const SampledProblem problem = sample_problem(part.a, part.b * plant_.actuator_slope,
+                                                weight_matrix(plant_, weights), weights.r, 1.0 / rate_hz);
+  a_ = problem.a;
+  b_ = problem.b;
+  q_ = problem.q;
+  s_ = problem.s;
+  r_ = problem.r;
+  smallest_ = solve_discrete_riccati(a_, b_, q_, s_, MatrixXd::Constant(1, 1, r_)).x;
+}
+
+/// k in u = k x.
+RowVectorXd GainCost::feedback(const std::array<double, 4>& gains) const {
+  RowVectorXd k(a_.rows());
+  for (Index i = 0; i < k.size(); ++i)
+    k(i) = gains[plant_.fed_back[static_cast<std::size_t>(i)]] * plant_.sensor_scale(i);
+  return k;
+}
+
+std::vector<std::complex<double>> GainCost::closed_loop_poles(const std::array<double, 4>& gains) const {
+  return poles_of(a_ + b_ * feedback(gains), rate_hz_);
+}
+
+double GainCost::loss(const std::array<double, 4>& gains) const {
+  const RowVectorXd k = feedback(gains);
+  const MatrixXd closed = a_ + b_ * k;
+  const MatrixXd each = q_ + s_ * k + k.transpose() * s_.transpose() + r_ * k.transpose() * k;
+  const std::optional<MatrixXd> cost = discrete_lyapunov(closed, each);
+  if (!cost) return std::numeric_limits<double>::infinity();
+  const Eigen::VectorXcd ratios = eigenvalues(inverse(smallest_) * *cost);
+  return ratios.real().maxCoeff() - 1.0;
 }
 
 }  // namespace upright

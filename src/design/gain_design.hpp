@@ -1,6 +1,7 @@
 // Gain design: linear-quadratic state feedback for a plant, continuous or for the sampled loop.
 #pragma once
 
+#include <Eigen/Core>
 #include <array>
 #include <complex>
 #include <optional>
@@ -9,6 +10,7 @@
 
 #include "controllable_part.hpp"
 #include "upright/control/velocity_estimator.hpp"
+#include "upright/model/linear_plant.hpp"
 #include "upright/model/plant.hpp"
 
 namespace upright {
@@ -48,5 +50,28 @@ struct SampledDesign {
 /// those without it); it needs `delay_compensation: {kind: predictor}`. Throws ConfigError.
 SampledDesign design_sampled_gains(const Plant& plant, const DesignWeights& weights, double smoothing,
                                    double rate_hz, double delay_s, const EstimatorConfig& estimator = {});
+
+/// What a sampled loop costs whose gains are not the optimal ones: of the same integral, with the true state
+/// and without delay.
+class GainCost {
+ public:
+  /// Throws ConfigError as the design does.
+  GainCost(const Plant& plant, const DesignWeights& weights, double smoothing, double rate_hz);
+
+  /// By how much the cost exceeds the smallest one, relative, from the start for which it exceeds it most;
+  /// infinite for gains that do not stabilise the plant.
+  double loss(const std::array<double, 4>& gains) const;
+  /// As in GainDesign, for these gains.
+  std::vector<std::complex<double>> closed_loop_poles(const std::array<double, 4>& gains) const;
+
+ private:
+  Eigen::RowVectorXd feedback(const std::array<double, 4>& gains) const;
+
+  LinearPlant plant_;
+  Eigen::MatrixXd a_, q_;
+  Eigen::VectorXd b_, s_;
+  double r_ = 0.0, rate_hz_;
+  Eigen::MatrixXd smallest_;  ///< the smallest cost from a state x is x' smallest_ x
+};
 
 }  // namespace upright

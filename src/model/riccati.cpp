@@ -149,4 +149,19 @@ DiscreteRiccatiSolution solve_discrete_riccati(const MatrixXd& a, const MatrixXd
   return solution;
 }
 
+std::optional<MatrixXd> discrete_lyapunov(const MatrixXd& a, const MatrixXd& q) {
+  MatrixXd power = a, sum = q;
+  constexpr int max_doublings = 60;
+  constexpr double converged = 1e-15;
+  for (int i = 0; i < max_doublings && power.allFinite() && sum.allFinite(); ++i) {
+    const MatrixXd more = power.transpose() * sum * power;
+    sum = symmetric_part(sum + more);
+    power = (power * power).eval();
+    if (more.cwiseAbs().maxCoeff() <= converged * sum.cwiseAbs().maxCoeff() &&
+        power.cwiseAbs().maxCoeff() < 1.0)
+      return sum;
+  }
+  return std::nullopt;
+}
+
 }  // namespace upright

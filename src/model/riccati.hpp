@@ -1,7 +1,8 @@
-// The algebraic Riccati equations of linear-quadratic design and of stationary Kalman filters.
+// The algebraic Riccati and Lyapunov equations of linear-quadratic design and of stationary Kalman filters.
 #pragma once
 
 #include <Eigen/Core>
+#include <optional>
 
 namespace upright {
 
@@ -32,5 +33,9 @@ struct DiscreteRiccatiSolution {
 DiscreteRiccatiSolution solve_discrete_riccati(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b,
                                                const Eigen::MatrixXd& q, const Eigen::MatrixXd& s,
                                                const Eigen::MatrixXd& r);
+
+/// X = A'XA + Q for symmetric Q: the sum of A'^k Q A^k, doubled (Smith 1968). Absent where A has an
+/// eigenvalue on or outside the unit circle.
+std::optional<Eigen::MatrixXd> discrete_lyapunov(const Eigen::MatrixXd& a, const Eigen::MatrixXd& q);
 
 }  // namespace upright
