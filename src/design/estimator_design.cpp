@@ -100,11 +100,11 @@ EstimatorDesign design_with_estimator(const Plant& plant, const EstimatorRequest
   std::optional<double>& noise = design.config.state_estimator.cart_force_noise_n2_per_s;
   // A predictor's horizon decides what it bears, hardly the force noise: one period is asked of it.
   const double wanted_s = request.delay_s ? design.config.period_s() : slow_actuator_s;
-  constexpr int most_halvings = 12;
-  for (int i = 0; i <= most_halvings; ++i) {
+  constexpr int max_halvings = 12;
+  for (int i = 0; i <= max_halvings; ++i) {
     design.bears_unmodelled_s = borne_s(sliding, design.config, ExtraDelay::unmodelled);
     if (design.bears_unmodelled_s >= wanted_s) break;
-    if (i < most_halvings) *noise *= 0.5;
+    if (i < max_halvings) *noise *= 0.5;
   }
   if (design.bears_unmodelled_s <= 0.0)
     throw ConfigError(

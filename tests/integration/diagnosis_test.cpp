@@ -191,7 +191,7 @@ class Blind : public testing::TestWithParam<BlindCase> {
          .size = c.size,
          .seed = c.seed,
          .condition = c.disturbed ? blind::Condition::disturbed : blind::Condition::quantized,
-         .most_samples = 4000.0});
+         .max_samples = 4000.0});
     diagnosis_ = diagnose(case_.believed, measure_all(case_));
   }
 

@@ -160,7 +160,7 @@ Ended begin_beyond(const std::string& piece, double cart_m, double cart_mps, dou
   limits.track_limit_m = setup.rig.track_limit_m;
   limits.fall_angle_rad = setup.rig.fall_angle_rad;
   limits.watchdog_s = 1.0;
-  limits.most_periods_late = 1;
+  limits.max_periods_late = 1;
   limits.coast_s = setup.rig.coast_s;
   RowMemory memory;
   const SignalFlag no_signal{0};

@@ -214,9 +214,9 @@ TEST(OverrunLimit, OnlyTightensAsTheDelayGrows) {
   for (double delay_s = 0.0; delay_s < 0.12; delay_s += 0.001) {
     config.delay_s = delay_s;
     const OverrunLimit limit = overrun_limit(plant_named("exponential"), config);
-    EXPECT_LE(limit.most_periods_late, before) << delay_s;
+    EXPECT_LE(limit.max_periods_late, before) << delay_s;
     EXPECT_EQ(limit.warning.empty(), delay_s < 0.01415) << delay_s << limit.warning;
-    before = limit.most_periods_late;
+    before = limit.max_periods_late;
   }
   EXPECT_EQ(before, 3u);
 }
@@ -225,11 +225,11 @@ TEST(OverrunLimit, WithoutAModelIsTighterThanWhatLeavesTimeBeforeAFallAndSaysSo)
   ControlConfig config = gains_named("exponential");
   const OverrunLimit limit = overrun_limit(std::nullopt, config);
   EXPECT_FALSE(limit.tolerance);
-  EXPECT_EQ(limit.most_periods_late, 10u);
+  EXPECT_EQ(limit.max_periods_late, 10u);
   EXPECT_NE(limit.sentence.find("unknown"), std::string::npos) << limit.sentence;
   EXPECT_EQ(limit.warning, "");
   config.sample_rate_hz = 100.0;
-  EXPECT_EQ(overrun_limit(std::nullopt, config).most_periods_late, 3u);
+  EXPECT_EQ(overrun_limit(std::nullopt, config).max_periods_late, 3u);
 }
 
 TEST(OverrunLimit, GainsThatStabilizeNothingAreToldFromADelayThatIsTooLong) {
@@ -238,7 +238,7 @@ TEST(OverrunLimit, GainsThatStabilizeNothingAreToldFromADelayThatIsTooLong) {
   const OverrunLimit limit = overrun_limit(plant_named("exponential"), config);
   ASSERT_TRUE(limit.tolerance);
   EXPECT_FALSE(limit.tolerance->stabilized);
-  EXPECT_EQ(limit.most_periods_late, 3u);
+  EXPECT_EQ(limit.max_periods_late, 3u);
   EXPECT_NE(limit.warning.find("do not stabilize"), std::string::npos) << limit.warning;
 }
 

@@ -256,10 +256,10 @@ TEST(SignCheck, PulsesUpToItsLargestVoltageHoweverLow) {
   for (const double largest_v : {1e-9, 0.3, 0.5, 1.0, 1.2, 4.0}) {
     ExperimentSetup setup = setup_with("{kind: sign_check, largest_v: " + exact_text(largest_v) + "}");
     setup.plant.set(effect_number("coulomb_friction"), std::vector<double>{5.0});  // nothing moves
-    double most_v = 0.0;
+    double max_v = 0.0;
     for (const LogRecord& row : rehearse(setup.experiment.pieces.front(), setup).rows)
-      most_v = std::max(most_v, std::abs(row.voltage_v));
-    EXPECT_EQ(most_v, largest_v);
+      max_v = std::max(max_v, std::abs(row.voltage_v));
+    EXPECT_EQ(max_v, largest_v);
   }
 }
 
