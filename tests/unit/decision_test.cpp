@@ -247,7 +247,7 @@ TEST(Exchange, IsForWhatIsAsGoodAndPlainer) {
   EXPECT_EQ(rule(-0.5 * p.equally_good_evidence, 0.1 - 0.5 * p.equally_good_evidence), Rule::plainer);
 }
 
-TEST(Exchange, AsksOfWhatStandsInThatItIsPossibleCertainAndSimulates) {
+TEST(Exchange, AsksThatTheSubstituteIsPossibleAndCertain) {
   Evidence e = evidence(Change::exchange, 100.0, 1.0, 0.0);
   e.certainty = p.min_certainty;
   EXPECT_EQ(rule_of(e), Rule::better);
@@ -328,7 +328,7 @@ TEST(BestContender, IsChosenByHeldOutRunsAmongEquals) {
   EXPECT_EQ(best_of({{spring, 100.0, 4.0}, {force, 100.0, 0.0}}, p), 1u);
 }
 
-TEST(Indistinguishable, IsWhatLosesLittleEvidenceOrLessThanItsScatter) {
+TEST(Indistinguishable, IsWhatLosesLittleEvidence) {
   const DistinctionPolicy& d = policy.distinction;
   EXPECT_TRUE(is_indistinguishable(below(d.indistinguishable_evidence), 100.0, d));
   EXPECT_FALSE(is_indistinguishable(d.indistinguishable_evidence, 100.0, d));

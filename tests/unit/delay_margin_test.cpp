@@ -158,7 +158,7 @@ TEST(SampledMargin, TendsToTheContinuousOneAtHighRates) {
   EXPECT_NEAR(sampled, continuous, 5e-3 * continuous);
 }
 
-TEST(SampledMargin, PredictorBearsExtraDelayAndItsLoopIsTheUndelayedOne) {
+TEST(SampledMargin, LoopWithPredictorIsTheUndelayedOne) {
   const Plant plant = plant_named("viscous");
   ControlConfig config = gains_named("viscous");
   config.delay_s = 0.1;
@@ -221,7 +221,7 @@ TEST(OverrunLimit, OnlyTightensAsTheDelayGrows) {
   EXPECT_EQ(before, 3u);
 }
 
-TEST(OverrunLimit, WithoutAModelIsTighterThanWhatLeavesTimeBeforeAFallAndSaysSo) {
+TEST(OverrunLimit, WithoutAModelIsTighterAndSaysSo) {
   ControlConfig config = gains_named("exponential");
   const OverrunLimit limit = overrun_limit(std::nullopt, config);
   EXPECT_FALSE(limit.tolerance);
@@ -232,7 +232,7 @@ TEST(OverrunLimit, WithoutAModelIsTighterThanWhatLeavesTimeBeforeAFallAndSaysSo)
   EXPECT_EQ(overrun_limit(std::nullopt, config).max_periods_late, 3u);
 }
 
-TEST(OverrunLimit, GainsThatStabilizeNothingAreToldFromADelayThatIsTooLong) {
+TEST(OverrunLimit, UnstableGainsAreToldFromADelayThatIsTooLong) {
   ControlConfig config = gains_named("exponential");
   config.gains.pendulum_angle_v_per_rad *= -1.0;
   const OverrunLimit limit = overrun_limit(plant_named("exponential"), config);

@@ -37,7 +37,7 @@ ExperimentSetup setup_with(const std::string& piece, const std::string& plant = 
   return setup;
 }
 
-TEST(ExperimentFile, EveryPieceOfTheConfigurationReadsBackFromItsText) {
+TEST(ExperimentFile, EveryPieceOfTheConfigurationReadsBack) {
   int pieces = 0;
   for (const auto& entry : fs::recursive_directory_iterator(config / "experiments")) {
     if (entry.path().extension() != ".yaml") continue;
@@ -109,7 +109,7 @@ TEST(ExperimentScript, ARampFindsTheBreakawayVoltageOfThePlant) {
   EXPECT_EQ(ramps, 4);
 }
 
-TEST(ExperimentScript, AConstantVoltageReachesItsTerminalVelocityInBothDirections) {
+TEST(ExperimentScript, AConstantVoltageReachesTerminalVelocity) {
   ExperimentSetup setup = setup_with("{kind: constant_voltage, voltages_v: [3]}", "viscous.yaml");
   setup.plant.pendulum.reset();
   const Rehearsal r = rehearse(setup.experiment.pieces.front(), setup);
@@ -154,7 +154,7 @@ Piece sweep_piece(double stable_below_rad = 0.0) {
   return Piece{sweep};
 }
 
-TEST(DelaySweep, OrdersDelaysSoThatFallsComeLateAndFindsBothTransitions) {
+TEST(DelaySweep, OrdersDelaysSoThatFallsComeLate) {
   const std::vector<Piece> pieces = {sweep_piece()};
   const double oscillates_s[2] = {0.0103, 0.0121}, falls_s[2] = {0.0217, 0.0233};
   std::vector<TrialResult> done;
