@@ -5,7 +5,7 @@
 // Timer 1 counts 800 steps per period. The resulting 20 kHz is inaudible and suits common bridges. The largest width is
 // one step less than a period, since a bridge may need this gap to recharge the gate supply of its upper transistors.
 #define STEPS 800
-#define MOST_STEPS (STEPS - 1)
+#define MAX_STEPS (STEPS - 1)
 #define CONNECTED (1 << COM1A1 | 1 << WGM11)
 #if defined(__AVR_ATmega328P__)
 #define LAMP_PORT PORTB
@@ -43,7 +43,7 @@ void motor_begin(void) {
 void motor_drive(int16_t millivolts) {
   const bool back = millivolts < 0;
   const uint16_t size = back ? (uint16_t)(0 - (uint16_t)millivolts) : (uint16_t)millivolts;
-  const uint16_t steps = size >= SUPPLY_MV ? MOST_STEPS : (uint16_t)((uint32_t)size * STEPS / SUPPLY_MV);
+  const uint16_t steps = size >= SUPPLY_MV ? MAX_STEPS : (uint16_t)((uint32_t)size * STEPS / SUPPLY_MV);
   // With width 0 the timer would still produce a pulse of one cycle.
   if (steps == 0) {
     disconnect();

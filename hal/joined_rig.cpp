@@ -8,7 +8,7 @@ namespace upright {
 
 namespace {
 
-constexpr double most_skew_periods = 0.5;
+constexpr double max_skew_periods = 0.5;
 
 bool of_link(RigFault fault) noexcept {
   return fault == RigFault::link_timeout || fault == RigFault::link_lost ||
@@ -24,7 +24,7 @@ struct Part {
 class JoinedRig final : public Rig {
  public:
   JoinedRig(std::vector<RigPart> parts, double period_s)
-      : most_skew_ns_(static_cast<std::int64_t>(1e9 * most_skew_periods * period_s)) {
+      : max_skew_ns_(static_cast<std::int64_t>(1e9 * max_skew_periods * period_s)) {
     std::stable_partition(parts.begin(), parts.end(), [](const RigPart& part) { return part.roles.output; });
     for (RigPart& part : parts) parts_.push_back({std::move(part.rig), part.roles, 0});
   }
@@ -60,7 +60,7 @@ class JoinedRig final : public Rig {
       }
     }
     reading.time_ns = std::min(cart_ns, pendulum_ns);
-    if (std::abs(cart_ns - pendulum_ns) > most_skew_ns_)
+    if (std::abs(cart_ns - pendulum_ns) > max_skew_ns_)
       worsen(reading, RigStatus::stale, RigFault::link_timeout);
     if (reading.status == RigStatus::fresh) reading.sequence = ++sequence_;
     return reading;
@@ -122,7 +122,7 @@ class JoinedRig final : public Rig {
   }
 
   std::vector<Part> parts_;  // the output's first
-  std::int64_t most_skew_ns_;
+  std::int64_t max_skew_ns_;
   std::uint64_t sequence_ = 0;
 };
 

@@ -15,7 +15,7 @@ namespace upright {
 namespace {
 
 /// The fewest bytes that a period sends over a serial line: reading the counters and writing the voltage.
-int fewest_bytes(const RigFile& rig) {
+int min_bytes(const RigFile& rig) {
   const ModbusRig& modbus = *rig.modbus;
   const RigRoles roles = roles_of(rig, Backend::modbus_rtu);
   const int counters = static_cast<int>(roles.cart) + static_cast<int>(roles.pendulum);
@@ -30,7 +30,7 @@ int fewest_bytes(const RigFile& rig) {
 double line_time_s(const RigFile& rig) {
   const ModbusRig& modbus = *rig.modbus;
   const int bits_per_byte = 1 + 8 + (modbus.parity == Parity::none ? 0 : 1) + modbus.stop_bits;
-  return static_cast<double>(fewest_bytes(rig) * bits_per_byte) / modbus.baud;
+  return static_cast<double>(min_bytes(rig) * bits_per_byte) / modbus.baud;
 }
 
 }  // namespace
@@ -39,12 +39,12 @@ void require_link_fits(const RigFile& rig, double period_s) {
   const std::string file = rig.file.string() + ":1: ";
   const std::string period = "the period of " + exact_text(period_s) + " s";
   // Each cycle serves the card's watchdog once, and a cycle may come late.
-  constexpr double fewest_periods = 2.0;
-  if (rig.quanser && rig.quanser->watchdog_s > 0.0 && rig.quanser->watchdog_s < fewest_periods * period_s)
+  constexpr double min_periods = 2.0;
+  if (rig.quanser && rig.quanser->watchdog_s > 0.0 && rig.quanser->watchdog_s < min_periods * period_s)
     throw ConfigError(file + "quanser_hil.watchdog_s is " + exact_text(rig.quanser->watchdog_s) +
                       ", less than twice " + period +
                       ": raise sample_rate_hz in the gain file, or set quanser_hil.watchdog_s to at least " +
-                      exact_text(fewest_periods * period_s));
+                      exact_text(min_periods * period_s));
   if (!rig.modbus || is_simulated(rig)) return;
   if (rig.modbus->response_timeout_s >= period_s)
     throw ConfigError(

@@ -35,7 +35,7 @@ from stages import ELSEWHERE, STAGES, Stage  # noqa: E402
 NUMBER = re.compile(r"(?<![\w.])[-+]?\d+\.?\d*(?:e[-+]?\d+)?")
 LARGEST_DIFFERENCE = 0.01  # of numbers, relative: fits agree to about 1e-3 between processors
 TIME_LIMIT_S = 200  # of one block, on a busy machine: the slowest, a diagnosis, takes some 10 s of processor time
-MOST_RETRIES = 2
+MAX_RETRIES = 2
 STOPPED = (3, 4)  # exit codes of what no human, card or real-time kernel is there for
 
 
@@ -148,10 +148,10 @@ def check(page, program, stalls):
 
     def perform(block, line):
         command = scene.staged(block)
-        for attempt in range(MOST_RETRIES + 1):
+        for attempt in range(MAX_RETRIES + 1):
             begin_s = time.monotonic()
             done = scene.run(command)
-            late = stage.real_time and done.returncode != 0 and attempt < MOST_RETRIES
+            late = stage.real_time and done.returncode != 0 and attempt < MAX_RETRIES
             if not late or not stalls.excuse(f"{name}:{line}", begin_s, time.monotonic()):
                 break
         if done.returncode != 0:

@@ -16,7 +16,7 @@ import sys
 
 from fixed_phrases import fixed_phrases
 
-MOST_WORDS = 40  # plain English style guides ask for 25; a technical sentence with an example in brackets needs more
+MAX_WORDS = 40  # plain English style guides ask for 25; a technical sentence with an example in brackets needs more
 PLAIN = {
     r"what is left": "the residual, the remainder",
     r"(?:tell|tells|told) (?:\w+ )?apart": "distinguish",
@@ -89,7 +89,7 @@ def findings_of(name, text):
     start = 0
     for end in [*(match.start() for match in SENTENCE_END.finditer(flat)), len(flat)]:
         words = flat[start:end].split()
-        if len(words) > MOST_WORDS:
+        if len(words) > MAX_WORDS:
             yield f"{name}: a sentence has {len(words)} words ('{' '.join(words[:6])} ...'): split it"
         start = end
 

@@ -13,12 +13,12 @@ import sys
 import xml.etree.ElementTree
 
 # The budgets for one run of all tests, with .ci/run or scripts/test.sh.
-MOST_RETRIES = 20        # of about 250 test cases in real time; with more, the machine is too busy for valid results
-MOST_STALLED_SKIPS = 2   # of the same; a skipped test has tested nothing
+MAX_RETRIES = 20        # of about 250 test cases in real time; with more, the machine is too busy for valid results
+MAX_STALLED_SKIPS = 2   # of the same; a skipped test has tested nothing
 # Tests whose requirements may be missing; the output of each says what to install. Measured data (1), a second variant
 # of libm (1), memory that can be locked (1), a browser (4), MPI (1), pymodbus (7), a mount name space (1), a model of
 # friction (1), a fresh system for the package (1).
-MOST_OTHER_SKIPS = 18
+MAX_OTHER_SKIPS = 18
 
 
 class Counts:
@@ -49,9 +49,9 @@ def main(folders):
         if ctest.exists():
             counts.read_ctest(ctest)
     too_many = False
-    for what, found, most in (("retries because of a stall of the machine", counts.retries, MOST_RETRIES),
-                              ("tests skipped because every attempt met a stall", counts.stalled, MOST_STALLED_SKIPS),
-                              ("tests skipped because a requirement is missing", counts.other, MOST_OTHER_SKIPS)):
+    for what, found, most in (("retries because of a stall of the machine", counts.retries, MAX_RETRIES),
+                              ("tests skipped because every attempt met a stall", counts.stalled, MAX_STALLED_SKIPS),
+                              ("tests skipped because a requirement is missing", counts.other, MAX_OTHER_SKIPS)):
         print(f"{len(found)} {what} (at most {most})")
         for entry in found:
             print(f"  {entry[:150]}")

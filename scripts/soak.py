@@ -33,8 +33,8 @@ LATE_MS = 6
 MISSED, HELD = 128, 3  # bits of the column flags: see docs/reference/run-directory.md
 
 WARM_SHARE = 0.3           # share of the time in which memory may still grow
-MOST_GROWTH_KIB = 512      # of the resident memory after that, in total
-MOST_DRIFT_S = 1e-3        # between ticks and time stamps, in real time
+MAX_GROWTH_KIB = 512      # of the resident memory after that, in total
+MAX_DRIFT_S = 1e-3        # between ticks and time stamps, in real time
 READER_MIB = 256           # for replay and report, independent of the length of the run
 problems = []
 
@@ -181,7 +181,7 @@ def judge_run(options, run, rate_hz, virtual):
     demand(counts["rows_dropped"] == 0, f"{counts['rows_dropped']} rows were dropped")
     demand(rows.unexplained == 0, f"{rows.unexplained} gaps between ticks are not flagged as missed periods")
     demand(rows.missed == counts["missed"], f"{rows.missed} ticks are missing, but run.yaml counts {counts['missed']}")
-    demand(abs(rows.drift_s()) <= (1e-9 if virtual else MOST_DRIFT_S), f"the clock drifted by {rows.drift_s()} s")
+    demand(abs(rows.drift_s()) <= (1e-9 if virtual else MAX_DRIFT_S), f"the clock drifted by {rows.drift_s()} s")
     demand(rows.held == counts["stale"] + counts["faults"], "the number of rows without fresh counts differs from run.yaml")
     judge_readers(options, run)
     return counts
@@ -189,7 +189,7 @@ def judge_run(options, run, rate_hz, virtual):
 
 def judge_memory(name, watched):
     print(f"  memory of the {name}: at most {watched.largest_mib():.1f} MiB, {watched.growth_kib():+d} KiB after the warm-up", flush=True)
-    demand(watched.growth_kib() <= MOST_GROWTH_KIB, f"the memory of the {name} grew by {watched.growth_kib()} KiB")
+    demand(watched.growth_kib() <= MAX_GROWTH_KIB, f"the memory of the {name} grew by {watched.growth_kib()} KiB")
 
 
 def soak_virtual(options, folder):

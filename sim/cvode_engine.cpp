@@ -17,7 +17,7 @@ namespace upright {
 namespace {
 
 constexpr sunindextype state_size = 6;
-constexpr double least_lag_s = 1e-6;
+constexpr double min_lag_s = 1e-6;
 constexpr double smallest_step_s = 1e-13;
 /// Faster rates than this make the plant stiff against control periods of a millisecond.
 constexpr double stiff_rate_radps = 5000.0;
@@ -115,17 +115,16 @@ class CvodeEngine::Work {
     settle();
   }
 
-  void advance(double duration_s, const Volts* volts, double voltage_v, double most_step_s,
-               const Sink* sink) {
+  void advance(double duration_s, const Volts* volts, double voltage_v, double max_step_s, const Sink* sink) {
     volts_ = volts;
     held_v_ = dynamics_.actuate(voltage_v);
-    lag_ = dynamics_.has_motor_lag() && (volts == nullptr || dynamics_.motor_time_constant_s() > least_lag_s);
+    lag_ = dynamics_.has_motor_lag() && (volts == nullptr || dynamics_.motor_time_constant_s() > min_lag_s);
     set_motor_state();
     settle();
     halt_where_ended();
     const double end_s = time_s_ + duration_s;
     while (!halted_ && end_s - time_s_ > smallest_step_s * (1.0 + std::abs(end_s)))
-      until_event(end_s, most_step_s, sink);
+      until_event(end_s, max_step_s, sink);
     if (!halted_) time_s_ = end_s;
   }
 
@@ -196,11 +195,11 @@ class CvodeEngine::Work {
     return 0;
   }
 
-  void restart(double end_s, double most_step_s) {
+  void restart(double end_s, double max_step_s) {
     pack(state_, N_VGetArrayPointer(y_.at));
     require(CVodeReInit(cvode_.at, time_s_, y_.at), "restart");
     require(CVodeSetStopTime(cvode_.at, end_s), "restart");
-    require(CVodeSetMaxStep(cvode_.at, std::isfinite(most_step_s) ? most_step_s : 0.0), "restart");
+    require(CVodeSetMaxStep(cvode_.at, std::isfinite(max_step_s) ? max_step_s : 0.0), "restart");
     const int count = static_cast<int>(watches_.count);
     require(CVodeRootInit(cvode_.at, count, count > 0 ? &Work::roots : nullptr), "restart");
     if (count == 0) return;
@@ -211,17 +210,17 @@ class CvodeEngine::Work {
   }
 
   /// One smooth stretch: from a restart to the next event or the end.
-  void until_event(double end_s, double most_step_s, const Sink* sink) {
+  void until_event(double end_s, double max_step_s, const Sink* sink) {
     const bool held = budget_.spent(time_s_);
     const double stretch_end_s = held ? std::min(end_s, time_s_ + held_stretch_s) : end_s;
     watches_ = next_events(dynamics_, state_.cart_mps, state_.theta_radps, contacts_, options_, held);
     if (volts_ != nullptr) corners_.watch((*volts_)(time_s_, state_), watches_);
-    restart(stretch_end_s, most_step_s);
+    restart(stretch_end_s, max_step_s);
     while (true) {
       ++step_count_;
       const double from_s = time_s_;
       double to_s = from_s;
-      const double toward_s = std::min(stretch_end_s, from_s + most_step_s);
+      const double toward_s = std::min(stretch_end_s, from_s + max_step_s);
       const int flag = CVode(cvode_.at, toward_s, y_.at, &to_s, CV_ONE_STEP);
       if (flag == CV_TOO_CLOSE) {
         time_s_ = stretch_end_s;
@@ -299,7 +298,7 @@ class CvodeEngine::Work {
     require(CVodeGetCurrentTime(cvode_.at, &dense.at_s), "interpolation");
     int order = 0;
     require(CVodeGetLastOrder(cvode_.at, &order), "interpolation");
-    dense.factors = std::min(order + 1, DenseStep::most_factors);
+    dense.factors = std::min(order + 1, DenseStep::max_factors);
     double factorial = 1.0;
     for (int k = 0; k < dense.factors; ++k) {
       if (k > 0) factorial *= k;
@@ -353,8 +352,8 @@ void CvodeEngine::advance(double duration_s, double voltage_v) {
   work_->advance(duration_s, nullptr, voltage_v, std::numeric_limits<double>::infinity(), nullptr);
 }
 
-void CvodeEngine::advance(double duration_s, const Volts& volts, double most_step_s, const Sink& sink) {
-  work_->advance(duration_s, &volts, 0.0, most_step_s, &sink);
+void CvodeEngine::advance(double duration_s, const Volts& volts, double max_step_s, const Sink& sink) {
+  work_->advance(duration_s, &volts, 0.0, max_step_s, &sink);
 }
 
 const PlantState<double>& CvodeEngine::state() const {

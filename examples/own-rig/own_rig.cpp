@@ -79,7 +79,7 @@ int balance(const char* rig_file, const char* gain_file, const char* plant_file)
   setup.control = upright::read_gain_file(gain_file);
   setup.limits = upright::rig_limits(setup.rig, std::nullopt);
   setup.limits.periods = static_cast<std::uint64_t>(setup.duration_s * setup.control.sample_rate_hz);
-  setup.limits.most_periods_late = upright::default_periods_late(setup.control.period_s());
+  setup.limits.max_periods_late = upright::default_periods_late(setup.control.period_s());
 
   upright::VirtualClock clock;  // a real card needs upright::MonotonicClock
   const auto rig =

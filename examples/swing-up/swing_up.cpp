@@ -90,7 +90,7 @@ int swing_up(const std::string& rig_file, const std::string& gain_file, bool rea
   setup.theta0_rad = std::numbers::pi;  // hanging
   setup.limits = upright::rig_limits(setup.rig, setup.plant);
   setup.limits.periods = static_cast<std::uint64_t>(setup.duration_s * setup.control.sample_rate_hz);
-  setup.limits.most_periods_late = upright::default_periods_late(setup.control.period_s());
+  setup.limits.max_periods_late = upright::default_periods_late(setup.control.period_s());
 
   upright::VirtualClock virtual_clock;
   upright::MonotonicClock real_clock;

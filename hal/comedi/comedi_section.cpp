@@ -46,12 +46,12 @@ void analog_keys(YamlKeys& keys, int width_bits, ComediEncoder& encoder) {
   range_key(keys, encoder.range);
   keys.one_of("reference", encoder.reference, references, ComediReference::ground);
   keys.number("counts_per_v", encoder.counts_per_v, Range{1e-3, 1e9});
-  const double most = std::max(std::abs(encoder.range.low_v), std::abs(encoder.range.high_v));
+  const double largest_v = std::max(std::abs(encoder.range.low_v), std::abs(encoder.range.high_v));
   const double room = std::ldexp(1.0, width_bits - 1) - 1.0;
-  keys.check(
-      "counts_per_v", most * encoder.counts_per_v <= room,
-      "gives more counts than the calibration's " + std::to_string(width_bits) + " bits can hold",
-      "reduce counts_per_v to at most " + exact_text(std::floor(room / most)) + ", or set width_bits to 32");
+  keys.check("counts_per_v", largest_v * encoder.counts_per_v <= room,
+             "gives more counts than the calibration's " + std::to_string(width_bits) + " bits can hold",
+             "reduce counts_per_v to at most " + exact_text(std::floor(room / largest_v)) +
+                 ", or set width_bits to 32");
 }
 
 void encoder_keys(YamlKeys& keys, const std::string& device, int width_bits, ComediEncoder& encoder) {

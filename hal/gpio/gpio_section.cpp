@@ -13,7 +13,7 @@ namespace upright {
 namespace {
 
 constexpr int highest_line = 1023;
-constexpr std::size_t most_limit_switches = 8;
+constexpr std::size_t max_limit_switches = 8;
 constexpr Words<3> biases = {"as_is", "pull_up", "pull_down"};
 constexpr Words<2> ends = {"plus_x", "minus_x"};
 
@@ -65,9 +65,9 @@ void rig_keys(YamlKeys& keys, GpioRig& rig, TakenLines& taken) {
       input_keys(map, limit.line, taken);
     });
     const std::size_t count = rig.limit_switches.size();
-    keys.check("limit_switches", count > 0 && count <= most_limit_switches,
+    keys.check("limit_switches", count > 0 && count <= max_limit_switches,
                "has " + std::to_string(count) + " switches",
-               "list 1 to " + std::to_string(most_limit_switches) + " switches, or remove limit_switches");
+               "list 1 to " + std::to_string(max_limit_switches) + " switches, or remove limit_switches");
   }
   keys.optional_map("amplifier_enable", rig.amplifier_enable, output);
   keys.optional_map("heartbeat", rig.heartbeat,

@@ -7,13 +7,13 @@ namespace upright {
 namespace {
 
 /// So few edges are no rate yet: a contact bounces, a shaft trembles.
-constexpr double least_burst = 8.0;
+constexpr double min_burst = 8.0;
 
 }  // namespace
 
 QuadratureDecoder::QuadratureDecoder(double fastest_edges_per_s) noexcept
     : fastest_edges_per_s_(fastest_edges_per_s),
-      most_edges_(std::max(least_burst, fastest_edges_per_s * burst_s)) {}
+      max_edges_(std::max(min_burst, fastest_edges_per_s * burst_s)) {}
 
 void QuadratureDecoder::start(LinePair levels) noexcept {
   levels_ = levels;
@@ -34,7 +34,7 @@ bool QuadratureDecoder::too_fast(std::int64_t time_ns) noexcept {
   have_last_ = true;
   last_ns_ = time_ns;
   burst_ = std::max(0.0, burst_ - fastest_edges_per_s_ * std::max(0.0, passed_s)) + 1.0;
-  return burst_ > most_edges_;
+  return burst_ > max_edges_;
 }
 
 RigFault QuadratureDecoder::take(const Edge& edge) noexcept {

@@ -53,7 +53,7 @@ class QuadratureDecoder {
   bool too_fast(std::int64_t time_ns) noexcept;
 
   double fastest_edges_per_s_;
-  double most_edges_;   // in a burst
+  double max_edges_;    // in a burst
   double burst_ = 0.0;  // edges not yet paid for by time
   std::int64_t last_ns_ = 0;
   bool have_last_ = false;

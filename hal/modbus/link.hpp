@@ -62,7 +62,7 @@ class ModbusLink {
   std::int64_t last_unanswered_ns() const noexcept { return unanswered_ns_; }
 
  private:
-  static constexpr int most_registers = 125;
+  static constexpr int max_registers = 125;
 
   void find_block() noexcept;
   std::array<std::uint16_t, 2> voltage_words(double voltage_v) const noexcept;
@@ -88,7 +88,7 @@ class ModbusLink {
   int other_block_ = 0;  // asked for to tell an answer from those to earlier requests
   std::unique_ptr<ModbusChannel> channel_;
   Pdu reply_;
-  std::array<std::uint16_t, most_registers> registers_{};
+  std::array<std::uint16_t, max_registers> registers_{};
 };
 
 }  // namespace upright

@@ -15,7 +15,7 @@ namespace upright {
 namespace {
 
 constexpr int last_address = 65535;
-constexpr int most_registers_per_read = 125;
+constexpr int max_registers_per_read = 125;
 
 constexpr Words<3> parities = {"none", "even", "odd"};
 constexpr Words<2> exchanges = {"read_write", "separate"};
@@ -127,7 +127,7 @@ void check_registers(const YamlMap& map, const ModbusRig& rig, const RigRoles& r
     first = std::min(first, block.first);
     end = std::max(end, block.first + block.count);
   }
-  if (end - first > most_registers_per_read)
+  if (end - first > max_registers_per_read)
     map.fail("counters",
              "span " + std::to_string(end - first) + " registers, including boot count and status",
              "place them within 125 registers, because one request reads them all");

@@ -69,9 +69,9 @@ class SerialChannel final : public ModbusChannel {
   void flush() noexcept override { modbus_flush(context_.get()); }
 
   void await_silence(double quiet_s) noexcept override {
-    constexpr int most_rounds = 4;
+    constexpr int max_rounds = 4;
     const int quiet_ms = std::max(1, static_cast<int>(quiet_s * 1e3));
-    for (int i = 0; i < most_rounds; ++i) {
+    for (int i = 0; i < max_rounds; ++i) {
       pollfd line{modbus_get_socket(context_.get()), POLLIN, 0};
       if (poll(&line, 1, quiet_ms) <= 0) return;
       flush();

@@ -42,17 +42,17 @@ void StopSequence::reset(bool reads_back, double watchdog_s) noexcept {
 }
 
 double StopSequence::patience_s() const noexcept {
-  constexpr int most_doublings = 16;
+  constexpr int max_doublings = 16;
   return std::min(longest_patience_s,
-                  std::ldexp(rig_.response_timeout_s, std::min(attempts_, most_doublings)));
+                  std::ldexp(rig_.response_timeout_s, std::min(attempts_, max_doublings)));
 }
 
 std::int64_t StopSequence::pause_ns() const noexcept {
-  constexpr int most_doublings = 8;
+  constexpr int max_doublings = 8;
   const double watchdog_s = report_.watchdog_s;
   if (watchdog_s > 0.0 && watchdog_s <= longest_silence_s && attempts_ % attempts_per_silence == 0)
     return static_cast<std::int64_t>(1e9 * (silence_share * watchdog_s + silence_margin_s));
-  return std::min(longest_pause_ns, first_pause_ns << std::min(attempts_, most_doublings));
+  return std::min(longest_pause_ns, first_pause_ns << std::min(attempts_, max_doublings));
 }
 
 void StopSequence::note(RigFault fault) noexcept {

@@ -54,8 +54,8 @@ std::string prove_output(QuanserCard& card) {
 }
 
 void wait_for_expiry(double watchdog_s) {
-  constexpr double surely = 3.0, at_least_s = 0.05;
-  std::this_thread::sleep_for(std::chrono::duration<double>(surely * watchdog_s + at_least_s));
+  constexpr double surely = 3.0, min_extra_s = 0.05;
+  std::this_thread::sleep_for(std::chrono::duration<double>(surely * watchdog_s + min_extra_s));
 }
 
 std::string prove_watchdog(QuanserCard& card) {

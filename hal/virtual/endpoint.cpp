@@ -23,7 +23,7 @@ namespace {
 constexpr std::uint32_t partial_request_us = 20'000;  // a request that stops in the middle is given up
 constexpr std::uint32_t exception_pause_us =
     100;  // libmodbus sleeps this long before it reports an exception
-constexpr int most_clients = 8;
+constexpr int max_clients = 8;
 
 std::string reason() {
   return std::strerror(errno);
@@ -81,7 +81,7 @@ void Endpoint::listen_tcp(const std::string& host, int port) {
   setsockopt(listener_.get(), SOL_SOCKET, SO_REUSEADDR, &on, sizeof on);
   socklen_t size = sizeof address;
   if (bind(listener_.get(), reinterpret_cast<sockaddr*>(&address), size) != 0 ||
-      listen(listener_.get(), most_clients) != 0)
+      listen(listener_.get(), max_clients) != 0)
     throw DeviceError("cannot listen on " + host + ":" + std::to_string(port) + " (" + reason() +
                       "): choose another port, or 0 for any free port");
   getsockname(listener_.get(), reinterpret_cast<sockaddr*>(&address), &size);
@@ -131,7 +131,7 @@ bool Endpoint::accept_client() {
   if (client.get() < 0) return false;
   const int on = 1;
   setsockopt(client.get(), IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
-  if (peers_.size() >= most_clients) peers_.erase(peers_.begin());
+  if (peers_.size() >= max_clients) peers_.erase(peers_.begin());
   Peer peer;
   peer.descriptor = std::move(client);
   peers_.push_back(std::move(peer));

@@ -146,7 +146,7 @@ class SignalHistory {
     double begin_s = 0.0;
     double at_s = 0.0;
     int count = 0;
-    std::array<double, DenseStep::most_factors> factor{};
+    std::array<double, DenseStep::max_factors> factor{};
   };
 
   std::deque<Step> steps_;

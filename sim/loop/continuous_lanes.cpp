@@ -292,10 +292,10 @@ class ContinuousRuns {
                   bend = Lanes(2.0) * (first + last) - Lanes(4.0) * between;
       const LaneMask arched = (bend < zero) & (slope > zero) & (slope < Lanes(-2.0) * bend) & !(last > zero);
       highest = select(arched, slope / select(arched, Lanes(-2.0) * bend, Lanes(1.0)), Lanes(1.0));
-      const Lanes most = select(arched, first + half * slope * highest, last);
-      most.store(most_excess_n_.data());
+      const Lanes excess = select(arched, first + half * slope * highest, last);
+      excess.store(max_excess_n_.data());
       last.store(end_excess_n_.data());
-      eventful = eventful | (rests & (most > zero));
+      eventful = eventful | (rests & (excess > zero));
     }
     const std::uint32_t candidates = eventful.bits() & accepted;
     if (candidates == 0) {
@@ -312,7 +312,7 @@ class ContinuousRuns {
       if (direction_[i] == 0.0) {
         if (budget_[i].spent(time_s_[i])) continue;
         if (end_excess_n_[i] <= 0.0) {
-          if (shortest || most_excess_n_[i] <= at_edge_n) continue;
+          if (shortest || max_excess_n_[i] <= at_edge_n) continue;
           proposed_s_[i] = peaks[i] * step;
           cut_[i] = Cut::before_breakaway;
           accepted &= ~(1u << i);
@@ -381,7 +381,7 @@ class ContinuousRuns {
     widen(theta_low_, theta_high_, y.theta_rad, theta, end.theta_rad);
     widen(cart_low_, cart_high_, y.cart_m, cart, end.cart_m);
     if (fallen_ != 0) note_falls(begin_s, h, y, k1, end, k7);
-    cart_most_ = select(mine, larger(cart_most_, larger(absolute(cart), absolute(end.cart_m))), cart_most_);
+    cart_max_ = select(mine, larger(cart_max_, larger(absolute(cart), absolute(end.cart_m))), cart_max_);
   }
 
   void note_falls(const Lanes& begin_s, const Lanes& h, const State& y, const State& k1, const State& end,
@@ -402,7 +402,7 @@ class ContinuousRuns {
       LoopResult& result = results_[case_of_[i]];
       result.fall_time_s = value(begin_s, i) + high * step;
       result.theta_amplitude_rad = setup_.fell_above_rad;
-      result.cart_amplitude_m = std::max(value(cart_most_, i), std::abs(along(&State::cart_m, high)));
+      result.cart_amplitude_m = std::max(value(cart_max_, i), std::abs(along(&State::cart_m, high)));
       result.end = {along(&State::cart_m, high),
                     along(&State::theta_rad, high),
                     along(&State::cart_mps, high),
@@ -464,10 +464,10 @@ class ContinuousRuns {
   }
 
   void choose_step(std::size_t i, double wanted_s) {
-    const double most = delay_s_[i] > 0.0 ? std::min(longest_step_s, delay_s_[i]) : longest_step_s;
+    const double max_step_s = delay_s_[i] > 0.0 ? std::min(longest_step_s, delay_s_[i]) : longest_step_s;
     const double left = stop_s_[i] - time_s_[i];
-    double step = std::min(wanted_s, most);
-    if (left <= 1.001 * step && left <= most)
+    double step = std::min(wanted_s, max_step_s);
+    if (left <= 1.001 * step && left <= max_step_s)
       step = left;
     else if (left < 2.0 * step)
       step = 0.5 * left;
@@ -534,7 +534,7 @@ class ContinuousRuns {
     put(theta_high_, i, -infinite);
     put(cart_low_, i, infinite);
     put(cart_high_, i, -infinite);
-    put(cart_most_, i, 0.0);
+    put(cart_max_, i, 0.0);
     choose_step(i, first_step_s);
   }
 
@@ -557,11 +557,11 @@ class ContinuousRuns {
   State y_{}, k1_{};
   LaneHistory history_;
   Values time_s_{}, step_s_{}, controlled_step_s_{}, proposed_s_{}, stop_s_{}, delay_s_{};
-  Values direction_{}, excess_n_{}, end_excess_n_{}, most_excess_n_{};
+  Values direction_{}, excess_n_{}, end_excess_n_{}, max_excess_n_{};
   std::array<Cut, lane_count> cut_{};
   std::array<EventBudget, lane_count> budget_;
   std::array<Stops, lane_count> stops_;
-  Lanes theta_low_, theta_high_, cart_low_, cart_high_, cart_most_;
+  Lanes theta_low_, theta_high_, cart_low_, cart_high_, cart_max_;
   std::array<std::size_t, lane_count> case_of_{};
   std::size_t next_ = 0;
   std::uint32_t active_ = 0, stale_ = 0, event_ = 0, fallen_ = 0;

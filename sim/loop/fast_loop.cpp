@@ -128,7 +128,7 @@ class SmoothPeriod {
   }
 
   static constexpr double kink_sweep_mps = 1e-3;
-  static constexpr int most_pieces = 16;
+  static constexpr int max_pieces = 16;
 
   /// How many steps this period needs: more where the velocity sweeps over the turn of the friction.
   int pieces_for(const PlantState<Lanes>& state, const PlantState<Lanes>& first, double period_s) const {
@@ -137,7 +137,7 @@ class SmoothPeriod {
     const LaneMask near = absolute(state.cart_mps) - reach < Lanes(turning_mps_);
     const Lanes swept = select(near, reach, Lanes(0.0));
     int pieces = 1;
-    while (pieces < most_pieces && any(swept > Lanes(pieces * sweep_mps_))) pieces *= 2;
+    while (pieces < max_pieces && any(swept > Lanes(pieces * sweep_mps_))) pieces *= 2;
     return pieces;
   }
 

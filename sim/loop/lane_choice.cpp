@@ -34,9 +34,9 @@ bool has_avx512() {
 /// The lanes for this processor. UPRIGHT_LANES chooses narrower ones: baseline or avx2.
 LaneBuild widest() {
   const char* text = std::getenv("UPRIGHT_LANES");  // NOLINT(concurrency-mt-unsafe): nothing sets it
-  const std::string_view most = text != nullptr ? text : "avx512";
-  if (most == "baseline" || !has_avx2()) return baseline;
-  if (most == "avx2" || !has_avx512()) return {avx2_lanes::runs_side_by_side, avx2_lanes::run};
+  const std::string_view widest = text != nullptr ? text : "avx512";
+  if (widest == "baseline" || !has_avx2()) return baseline;
+  if (widest == "avx2" || !has_avx512()) return {avx2_lanes::runs_side_by_side, avx2_lanes::run};
   return {avx512_lanes::runs_side_by_side, avx512_lanes::run};
 }
 #else

@@ -23,7 +23,7 @@ class LaneResults {
     if (any(!(absolute(state.theta_rad) < Lanes(fell_above_rad_)))) drop_fallen(time_s, state);
     previous_theta_ = state.theta_rad;
     previous_s_ = time_s;
-    cart_most_ = larger(cart_most_, absolute(state.cart_m));
+    cart_max_ = larger(cart_max_, absolute(state.cart_m));
     if (time_s < window_begin_s_) return;
     theta_low_ = smaller(theta_low_, state.theta_rad);
     theta_high_ = larger(theta_high_, state.theta_rad);
@@ -51,7 +51,7 @@ class LaneResults {
   void drop_fallen(double time_s, PlantState<Lanes>& state) {
     auto x = state.cart_m.values(), th = state.theta_rad.values(), v = state.cart_mps.values(),
          w = state.theta_radps.values(), z = state.bristle_m.values();
-    const auto before = previous_theta_.values(), cart_most = cart_most_.values();
+    const auto before = previous_theta_.values(), cart_max = cart_max_.values();
     for (std::size_t i = 0; i < lane_count; ++i) {
       if (std::abs(th[i]) < fell_above_rad_) continue;
       if (alive(i)) {
@@ -59,7 +59,7 @@ class LaneResults {
         const double rise = std::abs(th[i]) - std::abs(before[i]);
         const double part = rise > 0.0 ? (fell_above_rad_ - std::abs(before[i])) / rise : 1.0;
         fall_time_s_[i] = previous_s_ + std::clamp(part, 0.0, 1.0) * (time_s - previous_s_);
-        fallen_cart_m_[i] = std::max(cart_most[i], std::abs(x[i]));
+        fallen_cart_m_[i] = std::max(cart_max[i], std::abs(x[i]));
         fallen_[i] = {x[i], th[i], v[i], w[i], 0.0, z[i]};
       }
       x[i] = th[i] = v[i] = w[i] = z[i] = 0.0;
@@ -76,7 +76,7 @@ class LaneResults {
   std::uint32_t alive_;
   std::array<double, lane_count> fall_time_s_, fallen_cart_m_{};
   std::array<PlantState<double>, lane_count> fallen_{};
-  Lanes previous_theta_, cart_most_;
+  Lanes previous_theta_, cart_max_;
   Lanes theta_low_{infinite}, theta_high_{-infinite}, cart_low_{infinite}, cart_high_{-infinite};
   double previous_s_ = 0.0;
 };

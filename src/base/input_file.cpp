@@ -71,13 +71,13 @@ void InputFile::check() const {
   if (bad()) throw ConfigError(file_.string() + " could not be read completely: check the disk");
 }
 
-std::string whole_file(const std::filesystem::path& file, std::uintmax_t most_bytes) {
+std::string whole_file(const std::filesystem::path& file, std::uintmax_t max_bytes) {
   InputFile in(file);
   std::string text;
   constexpr std::size_t part_bytes = 1 << 16;
   for (std::size_t kept = 0; in; kept = text.size()) {
-    if (kept > most_bytes || in.bytes() > most_bytes)
-      throw ConfigError(file.string() + " is larger than " + std::to_string(most_bytes >> 20) +
+    if (kept > max_bytes || in.bytes() > max_bytes)
+      throw ConfigError(file.string() + " is larger than " + std::to_string(max_bytes >> 20) +
                         " MiB: name a smaller file");
     text.resize(kept + part_bytes);
     in.read(text.data() + kept, part_bytes);

@@ -35,7 +35,7 @@ class InputFile final : public std::istream {
   __gnu_cxx::stdio_filebuf<char> buffer_;
 };
 
-/// The contents of a regular file. Throws ConfigError as InputFile does, and above `most_bytes`.
-std::string whole_file(const std::filesystem::path& file, std::uintmax_t most_bytes = largest_text_bytes);
+/// The contents of a regular file. Throws ConfigError as InputFile does, and above `max_bytes`.
+std::string whole_file(const std::filesystem::path& file, std::uintmax_t max_bytes = largest_text_bytes);
 
 }  // namespace upright

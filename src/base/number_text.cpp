@@ -9,7 +9,7 @@ namespace upright {
 
 namespace {
 
-constexpr double least_plain = 1e-4, least_exponential = 1e7;
+constexpr double min_plain = 1e-4, min_exponential = 1e7;
 
 std::string printed(const char* format, int digits, double value) {
   char buffer[64];
@@ -43,7 +43,7 @@ std::string number_text(double value, int digits) {
   if (text.find('e') == std::string::npos) return text;
   // What rounding makes of it decides: 9999999.9 is ten millions.
   const double rounded = std::strtod(text.c_str(), nullptr);
-  if (std::abs(rounded) >= least_plain && std::abs(rounded) < least_exponential)
+  if (std::abs(rounded) >= min_plain && std::abs(rounded) < min_exponential)
     return printed("%.*f", 0, rounded);
   return with_power(text);
 }
@@ -56,9 +56,9 @@ std::string number_within(double value, double low, double high) {
   const double half_width = 0.5 * (high - low);
   if (!(half_width > 0.0) || !std::isfinite(half_width) || !std::isfinite(value))
     return number_text(value, 5);
-  constexpr int most_decimals = 8;
+  constexpr int max_decimals = 8;
   const int decimals = 1 - decimal_exponent(half_width);
-  if (decimals > most_decimals || half_width >= least_exponential) return number_text(value, 5);
+  if (decimals > max_decimals || half_width >= min_exponential) return number_text(value, 5);
   // Without decimals, digits that the width does not bear become zeros.
   const double step = std::strtod(("1e" + std::to_string(-decimals)).c_str(), nullptr);
   const std::string text = printed("%.*f", std::max(decimals, 0), std::round(value / step) * step);

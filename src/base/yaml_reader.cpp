@@ -200,10 +200,10 @@ struct YamlMap::Node {
   /// A key that nobody asked for and that is nearly `key`: what was meant by it.
   YAML::Node slip_for(const std::string& key) const {
     constexpr std::size_t shortest = 6;  // below it other keys are as near as slips
-    const std::size_t most = key.size() < shortest ? 1 : std::max<std::size_t>(2, key.size() / 4);
+    const std::size_t max_distance = key.size() < shortest ? 1 : std::max<std::size_t>(2, key.size() / 4);
     for (const auto& entry : yaml)
       if (entry.first.IsScalar() && asked.count(entry.first.Scalar()) == 0 &&
-          edit_distance(entry.first.Scalar(), key) <= most)
+          edit_distance(entry.first.Scalar(), key) <= max_distance)
         return entry.first;
     return YAML::Node(YAML::NodeType::Undefined);
   }

@@ -40,10 +40,10 @@ struct Candidate {
 
 /// Whether a line of the file begins with this key.
 bool has_key(const fs::path& file, const std::string& key) {
-  constexpr int most_lines = 1000;  // plant files and others are far shorter; a log is not worth reading
+  constexpr int max_lines = 1000;  // plant files and others are far shorter; a log is not worth reading
   std::ifstream in(file);
   std::string line;
-  for (int i = 0; i < most_lines && std::getline(in, line); ++i)
+  for (int i = 0; i < max_lines && std::getline(in, line); ++i)
     if (line.starts_with(key + ":")) return true;
   return false;
 }

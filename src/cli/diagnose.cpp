@@ -246,10 +246,10 @@ std::vector<std::string> provenance(const Diagnosis& d, const DiagnoseFlags& fla
 
 /// The residual force and torque on held-out data, before and after, thinned to what a plot can show.
 void write_residuals(const Diagnosis& d, std::ostream& out) {
-  constexpr std::size_t most_rows = 6000;
+  constexpr std::size_t max_rows = 6000;
   std::size_t count = 0;
   for (const ResidualTrace& trace : d.residual_before) count += trace.time_s.size();
-  const std::size_t stride = 1 + count / most_rows;
+  const std::size_t stride = 1 + count / max_rows;
   out << "segment,run,time_s,cart_m,cart_velocity_mps,voltage_v,force_before_n,force_after_n,torque_before_"
          "nm,torque_after_nm\n";
   for (std::size_t s = 0; s < d.residual_before.size(); ++s) {
@@ -270,13 +270,13 @@ void write_residuals(const Diagnosis& d, std::ostream& out) {
 /// found. A cell is empty where there is nothing measured.
 void write_traces(const Diagnosis& d, const Plant& given, const std::vector<Measurement>& runs,
                   std::ostream& out) {
-  constexpr std::size_t most_rows = 20000;
+  constexpr std::size_t max_rows = 20000;
   const std::vector<Segment> segments = held_out_segments(d, runs);
   const std::vector<SimulatedSegment> before = simulate_segments(given, runs, segments);
   const std::vector<SimulatedSegment> after = simulate_segments(d.model, runs, segments);
   std::size_t count = 0;
   for (const SimulatedSegment& trace : before) count += trace.time_s.size();
-  const std::size_t stride = 1 + count / most_rows;
+  const std::size_t stride = 1 + count / max_rows;
   out << "segment,run,time_s,voltage_v,cart_m,cart_before_m,cart_after_m,theta_rad,theta_before_rad,theta_"
          "after_rad\n";
   const auto cell = [&](const std::vector<double>& values, std::size_t k) {
@@ -325,7 +325,7 @@ ExitCode run_diagnose(const DiagnoseFlags& flags) {
   const NamedRuns named = runs_named(flags.data);
   std::vector<Measurement> runs = read_measurements(named.runs);
   if (!flags.trust_data) refuse_mistakes(runs, plant);
-  runs = within_samples(std::move(runs), most_diagnosed_samples);
+  runs = within_samples(std::move(runs), max_diagnosed_samples);
   const std::vector<Measurement> unseen = validation_runs(flags, plant);
   if (!flags.out.empty() && fs::exists(fs::path(flags.out) / "diagnosis.json"))
     throw ConfigError(flags.out + " already holds a diagnosis: choose another folder with --out");

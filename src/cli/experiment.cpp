@@ -101,7 +101,7 @@ void print_plan(const std::vector<PlannedPiece>& plan, const ExperimentSetup& se
   std::printf("%s: %s\n", setup.experiment.name.c_str(), setup.experiment.why.c_str());
   for (const PlannedPiece& p : plan)
     std::printf("  %-24s %-18s %7.1f s  to %5.0f mm  %5.2f V\n", p.piece.label.c_str(), p.piece.kind->name(),
-                p.duration_s, p.farthest_m * 1e3, p.most_v);
+                p.duration_s, p.farthest_m * 1e3, p.max_v);
   std::fflush(stdout);
 }
 
@@ -112,7 +112,7 @@ Json json_of(const std::vector<PlannedPiece>& plan) {
                     {"kind", p.piece.kind->name()},
                     {"duration_s", p.duration_s},
                     {"farthest_m", p.farthest_m},
-                    {"largest_v", p.most_v}});
+                    {"largest_v", p.max_v}});
   return list;
 }
 
@@ -136,7 +136,7 @@ Json overrun_json(const ExperimentSetup& setup, const Piece& piece, const Experi
   if (!balances(piece)) return nullptr;
   ControlConfig control = control_of(setup, piece, trial.controller);
   control.delay_s = trial.delay_s;
-  return overrun_limit(setup.plant, control).most_periods_late;
+  return overrun_limit(setup.plant, control).max_periods_late;
 }
 
 Json json_of(const ExperimentResult& result, const ExperimentSetup& setup, const std::vector<Piece>& pieces,

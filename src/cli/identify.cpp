@@ -183,7 +183,7 @@ ExitCode run_identify(const IdentifyFlags& flags) {
   std::vector<Measurement> runs;
   for (const fs::path& data : named.runs) runs.push_back(read_measurement(data));
   if (!flags.trust_data) refuse_mistakes(runs, base);
-  runs = within_samples(std::move(runs), most_identified_samples);
+  runs = within_samples(std::move(runs), max_identified_samples);
   if (!flags.out.empty() && fs::exists(fs::path(flags.out) / "identification.json"))
     throw ConfigError(flags.out + " already holds an identification: choose another folder with --out");
   IdentificationOptions options;

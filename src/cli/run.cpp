@@ -195,7 +195,7 @@ Json json_of(const SessionResult& result, const LoopLimits& limits, const Overru
     document["timing"][name] = histogram_json(durations);
   });
   document["delay_margin"] = json_of(overrun.tolerance);
-  document["most_periods_late"] = limits.most_periods_late;
+  document["most_periods_late"] = limits.max_periods_late;
   document["overrun_limit"] = overrun.sentence;
   document["warning"] = overrun.warning.empty() ? Json(nullptr) : Json(overrun.warning);
   document["scheduling"] = result.scheduling.note;

@@ -117,22 +117,22 @@ void add_virtual_rig(CommandLine& line) {
   command.option("--duration", flags->duration_s, "How long to serve [s] (default: 0, until interrupted)")
       .from_to(0.0, 1e6);
   command.flag("--no-pace", flags->no_pace, "Do not limit a pseudo-terminal to its baud rate");
-  constexpr int most_replies = 1'000'000'000;
+  constexpr int max_replies = 1'000'000'000;
   command.option("--inject-seed", flags->faults.seed, "Seed of the injected faults");
   command.option("--inject-late-ms", flags->late_ms, "Delay of a late reply [ms]").from_to(0.0, 1e5);
   command.option("--inject-late-every", flags->faults.late_every, "Delay one reply in N")
-      .from_to(0, most_replies);
+      .from_to(0, max_replies);
   command.option("--inject-drop-every", flags->faults.drop_every, "Drop one reply in N")
-      .from_to(0, most_replies);
+      .from_to(0, max_replies);
   command.option("--inject-corrupt-every", flags->faults.corrupt_every, "Flip one bit in one reply in N")
-      .from_to(0, most_replies);
+      .from_to(0, max_replies);
   command
       .option("--inject-stale-every", flags->faults.stale_every,
               "Repeat the previous reply instead of one reply in N")
-      .from_to(0, most_replies);
+      .from_to(0, max_replies);
   command
       .option("--inject-reorder-every", flags->faults.reorder_every, "Send one reply in N after the next one")
-      .from_to(0, most_replies);
+      .from_to(0, max_replies);
   const auto once = [&command](const char* name, double& after_s, const std::string& what) {
     command.option(name, after_s, what + " once, this many seconds after the controller takes over")
         .from_to(0.0, 1e6);

@@ -44,15 +44,15 @@ void doubt(Sentences& doubts, const PlausibleRange& range, double value) {
 }
 
 /// A lost reply or two are ordinary: a watchdog that is shorter ends runs that nothing is wrong with.
-constexpr double fewest_periods_of_a_watchdog = 3.0;
+constexpr double min_periods_of_a_watchdog = 3.0;
 
 void compare_watchdogs(const RigFile& rig, const ControlConfig& control, Sentences& warnings) {
   const double period_s = control.period_s();
   const auto compare = [&](const char* key, double time_s, const char* consequence) {
-    if (time_s >= fewest_periods_of_a_watchdog * period_s) return;
+    if (time_s >= min_periods_of_a_watchdog * period_s) return;
     warnings.push_back(std::string(key) + " is " + brief(time_s) + " s, but a period is " + brief(period_s) +
-                       " s, so " + consequence + ": set it to at least " +
-                       brief(fewest_periods_of_a_watchdog) + " periods, or raise sample_rate_hz");
+                       " s, so " + consequence + ": set it to at least " + brief(min_periods_of_a_watchdog) +
+                       " periods, or raise sample_rate_hz");
   };
   compare("watchdog_s", rig.watchdog_s, "one lost reply ends the run");
   if (rig.modbus && !is_simulated(rig) && rig.modbus->watchdog)
@@ -65,15 +65,15 @@ void compare_rig_and_plant(const RigFile& rig, const Plant& plant, Sentences& wa
   // Below, the amplifier cannot move the cart as a balancing cart moves; above, a unit is wrong.
   constexpr double slowest_mps2 = 0.2, fastest_mps2 = 2000.0;
   const double mass_kg = plant.cart_mass_kg + (plant.pendulum ? plant.pendulum->mass_kg : 0.0);
-  const double most_mps2 = rig.amplifier.limit_v * std::abs(plant.motor.force_per_volt_n) / mass_kg;
-  if (most_mps2 < slowest_mps2 || most_mps2 > fastest_mps2)
-    warnings.push_back("at the amplifier's limit the cart accelerates at " + brief(most_mps2) +
+  const double max_mps2 = rig.amplifier.limit_v * std::abs(plant.motor.force_per_volt_n) / mass_kg;
+  if (max_mps2 < slowest_mps2 || max_mps2 > fastest_mps2)
+    warnings.push_back("at the amplifier's limit the cart accelerates at " + brief(max_mps2) +
                        " m/s2, which is implausible: check amplifier.limit_v, force_per_volt_n, the masses, "
                        "and their units");
   if (!plant.pendulum) return;
   // A cart that catches a fall of a few degrees moves by about a tenth of the pendulum's length.
-  constexpr double least_share_of_length = 0.1;
-  if (rig.track_limit_m < least_share_of_length * plant.pendulum->length_to_com_m)
+  constexpr double min_share_of_length = 0.1;
+  if (rig.track_limit_m < min_share_of_length * plant.pendulum->length_to_com_m)
     warnings.push_back("track.limit_m is " + brief(rig.track_limit_m) +
                        " m, which is short for a pendulum of " + brief(plant.pendulum->length_to_com_m) +
                        " m to its centre of mass: check both values and their units");
@@ -110,10 +110,10 @@ Sentences doubts_about(const RigFile& rig) {
         "fall_angle_rad is " + brief(rig.fall_angle_rad) +
         " rad, which is beyond horizontal: set the angle at which the pendulum can no longer be caught");
   // A coarser encoder shows a balancing cart's motion in a few steps, and its velocity not at all.
-  constexpr double fewest_counts_on_the_track = 100.0;
-  if (rig.track_limit_m < fewest_counts_on_the_track * std::abs(rig.calibration.cart.per_count))
+  constexpr double min_counts_on_the_track = 100.0;
+  if (rig.track_limit_m < min_counts_on_the_track * std::abs(rig.calibration.cart.per_count))
     doubts.push_back("calibration.cart.m_per_count is " + brief(rig.calibration.cart.per_count) +
-                     " m, which gives fewer than " + brief(fewest_counts_on_the_track) +
+                     " m, which gives fewer than " + brief(min_counts_on_the_track) +
                      " counts up to track.limit_m: check both values and their units");
   return doubts;
 }

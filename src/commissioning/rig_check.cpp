@@ -209,8 +209,8 @@ double share_in_time(std::uint64_t trips) {
 
 double highest_rate_hz(const DurationHistogram& round_trip) {
   constexpr double exchanges = 2.0;
-  const double most_s = 1e-6 * round_trip.quantile_us(share_in_time(round_trip.count()));
-  return most_s > 0.0 ? 1.0 / (exchanges * most_s) : 0.0;
+  const double exchange_s = 1e-6 * round_trip.quantile_us(share_in_time(round_trip.count()));
+  return exchange_s > 0.0 ? 1.0 / (exchanges * exchange_s) : 0.0;
 }
 
 std::string verdict_sentence(Health verdict, double rate_hz, const DurationHistogram* round_trip) {

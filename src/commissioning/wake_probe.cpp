@@ -76,13 +76,13 @@ WakeProbe probe_wake_ups(double rate_hz, double duration_s, bool loaded, const R
 
 Finding judge_wake_ups(const std::string& subject, const DurationHistogram& late, double period_s) {
   constexpr double good_share = 0.1, bad_share = 0.5;
-  const double period_us = 1e6 * period_s, most_us = late.quantile_us(0.999);
+  const double period_us = 1e6 * period_s, p999_us = late.quantile_us(0.999);
   char what[160];
   std::snprintf(what, sizeof what,
                 "latency %.0f us (50 %%), %.0f us (99.9 %%), %.0f us (max), period %.0f us",
-                late.quantile_us(0.5), most_us, late.max_us(), period_us);
-  if (most_us <= good_share * period_us) return {subject, Health::good, what, ""};
-  return {subject, most_us > bad_share * period_us ? Health::bad : Health::poor, what,
+                late.quantile_us(0.5), p999_us, late.max_us(), period_us);
+  if (p999_us <= good_share * period_us) return {subject, Health::good, what, ""};
+  return {subject, p999_us > bad_share * period_us ? Health::bad : Health::poor, what,
           "lower sample_rate_hz, or apply the remedies above: kernel, processors, governor, scheduling"};
 }
 

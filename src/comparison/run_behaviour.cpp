@@ -13,10 +13,10 @@ namespace upright {
 namespace {
 
 constexpr double last_part = 1.0 / 3.0;
-constexpr double least_window_s = 1.0;  // the cart's hunting takes about a second from jump to jump
-constexpr double least_batch_s = 1.0;   // the same: a batch must hold what the next one is to repeat
-constexpr std::size_t least_batches = 5, most_batches = 20;
-constexpr std::uint64_t least_rows = 20;  // of a window: fewer say nothing of an rms
+constexpr double min_window_s = 1.0;  // the cart's hunting takes about a second from jump to jump
+constexpr double min_batch_s = 1.0;   // the same: a batch must hold what the next one is to repeat
+constexpr std::size_t min_batches = 5, max_batches = 20;
+constexpr std::uint64_t min_rows = 20;  // of a window: fewer say nothing of an rms
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
 double mean_of(const std::vector<double>& values) {
@@ -38,14 +38,14 @@ double neighbours_correlation(const std::vector<double>& values) {
   if (!(variance > 0.0)) return 0.0;
   double sum = 0.0;
   for (std::size_t i = 1; i < values.size(); ++i) sum += (values[i] - mean) * (values[i - 1] - mean);
-  constexpr double most = 0.8;
-  return std::clamp(sum / (variance * static_cast<double>(values.size() - 1)), 0.0, most);
+  constexpr double max_correlation = 0.8;
+  return std::clamp(sum / (variance * static_cast<double>(values.size() - 1)), 0.0, max_correlation);
 }
 
 Estimate root_mean_square(double mean_square, const std::vector<double>& batch_mean_squares) {
   Estimate estimate{std::sqrt(mean_square), {}};
   const std::size_t count = batch_mean_squares.size();
-  if (count < least_batches) return estimate;
+  if (count < min_batches) return estimate;
   const double r = neighbours_correlation(batch_mean_squares);
   const double half = student_quantile(count - 1) * std::sqrt(variance_of(batch_mean_squares) * (1.0 + r) /
                                                               (1.0 - r) / static_cast<double>(count));
@@ -55,7 +55,7 @@ Estimate root_mean_square(double mean_square, const std::vector<double>& batch_m
 
 Estimate peak_to_peak(double value, const std::vector<double>& of_batches) {
   Estimate estimate{value, {}};
-  if (of_batches.size() < least_batches) return estimate;
+  if (of_batches.size() < min_batches) return estimate;
   const double half = student_quantile(of_batches.size() - 1) * std::sqrt(variance_of(of_batches));
   estimate.ci95 = {std::max(0.0, value - half), value + half};
   return estimate;
@@ -121,10 +121,10 @@ void measure(const RunRecord& record, const Extent& extent, RunBehaviour& run) {
 }  // namespace
 
 BehaviourMeter::BehaviourMeter(double from_s, double to_s) : from_s_(from_s), to_s_(to_s) {
-  const double batches = std::floor((to_s - from_s) / least_batch_s);
-  const std::size_t count = batches < static_cast<double>(least_batches)
+  const double batches = std::floor((to_s - from_s) / min_batch_s);
+  const std::size_t count = batches < static_cast<double>(min_batches)
                                 ? 1
-                                : std::min(most_batches, static_cast<std::size_t>(batches));
+                                : std::min(max_batches, static_cast<std::size_t>(batches));
   batches_.assign(count, {infinity, -infinity, infinity, -infinity});
 }
 
@@ -148,7 +148,7 @@ void BehaviourMeter::add(const LogRecord& row) {
 }
 
 std::optional<Behaviour> BehaviourMeter::result() const {
-  if (to_s_ - from_s_ < least_window_s || rows_ < least_rows) return std::nullopt;
+  if (to_s_ - from_s_ < min_window_s || rows_ < min_rows) return std::nullopt;
   Batch whole{infinity, -infinity, infinity, -infinity};
   std::vector<double> carts, thetas, voltages, steps;
   for (const Batch& batch : batches_) {
@@ -205,8 +205,8 @@ std::vector<Difference> differences_between(const RunBehaviour& before, const Ru
     differences.push_back(difference);
   }
   const auto size = [](const Difference& d) {
-    const double least = std::max(std::min(d.from, d.to), 1e-12);
-    return std::max(d.from, d.to) / least;
+    const double smaller = std::max(std::min(d.from, d.to), 1e-12);
+    return std::max(d.from, d.to) / smaller;
   };
   std::stable_sort(differences.begin(), differences.end(), [&](const Difference& x, const Difference& y) {
     const bool x_clear = x.is_clear.value_or(false), y_clear = y.is_clear.value_or(false);

@@ -79,7 +79,7 @@ double Controller::feedback(const Demand& demand) const noexcept {
 
 ControlOutput Controller::step(const ControlInput& input) noexcept {
   const std::uint64_t periods = input.tick - tick_;
-  if (!started_ || periods == 0 || periods > most_missing_periods)
+  if (!started_ || periods == 0 || periods > max_missing_periods)
     begin(input);
   else
     advance_to(input, periods);

@@ -16,7 +16,7 @@ constexpr double counts_within_quantum = 2.0;
 /// How often each hypothetical cart must have left its place: once can be a matter of timing.
 constexpr int departures_for_proof = 2;
 /// Silence for less than this proves nothing: periods may be lost and readings late.
-constexpr double least_silence_s = 0.05;
+constexpr double min_silence_s = 0.05;
 
 double between(const Bounds& bounds, int third) noexcept {
   return bounds.low + 0.5 * third * (bounds.high - bounds.low);
@@ -54,31 +54,32 @@ bool CartPath::add(double time_s, double cart_m) noexcept {
   ++filling_;
   if (time_s - first_s_ < interval_s) return false;
   points_[next_] = {sum_.time_s / filling_, sum_.cart_m / filling_};
-  next_ = (next_ + 1) % most;
-  count_ = std::min(count_ + 1, most);
+  next_ = (next_ + 1) % max_points;
+  count_ = std::min(count_ + 1, max_points);
   filling_ = 0;
   return true;
 }
 
 double CartPath::duration_s() const noexcept {
-  if (count_ < fewest) return 0.0;
-  return points_[(next_ + most - 1) % most].time_s - points_[(next_ + most - count_) % most].time_s;
+  if (count_ < min_points) return 0.0;
+  return points_[(next_ + max_points - 1) % max_points].time_s -
+         points_[(next_ + max_points - count_) % max_points].time_s;
 }
 
 double CartPath::rms_from_parabola_m() const noexcept {
   const double duration = duration_s();
   if (duration <= 0.0) return 0.0;
   // 1, t and t^2 made orthogonal on the points, as they come; their part in the positions is taken away.
-  const Point latest = points_[(next_ + most - 1) % most];
-  std::array<std::array<double, most>, 3> basis;
-  std::array<double, most> rest;
+  const Point latest = points_[(next_ + max_points - 1) % max_points];
+  std::array<std::array<double, max_points>, 3> basis;
+  std::array<double, max_points> rest;
   const auto dot = [n = count_](const auto& a, const auto& b) {
     double sum = 0.0;
     for (std::size_t i = 0; i < n; ++i) sum += a[i] * b[i];
     return sum;
   };
   for (std::size_t i = 0; i < count_; ++i) {
-    const Point& point = points_[(next_ + most - count_ + i) % most];
+    const Point& point = points_[(next_ + max_points - count_ + i) % max_points];
     const double t = (point.time_s - latest.time_s) / duration + 0.5;
     basis[0][i] = 1.0;
     basis[1][i] = t;
@@ -129,7 +130,7 @@ bool EncoderWatch::cart_is_stuck(const WatchedPeriod& period, bool counted) noex
   every_moved_ = every_moved;
   // What the hypothesis without lag does at once, the real cart may do later.
   return every_moved && period.time_s - moved_since_s_ >= assumptions_.largest_lag_s &&
-         period.time_s - cart_.since_s >= least_silence_s;
+         period.time_s - cart_.since_s >= min_silence_s;
 }
 
 double EncoderWatch::parabola_tolerance_m() const noexcept {

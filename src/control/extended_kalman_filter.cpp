@@ -16,10 +16,10 @@ Plant without_static_actuator(Plant plant) {
 
 /// The estimate is good to a rounded count, so that steps need not be finer than the motion.
 EngineOptions options_for(double period_s) {
-  constexpr double most_steps = 4.0;
+  constexpr double max_steps = 4.0;
   EngineOptions options;
   options.max_step_s = period_s;
-  options.min_step_s = period_s / most_steps;
+  options.min_step_s = period_s / max_steps;
   options.step_fraction = 1.0;
   options.resolve_bristles = false;
   options.event_tolerance_s = 1e-4 * period_s;

@@ -53,8 +53,8 @@ MatrixXd generator(const DelayedFeedback& loop, double delay_s, Index count) {
 Complex polished(const DelayedFeedback& loop, double delay_s, Complex guess) {
   const auto f = [&](Complex s) { return 1.0 - transfer(loop, s) * std::exp(-s * delay_s); };
   Complex s = guess;
-  constexpr int most_steps = 20;
-  for (int i = 0; i < most_steps; ++i) {
+  constexpr int max_steps = 20;
+  for (int i = 0; i < max_steps; ++i) {
     const double aside = 1e-6 * (1.0 + std::abs(s));
     const Complex slope = (f(s + aside) - f(s - aside)) / (2.0 * aside);
     const Complex step = f(s) / slope;

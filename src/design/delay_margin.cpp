@@ -35,8 +35,8 @@ using LoopGain = std::function<Complex(double)>;
 /// The frequency between `low` and `high`, where log |gain| has different signs, at which it is zero.
 double bisected(const LoopGain& gain, double low, double high) {
   const bool rising = std::abs(gain(high)) > 1.0;
-  constexpr int most_halvings = 200;
-  for (int i = 0; i < most_halvings; ++i) {
+  constexpr int max_halvings = 200;
+  for (int i = 0; i < max_halvings; ++i) {
     const double middle = 0.5 * (low + high);
     if (middle <= low || middle >= high) break;
     if ((std::abs(gain(middle)) > 1.0) == rising)
@@ -47,12 +47,12 @@ double bisected(const LoopGain& gain, double low, double high) {
   return 0.5 * (low + high);
 }
 
-/// Smallest delay >= `least_s` at which gain e^(-j w delay) = 1.
-double delay_at(Complex gain, double frequency, double least_s) {
+/// Smallest delay >= `min_s` at which gain e^(-j w delay) = 1.
+double delay_at(Complex gain, double frequency, double min_s) {
   double delay = std::arg(gain) / frequency;
   const double turn = two_pi / frequency;
-  delay += turn * std::ceil((least_s - delay) / turn);
-  return delay < least_s ? delay + turn : delay;
+  delay += turn * std::ceil((min_s - delay) / turn);
+  return delay < min_s ? delay + turn : delay;
 }
 
 bool gain_falls(const LoopGain& gain, double frequency) {
@@ -209,8 +209,8 @@ Crossing sampled_crossing(const LinearSampledLoop& loop, std::pair<double, doubl
   double w = bisected(plain, bracket.first, bracket.second);
   const bool destabilizing = gain_falls(plain, w);
   double delay = delay_at(plain(w), w, 0.0);
-  constexpr int most_corrections = 30;
-  for (int i = 0; i < most_corrections; ++i) {
+  constexpr int max_corrections = 30;
+  for (int i = 0; i < max_corrections; ++i) {
     const LoopGain lined = [&](double v) { return plain(v) * loop.line(boundary(v), delay); };
     for (const double reach : {1e-3, 1e-2, 5e-2, 0.2}) {
       const double low = w * (1.0 - reach), high = w * (1.0 + reach);
@@ -302,8 +302,8 @@ OverrunTolerance overrun_tolerance(const Plant& plant, const ControlConfig& conf
     tolerance.critical_delay_s = margin.critical_delay_s;
     tolerance.extra_delay_s = std::max(0.0, margin.critical_delay_s - config.delay_s);
   }
-  constexpr double most_periods = 1e6;
-  const double periods = std::min(most_periods, tolerance.extra_delay_s / config.period_s());
+  constexpr double max_periods = 1e6;
+  const double periods = std::min(max_periods, tolerance.extra_delay_s / config.period_s());
   tolerance.missed_periods = std::max(0, static_cast<int>(std::ceil(periods - 1e-9)) - 1);
   tolerance.sentence = sentence_for(tolerance, config);
   return tolerance;

@@ -47,7 +47,7 @@ LoopMargin continuous_margin(const Plant& plant, const ControlConfig& config, do
 LoopMargin continuous_margin(const Plant& plant, const Gains& gains, double smoothing);
 
 /// Includes hold, estimator, delay line with interpolation, and predictor. `confirm`: compute the roots
-/// on both sides, if the delay is not too long for it (LinearSampledLoop::most_periods). `extra`: whether
+/// on both sides, if the delay is not too long for it (LinearSampledLoop::max_periods). `extra`: whether
 /// the delay is the gain file's, which a state estimator models, or an unmodelled delay of the actuator
 /// in addition to the gain file's.
 LoopMargin sampled_margin(const Plant& plant, const ControlConfig& config, double smoothing,

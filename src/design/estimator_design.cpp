@@ -105,11 +105,11 @@ EstimatorDesign design_with_estimator(const Plant& plant, const EstimatorRequest
     design.widened = widen_margin(sliding, margin, design.config);
     adopt(*design.widened, design.gains.design);
   }
-  constexpr int most_halvings = 12;
-  for (int i = 0; i <= most_halvings; ++i) {
+  constexpr int max_halvings = 12;
+  for (int i = 0; i <= max_halvings; ++i) {
     design.bears_unmodelled_s = borne_s(sliding, design.config, ExtraDelay::unmodelled);
     if (design.bears_unmodelled_s >= wanted_s) break;
-    if (i < most_halvings) *noise *= 0.5;
+    if (i < max_halvings) *noise *= 0.5;
   }
   if (design.bears_unmodelled_s <= 0.0)
     throw ConfigError(

@@ -227,7 +227,7 @@ double LinearSampledLoop::remembered_periods(double delay_s) const {
 }
 
 bool LinearSampledLoop::has_roots(double delay_s) const {
-  return remembered_periods(delay_s) <= most_periods;
+  return remembered_periods(delay_s) <= max_periods;
 }
 
 MatrixXd LinearSampledLoop::closed_loop(double delay_s) const {

@@ -38,7 +38,7 @@ class LinearSampledLoop {
 
   /// Largest number of periods of delay, prediction and input delay for which roots are computed: about 5
   /// s of computing.
-  static constexpr double most_periods = 1200.0;
+  static constexpr double max_periods = 1200.0;
   /// Whether the loop has at most that many.
   bool has_roots(double delay_s) const;
   /// The state matrix of the closed loop over one period; stable if all eigenvalues are inside the unit

@@ -50,11 +50,11 @@ Plant model_with(const Plant& given, const Plant& fitted, const std::vector<std:
 
 std::vector<MovedNumber> moved_numbers(const Plant& given, const Plant& model, const DataRange& range,
                                        const PriorPolicy& prior) {
-  constexpr double least_share = 1e-3;
+  constexpr double min_share = 1e-3;
   std::vector<MovedNumber> moved;
   const auto note = [&](const std::string& name, std::string_view unit, double file, double fitted,
                         double sigma) {
-    if (std::abs(fitted - file) <= least_share * std::abs(file)) return;
+    if (std::abs(fitted - file) <= min_share * std::abs(file)) return;
     moved.push_back(
         {name, std::string(unit), file, fitted, file - half_width * sigma, file + half_width * sigma});
   };

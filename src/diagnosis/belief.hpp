@@ -8,9 +8,9 @@
 namespace upright {
 
 /// The Gaussian with this mean and covariance. A parameter without variance is believed to be where it is,
-/// within `least_sigma`. Nearly the same force twice makes a covariance singular; the rounding of that does
+/// within `min_sigma`. Nearly the same force twice makes a covariance singular; the rounding of that does
 /// not become a belief in the impossible.
 GaussianPrior belief_of(const Eigen::VectorXd& mean, const Eigen::MatrixXd& covariance,
-                        const Eigen::VectorXd& least_sigma);
+                        const Eigen::VectorXd& min_sigma);
 
 }  // namespace upright

@@ -44,7 +44,7 @@ FreeParameter free_parameter(std::size_t effect, std::size_t index, const DataRa
 /// A force along the track counts as one that repeats when a run passes some of its crests. Several runs at
 /// different places pass the same crests together, but each could as well have a force of its own.
 double longest_pitch_m(const DataRange& range, const PriorPolicy& prior) {
-  return std::max(prior.least_longest_pitch_m, range.longest_travel_m / prior.crests_of_pitch);
+  return std::max(prior.min_longest_pitch_m, range.longest_travel_m / prior.crests_of_pitch);
 }
 
 }  // namespace
@@ -89,8 +89,8 @@ bool moves_enough(const std::vector<Measurement>& runs, const ExcitationPolicy& 
     return values.empty() ? 0.0 : *high - *low;
   };
   return std::any_of(runs.begin(), runs.end(), [&](const Measurement& run) {
-    return range(run.cart_m) > policy.least_steps * std::sqrt(12.0) * run.cart_noise_m() ||
-           range(run.theta_rad) > policy.least_steps * std::sqrt(12.0) * run.theta_noise_rad();
+    return range(run.cart_m) > policy.min_steps * std::sqrt(12.0) * run.cart_noise_m() ||
+           range(run.theta_rad) > policy.min_steps * std::sqrt(12.0) * run.theta_noise_rad();
   });
 }
 
@@ -105,33 +105,33 @@ std::vector<FreeParameter> free_parameters(std::size_t effect, const DataRange& 
     if (info.enters == Enters::cart && info.dry && info.parameters[i].unit == "N" &&
         range.largest_force_n > 0.0) {
       // Dry friction that the motor cannot overcome would hold the cart for good.
-      p.high = std::min(p.high, prior.most_share_of_motor_force * range.largest_force_n);
+      p.high = std::min(p.high, prior.max_share_of_motor_force * range.largest_force_n);
     }
     if (name == "shape") {
       p.prior_mean = prior.shape_mean;
       p.prior_sigma = prior.shape_sigma;
-      p.low = prior.least_shape;
-      p.high = prior.most_shape;
+      p.low = prior.min_shape;
+      p.high = prior.max_shape;
     } else if (is_named(effect, "stribeck_friction") && name == "velocity_mps") {
-      p.low = prior.least_stribeck_mps;
-      p.high = std::max(prior.fastest_stribeck_mps, prior.most_stribeck_share * range.largest_speed_mps);
+      p.low = prior.min_stribeck_mps;
+      p.high = std::max(prior.fastest_stribeck_mps, prior.max_stribeck_share * range.largest_speed_mps);
     } else if (name == "pitch_m") {
-      p.low = prior.least_pitch_m;
+      p.low = prior.min_pitch_m;
       p.high = longest_pitch_m(range, prior);
     } else if (name == "center_m") {
       p.prior_mean = range.cart_mean_m;
       p.prior_sigma = prior.spring_center_m;
     } else if (name == "stiffness_n_per_m" && is_named(effect, "bristle_friction")) {
-      p.low = prior.least_bristle_stiffness_n_per_m;
-      p.high = prior.most_bristle_stiffness_n_per_m;
+      p.low = prior.min_bristle_stiffness_n_per_m;
+      p.high = prior.max_bristle_stiffness_n_per_m;
     } else if (is_named(effect, "input_delay")) {
-      p.high = prior.most_delay_s;
+      p.high = prior.max_delay_s;
     } else if (is_named(effect, "motor_lag")) {
-      p.low = prior.least_lag_periods * range.shortest_period_s;
-      p.high = prior.most_lag_s;
+      p.low = prior.min_lag_periods * range.shortest_period_s;
+      p.high = prior.max_lag_s;
     } else if (name == "scale") {
-      p.low = prior.least_scale;
-      p.high = prior.most_scale;
+      p.low = prior.min_scale;
+      p.high = prior.max_scale;
       p.scale = 0.1;
       p.prior_mean = 1.0;
       p.prior_sigma = prior.scale;
@@ -164,7 +164,7 @@ std::vector<FreeParameter> correction_parameters(const Plant& plant, std::size_t
     p.prior_mean = have != nullptr ? have->values[i] : info.parameters[i].neutral;
     const double relative_sigma = info.enters == Enters::parameter ? prior.base_parameter : prior.friction;
     const double size =
-        std::max(std::abs(p.prior_mean), prior.least_share_of_typical * info.parameters[i].typical);
+        std::max(std::abs(p.prior_mean), prior.min_share_of_typical * info.parameters[i].typical);
     p.prior_sigma = relative_sigma * size;
     p.scale = size;
     if (is_named(effect, "angle_offset") && have == nullptr) {
@@ -173,8 +173,8 @@ std::vector<FreeParameter> correction_parameters(const Plant& plant, std::size_t
       p.scale = p.prior_sigma;
     }
     if (info.enters == Enters::parameter) {
-      p.low = prior.least_scale;
-      p.high = prior.most_scale;
+      p.low = prior.min_scale;
+      p.high = prior.max_scale;
       p.scale = 0.1;
     }
     free.push_back(p);
@@ -229,11 +229,11 @@ std::vector<std::vector<double>> cogging_starts(const std::vector<std::pair<doub
                                                 const SearchBudget& budget) {
   std::vector<std::pair<double, std::vector<double>>> found;
   const double travel = range.cart_high_m - range.cart_low_m;
-  if (force_residual.size() < budget.least_residual_samples || travel <= 0.0) return {{0.3, 0.02, 0.0}};
+  if (force_residual.size() < budget.min_residual_samples || travel <= 0.0) return {{0.3, 0.02, 0.0}};
   const double largest = longest_pitch_m(range, prior);
   // Frequencies over the track one half-cycle apart, so that no crest is missed.
   const double spacing = 0.25 / travel;
-  const double smallest = std::max(0.001, 1.0 / (1.0 / largest + budget.most_frequencies * spacing));
+  const double smallest = std::max(0.001, 1.0 / (1.0 / largest + budget.max_frequencies * spacing));
   for (double f = 1.0 / largest; f <= 1.0 / smallest; f += spacing) {
     double ss = 0.0, sc = 0.0, cc = 0.0, sy = 0.0, cy = 0.0, s1 = 0.0, c1 = 0.0, y1 = 0.0;
     for (const auto& [x, y] : force_residual) {
@@ -266,7 +266,7 @@ std::vector<std::vector<double>> cogging_starts(const std::vector<std::pair<doub
       return std::abs(1.0 / s[1] - 1.0 / start[1]) < 4.0 * spacing;
     });
     if (!near) starts.push_back(start);
-    if (starts.size() == budget.most_pitches) break;
+    if (starts.size() == budget.max_pitches) break;
   }
   return starts.empty() ? std::vector<std::vector<double>>{{0.3, 0.02, 0.0}} : starts;
 }

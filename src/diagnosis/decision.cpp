@@ -34,29 +34,29 @@ double combined_t(const Improvement& improvement, const AcceptancePolicy& p) {
 
 /// Whether training and held-out runs both speak for it, and together beyond doubt.
 bool is_borne_out(double saving, const Improvement& improvement, const AcceptancePolicy& p) {
-  return std::min(saving, improvement.held) > p.least_evidence_of_each &&
-         saving + improvement.held > p.least_evidence_together;
+  return std::min(saving, improvement.held) > p.min_evidence_of_each &&
+         saving + improvement.held > p.min_evidence_together;
 }
 
 /// Evidence on the training runs that only something missing can hold against: held-out runs may excite what
 /// is missing still, and speak against a right effect until it is found too.
 bool is_overwhelming(const Evidence& e, const AcceptancePolicy& p) {
-  return saving_of(e, e.improvement) > p.overwhelming_evidence && e.improvement.t_value > p.least_t;
+  return saving_of(e, e.improvement) > p.overwhelming_evidence && e.improvement.t_value > p.min_t;
 }
 
 /// Whether the data show an effect at all.
 Decision decide_shown(const Evidence& e, const Improvement& improvement, const AcceptancePolicy& p) {
   const double saving = saving_of(e, improvement);
   const double t = combined_t(improvement, p);
-  if (is_borne_out(saving, improvement, p) && t > p.least_t) return accepted(Rule::borne_out);
-  if (saving < p.least_evidence) return rejected(Rule::too_little_evidence);
+  if (is_borne_out(saving, improvement, p) && t > p.min_t) return accepted(Rule::borne_out);
+  if (saving < p.min_evidence) return rejected(Rule::too_little_evidence);
   // Held-out data that do not excite the effect say nothing.
   if (!(improvement.held > -p.held_out_indifference)) return rejected(Rule::held_out_against);
-  if (t > p.least_t) return accepted(Rule::shown_throughout);
+  if (t > p.min_t) return accepted(Rule::shown_throughout);
   if (saving > p.overwhelming_evidence) return accepted(Rule::overwhelming);
   // Numbers of the plant that need not be so far off are no matter of noise.
-  if (improvement.prior - e.penalty > p.least_evidence) return accepted(Rule::plant_numbers);
-  if (!(improvement.t_value > p.least_t_of_sensors && improvement.held > p.equally_good_evidence))
+  if (improvement.prior - e.penalty > p.min_evidence) return accepted(Rule::plant_numbers);
+  if (!(improvement.t_value > p.min_t_of_sensors && improvement.held > p.equally_good_evidence))
     return rejected(Rule::chance);
   // Where nothing but the sensors' noise is left, its evidence needs no other witness.
   if (!e.simulated_gap) return waiting(MissingFit::simulation);
@@ -66,7 +66,7 @@ Decision decide_shown(const Evidence& e, const Improvement& improvement, const A
 /// Whether the size of an effect is certain. A fit that is less certain than its evidence says has not
 /// arrived.
 Decision decide_certain(const Evidence& e, const Improvement& improvement, const AcceptancePolicy& p) {
-  const auto enough = [&](double certainty) { return certainty >= p.least_certainty; };
+  const auto enough = [&](double certainty) { return certainty >= p.min_certainty; };
   if (enough(e.certainty)) return accepted(Rule::shown_throughout);
   if (is_borne_out(saving_of(e, improvement), improvement, p)) {
     if (!e.certainty_of_all_runs) return waiting(MissingFit::all_runs);
@@ -82,7 +82,7 @@ Decision decide_certain(const Evidence& e, const Improvement& improvement, const
 /// further off, as far as their number can show it.
 bool simulates_as_well(const SimulationChange& change, const AcceptancePolicy& p) {
   if (change.segments == 0) return true;
-  const double scatter = std::max(p.least_simulation_scatter, change.scatter);
+  const double scatter = std::max(p.min_simulation_scatter, change.scatter);
   return change.mean <
          p.worse_simulation_by_chance + scatter / std::sqrt(static_cast<double>(change.segments));
 }
@@ -126,7 +126,7 @@ Decision decide_addition(const Evidence& e, const AcceptancePolicy& p) {
 /// What stands in the place of another must be possible, certain, and simulate as well.
 Decision decide_stand_in(const Evidence& e, Rule rule, const AcceptancePolicy& p) {
   if (!e.plausible) return rejected(Rule::cannot_be);
-  if (e.certainty < p.least_certainty) return rejected(Rule::uncertain_size);
+  if (e.certainty < p.min_certainty) return rejected(Rule::uncertain_size);
   return decide_simulation(e, rule, p);
 }
 
@@ -146,13 +146,13 @@ Decision decide_simplification(const Evidence& e, const AcceptancePolicy& p) {
 }
 
 Decision decide_pair(const Evidence& e, const AcceptancePolicy& p) {
-  if (saving_of(e, e.improvement) < p.least_evidence) return rejected(Rule::too_little_evidence);
+  if (saving_of(e, e.improvement) < p.min_evidence) return rejected(Rule::too_little_evidence);
   if (e.improvement.held < 0.0) return rejected(Rule::held_out_against);
   return decide_stand_in(e, Rule::better, p);
 }
 
 Decision decide_keeping(const Evidence& e, const AcceptancePolicy& p) {
-  if (saving_of(e, e.improvement) > p.least_evidence && e.improvement.t_value > p.kept_t_share * p.least_t)
+  if (saving_of(e, e.improvement) > p.min_evidence && e.improvement.t_value > p.kept_t_share * p.min_t)
     return accepted(Rule::still_shown);
   const Decision shown = decide_shown(e, e.improvement, p);
   if (is_open(shown) || shown.accepted) return shown;

@@ -166,7 +166,7 @@ class Diagnostician {
     if (!left.structured) return left;
     options_.tell(0.945, "estimating a coloured disturbance");
     const FitResult coloured = search_.with_coloured_noise(known_);
-    if (!(likelihood_of(known_.train) - likelihood_of(coloured) > policy_.acceptance.least_evidence))
+    if (!(likelihood_of(known_.train) - likelihood_of(coloured) > policy_.acceptance.min_evidence))
       return left;
     noise_ = coloured.point.noise;
     return tests_of(coloured.point, noise_);
@@ -254,12 +254,12 @@ class Diagnostician {
     for (;;) {
       options_.tell(0.93, "comparing parts of the data");
       reproductions_ = reproduce(search_, known_, all_found());
-      const Reproduction* least = nullptr;
+      const Reproduction* worst = nullptr;
       for (const Reproduction& r : reproductions_)
-        if (is_contradicted(r, policy_.reproducibility) && (least == nullptr || r.t_value < least->t_value))
-          least = &r;
-      if (least != nullptr) {
-        withdraw(least->effect, least->where);
+        if (is_contradicted(r, policy_.reproducibility) && (worst == nullptr || r.t_value < worst->t_value))
+          worst = &r;
+      if (worst != nullptr) {
+        withdraw(worst->effect, worst->where);
       } else {
         options_.tell(0.94, "measuring the gap");
         listing_ = list_effects(search_, final_, all_found());
@@ -412,7 +412,7 @@ class Diagnostician {
   /// Whether what was found closes most of what the plant file as given has above the noise floor.
   bool closes_excess() const {
     const double before = result_.gap_before - 1.0, after = result_.gap_after - 1.0;
-    return after < (1.0 - policy_.power.least_share_closed) * before;
+    return after < (1.0 - policy_.power.min_share_closed) * before;
   }
 
   /// Why data in which nothing is found do not show that nothing is missing.
@@ -452,7 +452,7 @@ class Diagnostician {
           on_screening_subset = search_.on_screening_subset(selection_.current()).train.objective;
         // So much worse on a part, it is no better on the whole.
         if (!(alternative.train.objective - *on_screening_subset <
-              policy_.distinction.most_scattered_evidence))
+              policy_.distinction.max_scattered_evidence))
           continue;
         alternative.train.point.noise = selection_.current().train.point.noise;
         search_.refit(*without, alternative);
@@ -533,7 +533,7 @@ double share_of(const RunEvidence& run, const std::vector<RunEvidence>& all) {
 
 NextBest next_best(const Diagnosis& diagnosis, const FoundEffect& effect) {
   const double near = SelectionPolicy{}.distinction.next_best_share;
-  const std::size_t most = SearchBudget{}.most_next_best;
+  const std::size_t max_others = SearchBudget{}.max_next_best;
   NextBest best;
   for (const Trial& trial : diagnosis.trials)
     if (trial.taken && trial.effect == effect.effect) best.taken = &trial;
@@ -547,7 +547,7 @@ NextBest next_best(const Diagnosis& diagnosis, const FoundEffect& effect) {
   }
   std::stable_sort(best.others.begin(), best.others.end(),
                    [](const Trial* a, const Trial* b) { return a->evidence > b->evidence; });
-  if (best.others.size() > most) best.others.resize(most);
+  if (best.others.size() > max_others) best.others.resize(max_others);
   return best;
 }
 

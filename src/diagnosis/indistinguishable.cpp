@@ -61,13 +61,12 @@ bool is_proportional(std::size_t effect) {
 }  // namespace
 
 bool reduces_certainty(double distance_with_other, double distance_alone, const DistinctionPolicy& policy) {
-  return distance_with_other < policy.least_distance &&
-         distance_with_other < policy.least_loss * distance_alone;
+  return distance_with_other < policy.min_distance && distance_with_other < policy.min_loss * distance_alone;
 }
 
 bool is_indistinguishable(double evidence_lost, double t_value, const DistinctionPolicy& policy) {
   return evidence_lost < policy.indistinguishable_evidence ||
-         (evidence_lost < policy.most_scattered_evidence && t_value < policy.scattered_t);
+         (evidence_lost < policy.max_scattered_evidence && t_value < policy.scattered_t);
 }
 
 std::vector<OpenedEffect> open_effects(const Search& search, const Hypothesis& h,

@@ -92,7 +92,7 @@ std::optional<NextExperiment> choose_experiment(
     } catch (const ConfigError&) {
       continue;  // this plant cannot do it within the travel
     }
-    double least = std::numeric_limits<double>::infinity();
+    double nearest = std::numeric_limits<double>::infinity();
     std::vector<double> sums(alternatives.size(), 0.0);
     std::size_t samples = 0;
     for (const Piece& piece : pieces) {
@@ -107,9 +107,9 @@ std::optional<NextExperiment> choose_experiment(
       }
     }
     for (const double sum : sums)
-      least = std::min(least, std::sqrt(sum / static_cast<double>(std::max<std::size_t>(samples, 1))));
-    if (!best || least > best->distance)
-      best = NextExperiment{item.experiment.name, item.experiment.why, item.file, least};
+      nearest = std::min(nearest, std::sqrt(sum / static_cast<double>(std::max<std::size_t>(samples, 1))));
+    if (!best || nearest > best->distance)
+      best = NextExperiment{item.experiment.name, item.experiment.why, item.file, nearest};
   }
   return best;
 }

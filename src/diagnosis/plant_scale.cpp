@@ -72,11 +72,11 @@ SelectionPolicy policy_for(const Plant& plant) {
                             scale.length, scale.force, scale.torque};
   for (std::size_t i = 0; i < start.size(); ++i) walk.start_variances[i] *= start[i] * start[i];
   PriorPolicy& prior = policy.prior;
-  prior.least_stribeck_mps *= scale.speed;
+  prior.min_stribeck_mps *= scale.speed;
   prior.fastest_stribeck_mps *= scale.speed;
   prior.spring_center_m *= scale.length;
-  prior.least_bristle_stiffness_n_per_m *= scale.force / scale.length;
-  prior.most_bristle_stiffness_n_per_m *= scale.force / scale.length;
+  prior.min_bristle_stiffness_n_per_m *= scale.force / scale.length;
+  prior.max_bristle_stiffness_n_per_m *= scale.force / scale.length;
   policy.excitation.arm_m *= scale.length;
   return policy;
 }

@@ -31,26 +31,26 @@ std::vector<std::size_t> certain_parameters(ParameterPosterior posterior,
   std::vector<std::size_t> open(is_correction.size());
   std::iota(open.begin(), open.end(), std::size_t{0});
   for (;;) {
-    double least = std::numeric_limits<double>::infinity();
+    double min_z = std::numeric_limits<double>::infinity();
     std::size_t place = 0;
     for (std::size_t a = 0; a < open.size(); ++a) {
       if (!is_correction[open[a]]) continue;
       const auto at = static_cast<Eigen::Index>(a);
       const double z = std::abs(posterior.value[at] - posterior.prior_mean[at]) /
                        std::sqrt(std::max(posterior.covariance(at, at), 1e-300));
-      if (z < least) {
-        least = z;
+      if (z < min_z) {
+        min_z = z;
         place = a;
       }
     }
-    if (!(least < policy.least_z)) return open;
+    if (!(min_z < policy.min_z)) return open;
     set_back(posterior, static_cast<Eigen::Index>(place));
     open.erase(open.begin() + static_cast<std::ptrdiff_t>(place));
   }
 }
 
 bool is_certain_of_all_runs(double certainty, const CorrectionPolicy& policy) {
-  return !(certainty < policy.least_certainty_of_all_runs);
+  return !(certainty < policy.min_certainty_of_all_runs);
 }
 
 bool is_within_prior(double value, double prior_mean, double prior_sigma, const CorrectionPolicy& policy) {
@@ -68,7 +68,7 @@ bool is_doubtful(double scale, const CorrectionPolicy& policy) {
 }
 
 bool shows_on_encoder(double offset_rad, double resolution_rad, const CorrectionPolicy& policy) {
-  return !(std::abs(offset_rad) < policy.least_angle_offset_steps * resolution_rad);
+  return !(std::abs(offset_rad) < policy.min_angle_offset_steps * resolution_rad);
 }
 
 bool are_bristles_short(double breakaway_n, double stiffness_n_per_m, double travel_m,
@@ -77,7 +77,7 @@ bool are_bristles_short(double breakaway_n, double stiffness_n_per_m, double tra
 }
 
 bool is_held_out_too_far_off(double held_out_excess, double excess, const ResidualPolicy& policy) {
-  return held_out_excess > policy.most_excess * std::max(1.0, excess);
+  return held_out_excess > policy.max_excess * std::max(1.0, excess);
 }
 
 }  // namespace upright

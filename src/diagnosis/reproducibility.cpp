@@ -59,13 +59,13 @@ GaussianPrior prior_from(const Part& other, std::size_t effect, const std::vecto
     if (p.prior_sigma > 0.0) prior.information(j, j) = 1.0 / (p.prior_sigma * p.prior_sigma);
   }
   const std::vector<Eigen::Index> own = places_of(effect, free);
-  Eigen::VectorXd mean(static_cast<Eigen::Index>(own.size())), least_sigma(mean.size());
+  Eigen::VectorXd mean(static_cast<Eigen::Index>(own.size())), min_sigma(mean.size());
   for (Eigen::Index i = 0; i < mean.size(); ++i) {
     const FreeParameter& p = free[static_cast<std::size_t>(own[static_cast<std::size_t>(i)])];
     mean[i] = other.with.point.plant.find(effect)->values[p.index];
-    least_sigma[i] = 1e-6 * p.scale;
+    min_sigma[i] = 1e-6 * p.scale;
   }
-  const GaussianPrior belief = belief_of(mean, other.with.covariance(own, own), least_sigma);
+  const GaussianPrior belief = belief_of(mean, other.with.covariance(own, own), min_sigma);
   prior.mean(own) = belief.mean;
   prior.information(own, own) = belief.information;
   return prior;
@@ -268,7 +268,7 @@ std::vector<Reproduction> reproduce(const Search& search, const Hypothesis& h,
 }
 
 bool is_contradicted(const Reproduction& reproduction, const ReproducibilityPolicy& policy) {
-  return reproduction.t_value < -policy.least_t;
+  return reproduction.t_value < -policy.min_t;
 }
 
 }  // namespace upright

@@ -95,11 +95,11 @@ using P = ResidualPolicy;
 constexpr auto above = ResidualCondition::Beyond::above, below = ResidualCondition::Beyond::below;
 
 constexpr std::array table = {
-    ResidualTest{"dependence", {dependence, above, &P::least_dependence}, {}, depends_on},
+    ResidualTest{"dependence", {dependence, above, &P::min_dependence}, {}, depends_on},
     ResidualTest{"bursts", {dispersion, above, &P::bursts}, {}, comes_in_bursts},
     ResidualTest{"heavy_tails",
                  {kurtosis, above, &P::heaviest_tails},
-                 ResidualCondition{tails_certainty, above, &P::least_dependence},
+                 ResidualCondition{tails_certainty, above, &P::min_dependence},
                  has_heavy_tails},
     ResidualTest{"lasting_bursts",
                  {kurtosis, above, &P::heavy_tails},
@@ -111,7 +111,7 @@ constexpr std::array table = {
                  {quick, below, &P::rather_quick},
                  ResidualCondition{dependence, above, &P::suspected_dependence},
                  is_too_quick},
-    ResidualTest{"excess", {excess, above, &P::most_excess}, {}, simulates_too_far_off},
+    ResidualTest{"excess", {excess, above, &P::max_excess}, {}, simulates_too_far_off},
     ResidualTest{"uneven_with_dependence",
                  {dispersion, above, &P::uneven},
                  ResidualCondition{dependence, above, &P::suspected_dependence},

@@ -167,7 +167,7 @@ class BlockSums {
   }
   /// Ends the block. Pulses count where they are `visible`.
   void close(const std::array<bool, 2>& visible, const ResidualPolicy& policy, Blocks& blocks) {
-    if (count_ > policy.least_block_weight && sum_ > policy.at_rest * policy.at_rest * count_)
+    if (count_ > policy.min_block_weight && sum_ > policy.at_rest * policy.at_rest * count_)
       blocks.rms.push_back(std::sqrt(sum_ / count_));
     blocks.power += sum_;
     for (std::size_t i = 0; i < probes.size(); ++i) blocks.probe[i].push_back(scores_[i]);
@@ -193,7 +193,7 @@ void examine_segment(const Measurement& run, const Segment& segment, const FitPo
   const ResidualPolicy& residual = policy.residual;
   const bool present[2] = {run.has_cart(), run.has_theta() && point.plant.pendulum.has_value()};
   const auto length = static_cast<std::size_t>(
-      std::max(residual.least_block_samples, residual.block_s / std::max(run.median_period_s(), 1e-9)));
+      std::max(residual.min_block_samples, residual.block_s / std::max(run.median_period_s(), 1e-9)));
   ProbeState state(0.5 * (run.time_s.front() + run.time_s.back()), policy.motion);
   ProbeValues acting{};
   BlockSums sums;
@@ -258,7 +258,7 @@ double share_of(const std::vector<Score>& scores, double power) {
 /// How large pulses are at most, in standard errors: their root mean square, or what most of them are with
 /// as much more as chance makes of so few. 1 of too few to say.
 double largest_size(const std::vector<double>& pulses, const ResidualPolicy& policy) {
-  if (pulses.size() < policy.least_pulses) return 1.0;
+  if (pulses.size() < policy.min_pulses) return 1.0;
   double sum = 0.0;
   for (const double p : pulses) sum += p * p;
   return std::min(std::sqrt(sum / static_cast<double>(pulses.size())),
@@ -274,7 +274,7 @@ ResidualTests examine_residuals(const FitData& data, const FitPoint& point, cons
   for (std::size_t s = 0; s < steps.size(); ++s)
     examine_segment((*data.runs)[data.segments[s].run], data.segments[s], point, steps[s], policy, blocks);
   ResidualTests result;
-  if (blocks.rms.size() >= residual.least_blocks) {
+  if (blocks.rms.size() >= residual.min_blocks) {
     std::sort(blocks.rms.begin(), blocks.rms.end());
     result.dispersion = blocks.rms[blocks.rms.size() * residual.large_block_percentile / 100] /
                         std::max(blocks.rms[blocks.rms.size() / 2], 1e-12);
@@ -288,8 +288,8 @@ ResidualTests examine_residuals(const FitData& data, const FitPoint& point, cons
   double largest_share = 0.0;
   for (std::size_t i = 0; i < probes.size(); ++i) {
     const double certainty = certainty_of(blocks.probe[i]), share = share_of(blocks.probe[i], blocks.power);
-    if (is_sensor(probes[i].on) && share < residual.least_sensor_share) continue;
-    const bool certain = certainty > residual.least_dependence;
+    if (is_sensor(probes[i].on) && share < residual.min_sensor_share) continue;
+    const bool certain = certainty > residual.min_dependence;
     if (certain ? share <= largest_share : certainty <= result.certainty) continue;
     if (certain) largest_share = share;
     result.certainty = certainty;

@@ -34,13 +34,13 @@ std::set<std::size_t> effects_of_both(const Hypothesis& first, const Hypothesis&
 /// What a fit says of its parameters, as a belief. What it says nothing of is believed to be where it is.
 GaussianPrior posterior_of(const Hypothesis& h) {
   const auto n = static_cast<Eigen::Index>(h.free.size());
-  Eigen::VectorXd mean(n), least_sigma(n);
+  Eigen::VectorXd mean(n), min_sigma(n);
   for (Eigen::Index j = 0; j < n; ++j) {
     const FreeParameter& p = h.free[static_cast<std::size_t>(j)];
     mean[j] = h.train.point.plant.find(p.effect)->values[p.index];
-    least_sigma[j] = 1e-6 * p.scale;
+    min_sigma[j] = 1e-6 * p.scale;
   }
-  return belief_of(mean, h.train.covariance, least_sigma);
+  return belief_of(mean, h.train.covariance, min_sigma);
 }
 
 double log_determinant(const Eigen::MatrixXd& information) {
@@ -112,8 +112,8 @@ Search::Search(const Plant& plant, const std::vector<Measurement>& runs, const F
     plant_.set(effect, std::vector<double>{effect_registry()[effect].parameters[0].neutral});
   }
   // Runs differ, segments of a run are alike: take them in turn.
-  const std::size_t stride = std::clamp<std::size_t>(
-      train_.segments.size() / budget_.least_screening_segments, 1, budget_.most_screening_stride);
+  const std::size_t stride = std::clamp<std::size_t>(train_.segments.size() / budget_.min_screening_segments,
+                                                     1, budget_.max_screening_stride);
   choose_screening_subset(stride);
   train_starts_ = estimate_initial_states(runs, train.segments, plant_);
   held_starts_ = estimate_initial_states(runs, held.segments, plant_);
@@ -342,10 +342,10 @@ std::vector<double> Search::predicted_gains(const Hypothesis& base,
     std::set<std::size_t> added = base.added;
     added.insert(effect);
     const std::vector<FreeParameter> free = free_of(added);
-    double least = infinity;
+    double best = infinity;
     for (const FitPoint& point : points_with(from, effect, base))
-      least = std::min(least, predicted_objective(point, free));
-    gains.push_back(std::isfinite(without) ? without - least : infinity);
+      best = std::min(best, predicted_objective(point, free));
+    gains.push_back(std::isfinite(without) ? without - best : infinity);
   }
   return gains;
 }

@@ -15,9 +15,9 @@ struct SearchBudget {
   /// [segments] The least number of screening segments. Runs differ, but the segments of a run are similar,
   /// so only every few are used. From twelve segments on this saves half of the work: six 10 s runs with two
   /// effects took 35 s of processor time instead of 62 s (with two more changes, seed 41/3).
-  std::size_t least_screening_segments = 6;
+  std::size_t min_screening_segments = 6;
   /// [segments] The largest stride between screening segments. Chosen.
-  std::size_t most_screening_stride = 3;
+  std::size_t max_screening_stride = 3;
   /// [steps] The steps of a candidate's fit to the screening segments, from each of its starts. Chosen.
   int screening_steps = 4;
   /// [steps] The steps of the fit without the candidate. It has converged on all the data and needs only a
@@ -34,22 +34,22 @@ struct SearchBudget {
   double predicted_gain_share = 0.1;
   /// [candidates] The least number that is screened, whatever their predicted gain. Well above three, for the
   /// same reason.
-  std::size_t least_screened = 8;
-  /// [1] A candidate that gains less than this share of `least_evidence` on the screening segments, in
+  std::size_t min_screened = 8;
+  /// [1] A candidate that gains less than this share of `min_evidence` on the screening segments, in
   /// proportion to their number, is not fitted completely. Below one, because a few steps do not reach the
   /// whole gain. Chosen.
-  double least_screening_evidence_share = 0.4;
+  double min_screening_evidence_share = 0.4;
   /// [1] A candidate that gains less than this share of the best one's gain is not fitted completely either,
   /// because a complete fit would not close the difference. Twelve matrix cases gave the same results with
   /// and without this limit.
-  double least_gain_share = 0.05;
+  double min_gain_share = 0.05;
   /// [candidates] The most that are fitted completely in each round. Chosen.
-  std::size_t most_finalists = 4;
+  std::size_t max_finalists = 4;
   /// [candidates] If nothing else explains the data, the pairs of this many candidates of the first round are
   /// tried: 28 pairs. Chosen.
-  std::size_t most_resembling = 8;
+  std::size_t max_resembling = 8;
   /// [rounds] The rounds of each search. Each adds one effect. The matrix hides at most two. Chosen.
-  int most_rounds = 4;
+  int max_rounds = 4;
 
   // Fits: how far they are continued.
   /// [steps] The steps of the first fit, of the plant file with little noise. It starts far from its minimum.
@@ -81,20 +81,20 @@ struct SearchBudget {
 
   // Starts of a force that is periodic along the track.
   /// [samples] The samples of the residual force, evenly spaced. Chosen.
-  std::size_t most_residual_samples = 4000;
+  std::size_t max_residual_samples = 4000;
   /// [samples] Fewer samples show no pitch. Chosen.
-  std::size_t least_residual_samples = 50;
+  std::size_t min_residual_samples = 50;
   /// [frequencies] Enough for 5 m of track and a pitch of 1 mm. On a longer track (or in another unit) the
   /// shortest pitches are not searched, because the time grows with the travel without limit.
-  double most_frequencies = 20000.0;
+  double max_frequencies = 20000.0;
   /// [pitches] The pitches from which fits start. Chosen.
-  std::size_t most_pitches = 2;
+  std::size_t max_pitches = 2;
 
   /// [draws] The noise draws for the floor of a plain simulation. The largest draw is the limit of what noise
   /// can cause. Chosen.
   std::size_t floor_draws = 32;
   /// [effects] The most effects that are named as next best. Chosen for the reader.
-  std::size_t most_next_best = 3;
+  std::size_t max_next_best = 3;
 };
 
 }  // namespace upright

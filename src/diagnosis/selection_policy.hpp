@@ -27,15 +27,15 @@ struct AcceptancePolicy {
   /// [evidence] The least evidence on the training runs, after the penalty of the parameters. About 30
   /// candidates with up to three parameters are tried. With white noise, 25 keeps a chance result below one
   /// in a thousand diagnoses. Computed from that number of candidates.
-  double least_evidence = 25.0;
+  double min_evidence = 25.0;
   /// [standard errors] The least t value of the saving per quarter of a second. It remains reliable if the
   /// noise is not white. By chance, three occurs once in 700 times. Chosen.
-  double least_t = 3.0;
+  double min_t = 3.0;
   /// [evidence] Coloured noise cannot produce this much, even if few segments contain it. Chosen.
   double overwhelming_evidence = 1000.0;
   /// [robust standard errors] The least certainty of the size of an effect. Equivalent to an evidence of 16.
   /// Chosen.
-  double least_certainty = 4.0;
+  double min_certainty = 4.0;
   /// [evidence] Each parameter beyond the first must save this in addition, so a simpler effect that fits
   /// nearly as well is preferred. Chosen.
   double parameter_penalty = 10.0;
@@ -48,17 +48,17 @@ struct AcceptancePolicy {
   double held_out_indifference = 1.4;
   /// [evidence] If training and held-out runs both support an effect, each needs at least this. Without this
   /// rule, weak effects in one short run were missed (new seeds of the matrix).
-  double least_evidence_of_each = 8.0;
-  /// [evidence] The sum that both need. It is larger than `least_evidence` because it replaces it. Same
+  double min_evidence_of_each = 8.0;
+  /// [evidence] The sum that both need. It is larger than `min_evidence` because it replaces it. Same
   /// origin.
-  double least_evidence_together = 40.0;
+  double min_evidence_together = 40.0;
   /// [standard errors] Below this t value, held-out evidence is not added to its square: one standard error
   /// is what chance produces. Chosen. (Held-out evidence of 25 confirmed a t of 1.5: seeds 181/83 and
   /// 182/114.)
   double chance_t = 1.0;
   /// [standard errors] The least t value if only sensor noise remains, because then nothing else can have
   /// produced the evidence. Chosen.
-  double least_t_of_sensors = 1.5;
+  double min_t_of_sensors = 1.5;
   /// [sensor noise] A plain simulation of held-out runs with a smaller error leaves only sensor noise. This
   /// is the matrix's limit for the error of a right model relative to the floor.
   double sensors_gap = 1.05;
@@ -70,8 +70,8 @@ struct AcceptancePolicy {
   double worse_simulation_by_chance = 0.1;
   /// [ln of a ratio] It may also grow by one standard error of its scatter over the segments, which is taken
   /// to be at least this: while another effect is missing, errors change by half in either direction.
-  double least_simulation_scatter = 0.5;
-  /// [1] An effect that was found stays in the model while its t value is above this share of `least_t`. It
+  double min_simulation_scatter = 0.5;
+  /// [1] An effect that was found stays in the model while its t value is above this share of `min_t`. It
   /// is not dropped because other effects make it slightly less certain. Chosen.
   double kept_t_share = 0.7;
 
@@ -85,11 +85,11 @@ struct AcceptancePolicy {
 
 /// When a number of the plant file is wrong, and which sizes are impossible.
 struct CorrectionPolicy {
-  /// [standard errors] A correction of the plant file is listed from here on. As `least_certainty`. Chosen.
-  double least_z = 4.0;
+  /// [standard errors] A correction of the plant file is listed from here on. As `min_certainty`. Chosen.
+  double min_z = 4.0;
   /// [standard errors] A correction with less than this after the final fit to all runs is removed, because
   /// its 95 % interval would contain zero.
-  double least_certainty_of_all_runs = 2.0;
+  double min_certainty_of_all_runs = 2.0;
   /// [prior standard deviations] A coefficient of the plant file that moved by less counts as unchanged: its
   /// number is adjusted, but nothing was missing. Such coefficients change this much from day to day. Chosen.
   double within_prior = 3.0;
@@ -97,7 +97,7 @@ struct CorrectionPolicy {
   /// less, where the data correct it. Chosen.
   double prior_widening = 4.0;
   /// [encoder steps] A smaller offset of the angle is not visible in the encoder's counts. Chosen.
-  double least_angle_offset_steps = 1.5;
+  double min_angle_offset_steps = 1.5;
   /// [1] Bristles that bend over more than this share of the travel before they slide act as a spring and are
   /// rejected. Bristles of 14 N/m with 5 N of friction had been found in place of a spring (canterbury data).
   double bristle_share_of_travel = 0.1;
@@ -115,14 +115,14 @@ struct DistinctionPolicy {
   /// Chosen.
   double indistinguishable_evidence = 16.0;
   /// [evidence] The most that a difference within its own scatter may be. Ten times the limit above. Chosen.
-  double most_scattered_evidence = 160.0;
+  double max_scattered_evidence = 160.0;
   /// [standard errors] A difference is within its own scatter if its t value is below this: a 95 % interval.
   double scattered_t = 2.0;
   /// [standard errors] An effect whose certainty falls below this once another effect is left open may be
   /// that other effect. Equivalent to an evidence of 16.
-  double least_distance = 4.0;
+  double min_distance = 4.0;
   /// [1] The other effect must reduce the certainty to less than this share of it. Chosen.
-  double least_loss = 0.5;
+  double min_loss = 0.5;
   /// [1] An effect with this share of the evidence of the effect that was added, and not confusable with it,
   /// is named as next best. Chosen for the reader; it decides nothing.
   double next_best_share = 1.0 / 3.0;
@@ -132,7 +132,7 @@ struct DistinctionPolicy {
 struct ReproducibilityPolicy {
   /// [standard errors] An effect is contradicted if what one part of the data says of it costs another part
   /// more than this, compared with no such effect. By chance, three occurs once in 700 times. Chosen.
-  double least_t = 3.0;
+  double min_t = 3.0;
 };
 
 /// What the data would have shown.
@@ -148,7 +148,7 @@ struct PowerPolicy {
   double clear_gap = 2.0;
   /// [1] The share of the excess above the floor that it must close then. Less than half explains less than
   /// it leaves.
-  double least_share_closed = 0.5;
+  double min_share_closed = 0.5;
   /// [kinds] Every rig has this friction. If the data would not have shown it at its usual size, they do not
   /// show that nothing is missing.
   std::array<std::string_view, 4> everywhere = {"viscous_friction", "coulomb_friction",
@@ -182,21 +182,21 @@ struct ResidualPolicy {
   /// a stroke of the cart. Chosen.
   double block_s = 0.15;
   /// [samples] The least number of samples in a block. Chosen.
-  double least_block_samples = 20.0;
+  double min_block_samples = 20.0;
   /// [samples] The least sum of weights in a block. Repeated quantised samples weigh less than one. Chosen.
-  double least_block_weight = 10.0;
+  double min_block_weight = 10.0;
   /// [sensor noise] A block with less scatter belongs to a cart at rest: within one encoder step it shows no
   /// noise. Chosen.
   double at_rest = 0.1;
   /// [blocks] Fewer blocks do not show how they scatter. Chosen.
-  std::size_t least_blocks = 20;
+  std::size_t min_blocks = 20;
   /// [percent] The percentile of block sizes whose ratio to the median is the dispersion. Chosen.
   std::size_t large_block_percentile = 95;
   /// [sensor noise] A white force that moves its sensor by less within a block is indistinguishable from
   /// encoder steps. Its pulses are not tested. Chosen.
   double visible_push = 0.1;
   /// [pulses] Fewer pulses do not show how large they can be. Chosen.
-  std::size_t least_pulses = 30;
+  std::size_t min_pulses = 30;
   /// [1] The RMS of few pulses may exceed the size of most of them by this factor by chance. Chosen.
   double pulses_by_chance = 1.5;
 
@@ -205,7 +205,7 @@ struct ResidualPolicy {
   double sensors_noise_ratio = 1.15;
   /// [standard errors] A dependence of the residual counts from here on. A dozen dependences are tried, and
   /// chance gives one in two hundred diagnoses. Computed from that number. Also the certainty of heavy tails.
-  double least_dependence = 3.5;
+  double min_dependence = 3.5;
   /// [1] Above this dispersion (95th percentile of block RMS over the median) the residual comes in bursts.
   /// Chosen.
   double bursts = 1.6;
@@ -217,7 +217,7 @@ struct ResidualPolicy {
   double suspected_dependence = 2.5;
   /// [1] No sensor is perfect, so a shift of a sensor counts only if it accounts for this share of the
   /// residual. A flexible drive accounted for 27 to 31 percent (aau data).
-  double least_sensor_share = 0.05;
+  double min_sensor_share = 0.05;
   /// [kurtosis] Above this kurtosis of its pulses a disturbance comes in bursts. A Gaussian has 3. Chosen.
   double heaviest_tails = 5.5;
   /// [kurtosis] Kurtosis that counts together with a slow residual, where the data are too few for one sign
@@ -238,7 +238,7 @@ struct ResidualPolicy {
   double rather_quick = 0.75;
   /// [1] A plain simulation may be this many times as far off as the largest of the noise draws, and held-out
   /// runs this many times further. Chosen.
-  double most_excess = 2.0;
+  double max_excess = 2.0;
 };
 
 /// How the residual is located: the regression of the residual force on measured quantities. Its result is
@@ -273,60 +273,60 @@ struct PriorPolicy {
   /// [rad] How accurately a pendulum at rest shows the vertical. Chosen.
   double rest_rad = 1e-3;
   /// [1] Relative priors refer to at least this share of the typical size of a parameter. Chosen.
-  double least_share_of_typical = 0.2;
+  double min_share_of_typical = 0.2;
   /// [1] The typical size of forces in a run, as a share of the motor's largest force. Chosen.
   double share_of_motor_force = 0.03;
   /// [1] The most dry friction, as a multiple of the motor's largest force, since the motor must be able to
   /// overcome it. Without this limit a fit with 1430 N took minutes.
-  double most_share_of_motor_force = 2.0;
+  double max_share_of_motor_force = 2.0;
 
   /// [1] The mean of the exponent of a Stribeck curve: 2 is a Gaussian, 1 an exponential. Chosen.
   double shape_mean = 2.0;
   /// [1] Its standard deviation. Chosen.
   double shape_sigma = 0.5;
   /// [1] The smallest exponent. Chosen.
-  double least_shape = 0.5;
+  double min_shape = 0.5;
   /// [1] The largest exponent. Chosen.
-  double most_shape = 4.0;
+  double max_shape = 4.0;
   /// [m/s] The slowest Stribeck velocity. For a small cart, and scaled to other plants. Chosen.
-  double least_stribeck_mps = 1e-3;
+  double min_stribeck_mps = 1e-3;
   /// [1] The fastest Stribeck velocity, as a share of the largest speed: the data do not show a faster one.
   /// Chosen.
-  double most_stribeck_share = 0.5;
+  double max_stribeck_share = 0.5;
   /// [m/s] The fastest Stribeck velocity is at least this. Scaled as the slowest. Chosen.
   double fastest_stribeck_mps = 0.02;
   /// [m] The shortest pitch of a periodic force along the track. Chosen.
-  double least_pitch_m = 5e-4;
+  double min_pitch_m = 5e-4;
   /// [crests] A force is periodic only if the run passes this many of its crests.
   double crests_of_pitch = 3.0;
   /// [m] Pitches up to this are always searched. Chosen.
-  double least_longest_pitch_m = 0.002;
+  double min_longest_pitch_m = 0.002;
   /// [m] The standard deviation of the centre of a spring about the mean position of the cart. For the track
   /// of a small cart, a metre, and scaled to other plants. Chosen.
   double spring_center_m = 0.5;
   /// [N/m] The softest bristles. Softer ones act as a spring. For a small cart, and scaled to other plants.
   /// Chosen.
-  double least_bristle_stiffness_n_per_m = 5.0;
+  double min_bristle_stiffness_n_per_m = 5.0;
   /// [N/m] The stiffest bristles. Stiffer ones are indistinguishable from a rigid contact. Scaled as the
   /// softest. Chosen.
-  double most_bristle_stiffness_n_per_m = 3e4;
+  double max_bristle_stiffness_n_per_m = 3e4;
   /// [s] The longest delay of the input. Chosen.
-  double most_delay_s = 0.2;
+  double max_delay_s = 0.2;
   /// [sample periods] The shortest lag of the motor. Shorter ones are not visible.
-  double least_lag_periods = 0.2;
+  double min_lag_periods = 0.2;
   /// [s] The longest lag of the motor. Chosen.
-  double most_lag_s = 0.5;
+  double max_lag_s = 0.5;
   /// [1] The smallest scale. If a smaller one is needed, something else is missing: a strong backlash had
   /// been explained by 0.3 times the mass.
-  double least_scale = 0.3;
+  double min_scale = 0.3;
   /// [1] The largest scale. The same reason.
-  double most_scale = 3.0;
+  double max_scale = 3.0;
 };
 
 /// What the runs can show at all.
 struct ExcitationPolicy {
   /// [sensor steps] A signal that moves by no more contains no information. Chosen.
-  double least_steps = 30.0;
+  double min_steps = 30.0;
   /// [m] The length of the pendulum when runs are sorted by the speed of the cart and of the pendulum's tip,
   /// to hold out a third of them. For a small cart, and scaled to other plants; it only weighs the two
   /// speeds. Chosen.

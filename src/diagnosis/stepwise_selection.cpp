@@ -27,7 +27,7 @@ void StepwiseSelection::begin() {
 }
 
 void StepwiseSelection::find() {
-  select_forward(0, budget_.most_rounds, false);
+  select_forward(0, budget_.max_rounds, false);
   try_pairs(finalists_);
   eliminate_backward();
 }
@@ -49,12 +49,12 @@ bool StepwiseSelection::find_pairs_of_all() {
 bool StepwiseSelection::find_thoroughly(bool certainly_missing) {
   const std::vector<std::size_t> before = found_;
   const double objective = current_.train.objective;
-  select_forward(budget_.most_rounds, 2 * budget_.most_rounds, true);
+  select_forward(budget_.max_rounds, 2 * budget_.max_rounds, true);
   // What certainly is missing shows on a part of many data too.
   const double share = search_.screening_share();
   if (share < 1.0 && !(certainly_missing && share < budget_.certain_screening_share)) {
     search_.screen_on_all();
-    select_forward(2 * budget_.most_rounds, 3 * budget_.most_rounds, false);
+    select_forward(2 * budget_.max_rounds, 3 * budget_.max_rounds, false);
   }
   // On the way a better place may have been found for the noise alone.
   if (found_ == before) return is_better_optimum(objective - current_.train.objective, policy_.acceptance);
@@ -105,7 +105,7 @@ std::vector<std::size_t> StepwiseSelection::promising_candidates(const Hypothesi
   std::size_t kept = 0;
   for (const std::size_t i : ranking) {
     const bool unknown = !std::isfinite(predicted[i]);
-    if (unknown || kept < budget_.least_screened || predicted[i] > budget_.predicted_gain_share * best) {
+    if (unknown || kept < budget_.min_screened || predicted[i] > budget_.predicted_gain_share * best) {
       chosen.push_back(candidates[i]);
       kept += unknown ? 0 : 1;
     } else if (round == 0) {
@@ -302,17 +302,17 @@ std::vector<StepwiseSelection::Finalist> StepwiseSelection::fit_finalists(
                    [](const ScreenedCandidate* a, const ScreenedCandidate* b) { return a->gain > b->gain; });
   if (round == 0)
     for (const ScreenedCandidate* s : ranking)
-      if (resembling_.size() < budget_.most_resembling &&
+      if (resembling_.size() < budget_.max_resembling &&
           s->gain > policy_.acceptance.resembling_share * ranking[0]->gain)
         resembling_.emplace_back(s->effect, s->hypothesis);
   std::vector<Finalist> accepted, doubtful;
-  const double least_gain =
-      budget_.least_screening_evidence_share * policy_.acceptance.least_evidence * search_.screening_share();
-  for (std::size_t place = 0; place < std::min(budget_.most_finalists, ranking.size()); ++place) {
+  const double min_gain =
+      budget_.min_screening_evidence_share * policy_.acceptance.min_evidence * search_.screening_share();
+  for (std::size_t place = 0; place < std::min(budget_.max_finalists, ranking.size()); ++place) {
     const ScreenedCandidate& finalist = *ranking[place];
-    if (finalist.gain < std::max(least_gain, budget_.least_gain_share * ranking[0]->gain)) break;
+    if (finalist.gain < std::max(min_gain, budget_.min_gain_share * ranking[0]->gain)) break;
     options_.tell(
-        done + 0.12 + 0.08 * static_cast<double>(place) / static_cast<double>(budget_.most_finalists),
+        done + 0.12 + 0.08 * static_cast<double>(place) / static_cast<double>(budget_.max_finalists),
         "fitting " + kind_of(finalist.effect));
     Finalist fitted{finalist.effect, finalist.hypothesis, 0.0};
     const Decision decision = try_finalist(round, with_low_noise, fitted);

@@ -11,8 +11,8 @@ double normal_deviate(double t, double freedom) {
 
 Tails tails_of(const std::vector<double>& values) {
   const auto n = static_cast<double>(values.size());
-  constexpr double least_count = 30.0;
-  if (n < least_count) return {};
+  constexpr double min_count = 30.0;
+  if (n < min_count) return {};
   double second = 0.0, fourth = 0.0;
   for (const double v : values) {
     second += v * v;

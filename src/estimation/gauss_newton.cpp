@@ -140,19 +140,19 @@ double GaussNewton::sample_count() const {
 }
 
 void GaussNewton::descend(double& objective) {
-  double damping = least_damping;
+  double damping = min_damping;
   converged_ = false;
   for (int iteration = 0;
        iteration < options_.max_iterations && std::isfinite(objective) && is_within_bound(); ++iteration) {
-    const double least_fall = options_.tolerance * sample_count() * 0.1 + 0.02;
-    const double next_objective = try_steps(objective, least_fall, damping);
+    const double min_fall = options_.tolerance * sample_count() * 0.1 + 0.02;
+    const double next_objective = try_steps(objective, min_fall, damping);
     if (!(next_objective < objective)) {
       converged_ = true;
       break;
     }
     const double fall = objective - next_objective;
     objective = next_objective;
-    if (fall < least_fall) {
+    if (fall < min_fall) {
       converged_ = true;
       break;
     }
@@ -161,13 +161,13 @@ void GaussNewton::descend(double& objective) {
 
 /// Goes the first of several steps, each damped more, after which the objective is less: which it is then.
 /// Where none is, the point stays.
-double GaussNewton::try_steps(double objective, double least_fall, double& damping) {
+double GaussNewton::try_steps(double objective, double min_fall, double& damping) {
   const FitPoint former = point_;
   double next_objective = infinity, rejected = infinity;
   for (int attempt = 0; attempt < 4; ++attempt) {
     Step next = step(damping);
-    if (next.predicted_reduction < least_fall && attempt == 0) next = step(damping = negligible_damping);
-    const bool promises = next.predicted_reduction >= least_fall;
+    if (next.predicted_reduction < min_fall && attempt == 0) next = step(damping = negligible_damping);
+    const bool promises = next.predicted_reduction >= min_fall;
     if (!promises && !next.cut_short) break;
     // A step that hardly differs from one that was rejected is not worth looking at, nor is one that does
     // not even promise to fall.
@@ -175,13 +175,13 @@ double GaussNewton::try_steps(double objective, double least_fall, double& dampi
     if (promises && next.predicted_reduction < alike * rejected) {
       point_ = std::move(next.point);
       linearised_.swap(former_);
-      next_objective = evaluate_step(std::max(next.predicted_reduction, least_fall));
+      next_objective = evaluate_step(std::max(next.predicted_reduction, min_fall));
       if (next_objective < objective) break;
       point_ = former;
       linearised_.swap(former_);
       rejected = next.predicted_reduction;
     }
-    damping = std::max(damping, least_damping) * 30.0;
+    damping = std::max(damping, min_damping) * 30.0;
   }
   // Where a step had to be damped, the next one has to be too.
   if (next_objective < objective && !std::isfinite(rejected))

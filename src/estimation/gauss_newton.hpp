@@ -65,7 +65,7 @@ class GaussNewton {
   double work_samples() const { return work_samples_; }
 
  private:
-  static constexpr double least_damping = 1e-4;  ///< of a first step
+  static constexpr double min_damping = 1e-4;  ///< of a first step
   /// Parameters that are one force are told apart by what is believed of them alone: next to nothing beside
   /// what is known of each by itself, and damping goes by that.
   static constexpr double negligible_damping = 1e-9;
@@ -77,7 +77,7 @@ class GaussNewton {
   double evaluate_step(double predicted_reduction);
   double objective_of_normals() const;
   double sample_count() const;
-  double try_steps(double objective, double least_fall, double& damping);
+  double try_steps(double objective, double min_fall, double& damping);
   ReducedEquations eliminate_initial_states(double damping) const;
   Step step(double damping) const;
   void move_parameters(Eigen::VectorXd& delta, Step& result) const;

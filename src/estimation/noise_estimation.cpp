@@ -52,8 +52,8 @@ Likelihood likelihood_with_noise(const std::vector<LinearStep>& steps, const Mea
 /// One number of the noise, of which the likelihood's maximum is sought.
 struct NoiseParameter {
   double Noise::*value;
-  double smallest, largest;  ///< below the smallest it is `least`
-  double least;
+  double smallest, largest;  ///< below the smallest it is `floor`
+  double floor;
   bool used;
   double Noise::*white = nullptr;  ///< of a coloured part: the white part beside it
   int tried_at = -1;               ///< after so many changes of the noise neither way was better
@@ -62,7 +62,7 @@ struct NoiseParameter {
   double moved(const Noise& noise, double move) const {
     const double now = noise.*value;
     const double to = now == 0.0 ? (move > 1.0 ? from_nothing(noise) : 0.0) : now * move;
-    return to < smallest ? least : std::min(to, largest);
+    return to < smallest ? floor : std::min(to, largest);
   }
 
  private:

@@ -15,8 +15,8 @@ Matrix inverse_of(const Matrix& h) {
   const Eigen::VectorXd scale =
       h.diagonal().unaryExpr([](double v) { return v > 1e-200 ? 1.0 / std::sqrt(v) : 0.0; });
   const Eigen::SelfAdjointEigenSolver<Matrix> solver(scale.asDiagonal() * h * scale.asDiagonal());
-  constexpr double least = 1e-13;
-  const Eigen::VectorXd inverse = solver.eigenvalues().cwiseMax(least).cwiseInverse();
+  constexpr double min_eigenvalue = 1e-13;
+  const Eigen::VectorXd inverse = solver.eigenvalues().cwiseMax(min_eigenvalue).cwiseInverse();
   return scale.asDiagonal() * solver.eigenvectors() * inverse.asDiagonal() *
          solver.eigenvectors().transpose() * scale.asDiagonal();
 }

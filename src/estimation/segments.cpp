@@ -10,9 +10,9 @@ namespace {
 /// What was commanded in a gap that ends at sample k is not known, and may still act for a while: through a
 /// delay, and, the more of it there was, through a lag. The first sample after that while.
 std::size_t resume_after_gap(const Measurement& run, std::size_t k) {
-  constexpr double at_least_s = 0.1, at_most_s = 0.5;
+  constexpr double min_s = 0.1, max_s = 0.5;
   const double gap_s = run.time_s[k] - run.time_s[k - 1];
-  const double resume_s = run.time_s[k] + std::min(at_least_s + 2.0 * gap_s, at_most_s);
+  const double resume_s = run.time_s[k] + std::min(min_s + 2.0 * gap_s, max_s);
   while (k + 1 < run.size() && run.time_s[k] < resume_s) ++k;
   return k;
 }

@@ -22,11 +22,11 @@ constexpr double not_simulated = std::numeric_limits<double>::quiet_NaN();
 class PieceSimulation {
  public:
   PieceSimulation(const Plant& plant, const Measurement& run, const Segment& piece,
-                  const PlantState<double>& start, std::size_t most_commands, RunSimulation& result)
+                  const PlantState<double>& start, std::size_t max_commands, RunSimulation& result)
       : run_(run),
         piece_(piece),
         result_(result),
-        simulator_(make_model<double>(plant, run.cart_locked), {}, most_commands) {
+        simulator_(make_model<double>(plant, run.cart_locked), {}, max_commands) {
     start_segment(simulator_, run, piece, start);
   }
 
@@ -142,11 +142,11 @@ std::vector<PlantState<double>> initial_states(const Plant& plant, const std::ve
   return fit_initial_states(data, guess).point.starts;
 }
 
-std::size_t most_commands(const Segment& piece, const SimulatedController* controller, double delay_s) {
+std::size_t max_commands(const Segment& piece, const SimulatedController* controller, double delay_s) {
   constexpr std::size_t margin = 64;
-  std::size_t most = margin + piece.last - piece.first;
-  if (controller != nullptr) most += static_cast<std::size_t>(delay_s * controller->control.sample_rate_hz);
-  return most;
+  std::size_t count = margin + piece.last - piece.first;
+  if (controller != nullptr) count += static_cast<std::size_t>(delay_s * controller->control.sample_rate_hz);
+  return count;
 }
 
 }  // namespace
@@ -171,7 +171,7 @@ std::vector<RunSimulation> simulate_runs(const Plant& plant, const std::vector<M
   parallel_for(pieces.size(), [&](std::size_t i) {
     const std::size_t r = pieces[i].run;
     const SimulatedController* controller = controllers.empty() ? nullptr : &controllers[r];
-    PieceSimulation piece(plant, runs[r], pieces[i], starts[i], most_commands(pieces[i], controller, delay_s),
+    PieceSimulation piece(plant, runs[r], pieces[i], starts[i], max_commands(pieces[i], controller, delay_s),
                           simulations[r]);
     if (controller != nullptr) {
       piece.follow(*controller);

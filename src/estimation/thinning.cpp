@@ -30,8 +30,8 @@ std::vector<Segment> moving_segments(const std::vector<Measurement>& runs) {
   return kept;
 }
 
-std::vector<Segment> thinned(const std::vector<Segment>& segments, double most) {
-  const double part = most / static_cast<double>(samples_in(segments));
+std::vector<Segment> thinned(const std::vector<Segment>& segments, double max_samples) {
+  const double part = max_samples / static_cast<double>(samples_in(segments));
   if (part >= 1.0) return segments;
   std::vector<Segment> kept;
   double owed = 0.5;

@@ -10,7 +10,7 @@ namespace upright {
 /// Segments with motion. Segments at rest carry no other information.
 std::vector<Segment> moving_segments(const std::vector<Measurement>& runs);
 
-/// Every n-th segment, so that about `most` samples remain and each run keeps its share.
-std::vector<Segment> thinned(const std::vector<Segment>& segments, double most);
+/// Every n-th segment, so that about `max_samples` samples remain and each run keeps its share.
+std::vector<Segment> thinned(const std::vector<Segment>& segments, double max_samples);
 
 }  // namespace upright

@@ -15,7 +15,7 @@ namespace {
 constexpr double longest_trial_s = 7200.0;
 constexpr double zero_patience_s = 2.0;
 /// A swing-up that fails is tried again; one that fails so often has a cause that stays.
-constexpr int most_trial_attempts = 3;
+constexpr int max_trial_attempts = 3;
 constexpr const char* again = "; start the same command again to repeat this piece";
 
 std::string section_of(const ExperimentSetup& setup, const Piece& piece, const ScriptContext& context) {
@@ -37,7 +37,7 @@ RunSetup run_setup(const ExperimentSetup& setup, const Piece& piece, const Contr
   if (simulated) run.plant = setup.simulated;
   run.limits = rig_limits(run.rig, setup.plant);
   run.limits.periods = static_cast<std::uint64_t>(longest_trial_s * run.control.sample_rate_hz);
-  run.limits.most_periods_late = default_periods_late(run.control.period_s());
+  run.limits.max_periods_late = default_periods_late(run.control.period_s());
   if (balances(piece) && options.know_loop) options.know_loop(run.control, run.limits);
   return run;
 }
@@ -177,7 +177,7 @@ ExperimentResult run_experiment(const ExperimentSetup& setup, const std::vector<
     ++attempts;
     result.stop = attempt.stop;
     if (attempt.result.outcome.empty()) {
-      if (attempt.may_repeat && attempts < most_trial_attempts && attempt.stop.done()) continue;
+      if (attempt.may_repeat && attempts < max_trial_attempts && attempt.stop.done()) continue;
       result.sentence = attempt.sentence;
       if (attempts > 1)
         result.sentence +=

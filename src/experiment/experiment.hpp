@@ -50,7 +50,7 @@ struct Rehearsal {
   LoopOutcome outcome;
   std::vector<LogRecord> rows;
   double farthest_m = 0.0;
-  double most_v = 0.0;
+  double max_v = 0.0;
   int cut_short = 0;         ///< times the guard had to end a stretch
   bool script_over = false;  ///< false: it did not come to its end
   std::uint64_t steps = 0;   ///< control periods and integration steps that it took
@@ -66,7 +66,7 @@ Rehearsal rehearse(const Piece& piece, const ExperimentSetup& setup, const Plant
 /// did, of a delay sweep that of the shortest delay, of a comparison the most of any controller and start.
 struct PlannedPiece {
   Piece piece;
-  double duration_s = 0.0, farthest_m = 0.0, most_v = 0.0;
+  double duration_s = 0.0, farthest_m = 0.0, max_v = 0.0;
 };
 
 /// Rehearses every piece. Throws ConfigError, with file and line, for a piece that would leave the travel,

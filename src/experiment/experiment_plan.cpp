@@ -20,7 +20,7 @@ constexpr double room_to_limit_m = 0.02;
 /// How far a rehearsal may go beyond the travel: the guard acts on estimates.
 constexpr double guard_slack_m = 0.01;
 /// Control periods and integration steps of a whole plan: some 10 s of computing, however stiff the plant is.
-constexpr std::uint64_t most_rehearsed_steps = 16'000'000;
+constexpr std::uint64_t max_rehearsed_steps = 16'000'000;
 
 ControlConfig without_feedback(double rate_hz) {
   ControlConfig control;
@@ -49,10 +49,10 @@ void refuse_beyond_limits(const ExperimentSetup& setup, double amplifier_limit_v
     throw ConfigError(cause + ": " + remedy);
   }
   for (const Piece& piece : e.pieces) {
-    const KeyedVoltage most = largest_voltage(*piece.kind);
-    if (most.key && most.voltage_v > amplifier_limit_v)
-      refuse(piece, most.key,
-             "asks for " + brief_text(most.voltage_v) + " V, more than the amplifier can give",
+    const KeyedVoltage largest = largest_voltage(*piece.kind);
+    if (largest.key && largest.voltage_v > amplifier_limit_v)
+      refuse(piece, largest.key,
+             "asks for " + brief_text(largest.voltage_v) + " V, more than the amplifier can give",
              "lower it to at most " + brief_text(amplifier_limit_v) + " V");
     if (!setup.plant.pendulum && piece.kind->needs_pendulum())
       refuse(piece, "kind", "needs a pendulum, but the plant has none",
@@ -75,7 +75,7 @@ Piece first_trial_of(const Piece& piece) {
 }
 
 struct RehearsalOptions {
-  std::uint64_t most_steps = 0;
+  std::uint64_t max_steps = 0;
   bool judges = false;  ///< ends where the piece has failed, and keeps no rows
 };
 
@@ -87,7 +87,7 @@ class RehearsalSink final : public RowSink {
       : script_(script), rig_(rig), farthest_m_(farthest_m), options_(options) {}
 
   bool push(const LogRecord& row) noexcept override {
-    most_v_ = std::max(most_v_, std::abs(row.voltage_v));
+    max_v_ = std::max(max_v_, std::abs(row.voltage_v));
     ++periods_;
     if (!options_.judges) rows_.push_back(row);
     const bool failed = options_.judges && (script_.cut_short() > 0 || std::abs(row.cart_m) > farthest_m_);
@@ -99,8 +99,8 @@ class RehearsalSink final : public RowSink {
 
   const SignalFlag& enough() const noexcept { return enough_; }
   std::uint64_t steps() const noexcept { return periods_ + rig_.steps_taken(); }
-  bool too_long() const noexcept { return steps() >= options_.most_steps; }
-  double most_v() const noexcept { return most_v_; }
+  bool too_long() const noexcept { return steps() >= options_.max_steps; }
+  double max_v() const noexcept { return max_v_; }
   std::vector<LogRecord> take_rows() noexcept { return std::move(rows_); }
 
  private:
@@ -109,7 +109,7 @@ class RehearsalSink final : public RowSink {
   double farthest_m_;
   RehearsalOptions options_;
   std::uint64_t periods_ = 0;
-  double most_v_ = 0.0;
+  double max_v_ = 0.0;
   std::vector<LogRecord> rows_;
   SignalFlag enough_{0};
 };
@@ -133,9 +133,9 @@ Rehearsal rehearse(const Piece& piece, const ExperimentSetup& setup, const Plant
   controller.follow(&script);
   PoseScaler scaler(calibration_in_use(rig));
   LoopLimits limits = rig_limits(rig, real);
-  limits.periods = options.most_steps;
+  limits.periods = options.max_steps;
   limits.watchdog_s = 1.0;
-  limits.most_periods_late = 1;
+  limits.max_periods_late = 1;
   RehearsalSink sink(script, *simulated, setup.experiment.travel_m + guard_slack_m, options);
   LiveStatus live;
   ControlLoop loop(*simulated, clock, controller, scaler, sink, limits, sink.enough(), live);
@@ -143,7 +143,7 @@ Rehearsal rehearse(const Piece& piece, const ExperimentSetup& setup, const Plant
   loop.run(rehearsal.outcome);
   rehearsal.rows = sink.take_rows();
   rehearsal.farthest_m = rehearsal.outcome.worst_cart_m;
-  rehearsal.most_v = sink.most_v();
+  rehearsal.max_v = sink.max_v();
   rehearsal.cut_short = script.cut_short();
   rehearsal.script_over = script.phase() == ScriptPhase::over;
   rehearsal.steps = sink.steps();
@@ -154,8 +154,8 @@ Rehearsal rehearse(const Piece& piece, const ExperimentSetup& setup, const Plant
 /// Plans piece after piece, within a number of steps for all of them.
 class Planner {
  public:
-  explicit Planner(const ExperimentSetup& setup, std::uint64_t most_steps = most_rehearsed_steps)
-      : setup_(setup), steps_left_(most_steps) {}
+  explicit Planner(const ExperimentSetup& setup, std::uint64_t max_steps = max_rehearsed_steps)
+      : setup_(setup), steps_left_(max_steps) {}
 
   PlannedPiece plan(const Piece& piece) { return compares(piece) ? plan_comparison(piece) : plan_one(piece); }
 
@@ -172,20 +172,20 @@ class Planner {
       steps_left_ = planner.steps_left_;
       whole.duration_s = std::max(whole.duration_s, planned.duration_s);
       whole.farthest_m = std::max(whole.farthest_m, planned.farthest_m);
-      whole.most_v = std::max(whole.most_v, planned.most_v);
+      whole.max_v = std::max(whole.max_v, planned.max_v);
     }
     return whole;
   }
 
   PlannedPiece plan_one(Piece piece) {
     if (!piece.fit_to_travel) refuse_unreachable(piece, setup_);
-    constexpr int most_plan_attempts = 16;
+    constexpr int max_plan_attempts = 16;
     for (int attempt = 0;; ++attempt) {
       const Rehearsal r = rehearsed(piece);
       const bool within = stays_within(r);
       if (within && r.outcome.reason == StopReason::duration)
-        return {piece, r.outcome.time_s, r.farthest_m, r.most_v};
-      if (within || !piece.fit_to_travel || attempt == most_plan_attempts) refuse_for(piece, r);
+        return {piece, r.outcome.time_s, r.farthest_m, r.max_v};
+      if (within || !piece.fit_to_travel || attempt == max_plan_attempts) refuse_for(piece, r);
       scale_voltages(*piece.kind, 0.8);
     }
   }
@@ -311,7 +311,7 @@ Rehearsal rehearse(const Piece& piece, const ExperimentSetup& setup) {
 }
 
 Rehearsal rehearse(const Piece& piece, const ExperimentSetup& setup, const Plant& real) {
-  return rehearse(piece, setup, real, {most_rehearsed_steps, false});
+  return rehearse(piece, setup, real, {max_rehearsed_steps, false});
 }
 
 std::vector<PlannedPiece> rehearse_all(const ExperimentSetup& setup, const ProgressCallback& progress) {

@@ -31,8 +31,8 @@ constexpr double held_s = 0.5;
 constexpr double pump_gain = 1.5;
 // Energy aimed at in excess of upright, in units of that between level and upright. A model that is a little
 // off would stop short, or pass over the top, for ever: each time moves the aim.
-constexpr double first_surplus = 0.04, surplus_step = 0.03, most_surplus = 0.4;
-constexpr double most_pump_mps2 = 5.0;
+constexpr double first_surplus = 0.04, surplus_step = 0.03, max_surplus = 0.4;
+constexpr double max_pump_mps2 = 5.0;
 constexpr double centring_per_s2 = 6.0, centring_per_s = 1.5;
 constexpr double catch_lean_rad = 0.35;
 // The feedback may ask for this many times the voltage there is: it is over in a tenth of a second.
@@ -205,7 +205,7 @@ Demand ExperimentScript::swing_up(const ControlState& now) noexcept {
   const bool high = std::abs(lean) < 1.2;
   if (high && now.pendulum_rate_radps * former_rate_ < 0.0) surplus_ += surplus_step;
   if (high && lean * former_lean_ < 0.0) surplus_ -= surplus_step;
-  surplus_ = std::clamp(surplus_, -most_surplus, most_surplus);
+  surplus_ = std::clamp(surplus_, -max_surplus, max_surplus);
   former_rate_ = now.pendulum_rate_radps;
   former_lean_ = lean;
   if (leaves_travel(now)) return put(servo_v(0.0, now));
@@ -214,9 +214,9 @@ Demand ExperimentScript::swing_up(const ControlState& now) noexcept {
   const double energy = 0.5 * w * w + m.gravity_mps2 / m.pendulum_m * (c - 1.0 - surplus_);
   const double pumping = w * c;
   double pump = pump_gain * energy * pumping / (std::abs(pumping) + 0.3);
-  pump = std::clamp(pump, -most_pump_mps2, most_pump_mps2);
+  pump = std::clamp(pump, -max_pump_mps2, max_pump_mps2);
   // A hanging pendulum at rest gives no direction: any will do.
-  if (std::abs(w) < 0.05 && c < -0.99) pump = most_pump_mps2;
+  if (std::abs(w) < 0.05 && c < -0.99) pump = max_pump_mps2;
   const double wanted = pump - centring_per_s2 * now.cart_m - centring_per_s * now.cart_velocity_mps;
   const double turning = pendulum_radps2(s, c, wanted, m.gravity_mps2, m.pendulum_m);
   const double force =

@@ -10,8 +10,8 @@ namespace upright {
 
 namespace {
 
-constexpr std::size_t most_list = 1000;
-constexpr std::size_t most_controllers = 8, longest_controller_name = 20;  // a table that can be read
+constexpr std::size_t max_list_length = 1000;
+constexpr std::size_t max_controllers = 8, longest_controller_name = 20;  // a table that can be read
 
 class KeyReader final : public PieceKeys, public YamlKeyReader {
  public:
@@ -55,22 +55,22 @@ class KeyReader final : public PieceKeys, public YamlKeyReader {
       controllers.push_back({name, files.path(name)});
     }
     files.finish();
-    if (controllers.size() < 2 || controllers.size() > most_controllers)
+    if (controllers.size() < 2 || controllers.size() > max_controllers)
       map_.fail(key, "has " + std::to_string(controllers.size()) + " controllers",
-                "list 2 to " + std::to_string(most_controllers) + ", as {NAME: FILE, NAME: FILE}");
+                "list 2 to " + std::to_string(max_controllers) + ", as {NAME: FILE, NAME: FILE}");
   }
 
  private:
   std::vector<double> list(const char* key, const Range& range) const {
     std::vector<double> values = map_.numbers(key, range);
-    if (values.empty() || values.size() > most_list)
+    if (values.empty() || values.size() > max_list_length)
       map_.fail(key, "has " + std::to_string(values.size()) + " numbers", "list 1 to 1000 numbers");
     return values;
   }
 
   static std::vector<double> grid(const YamlMap& map, const Range& range) {
     const double from = map.number("from", range), to = map.number("to", range);
-    const auto count = map.integer("count", 2, static_cast<std::int64_t>(most_list));
+    const auto count = map.integer("count", 2, static_cast<std::int64_t>(max_list_length));
     map.finish();
     std::vector<double> values;
     for (std::int64_t i = 0; i < count; ++i)

@@ -12,7 +12,7 @@ namespace {
 
 constexpr double servo_bandwidth_radps = 15.0;
 constexpr double push_gain = 20.0;  // V/s per m/s that is missing
-constexpr double most_push_v = 3.0;
+constexpr double max_push_v = 3.0;
 constexpr double start_margin_m = 0.015;
 // A cart that sticks cannot take out the last few degrees of a swing.
 constexpr double rest_lean_rad = 0.045;
@@ -60,7 +60,7 @@ double CartServo::voltage_v(double speed_mps, const ControlState& now, double el
     push_v_ *= std::max(0.0, 1.0 - 10.0 * elapsed_s);
   } else if (speed_mps != 0.0) {
     friction = 1.05 * m.breakaway_n * sign(speed_mps);
-    push_v_ = std::clamp(push_v_ + push_gain * speed_mps * elapsed_s, -most_push_v, most_push_v);
+    push_v_ = std::clamp(push_v_ + push_gain * speed_mps * elapsed_s, -max_push_v, max_push_v);
   }
   const double gain = servo_bandwidth_radps * m.mass_kg / m.force_per_volt_n;
   return (m.damping_n_per_mps * speed_mps + friction) / m.force_per_volt_n + gain * (speed_mps - v) + push_v_;

@@ -272,9 +272,9 @@ PartSpeeds speeds_in_parts(const Measurement& run, std::size_t first, std::size_
 /// The same all along, but for what noise makes of it: with a change of 3 percent over 0.15 s inertia takes a
 /// percent or two of what friction and back-EMF take.
 bool is_steady(const PartSpeeds& speeds) {
-  constexpr double share = 0.03, by_noise = 6.0, least_mps = 0.005;
+  constexpr double share = 0.03, by_noise = 6.0, min_mps = 0.005;
   const double noise_mps = by_noise * speeds.sigma_mps;
-  return std::abs(speeds.mean_mps) > std::max(least_mps, noise_mps) &&
+  return std::abs(speeds.mean_mps) > std::max(min_mps, noise_mps) &&
          speeds.highest_mps - speeds.lowest_mps < share * std::abs(speeds.mean_mps) + noise_mps;
 }
 
@@ -282,14 +282,14 @@ bool is_steady(const PartSpeeds& speeds) {
 
 std::vector<SteadyPoint> find_steady_points(const std::vector<Measurement>& runs, const Plant& plant) {
   constexpr double stretch_s = 0.15, settled_s = 0.25;
-  constexpr std::size_t parts = 5, least_of_part = 4;
+  constexpr std::size_t parts = 5, min_of_part = 4;
   std::vector<SteadyPoint> found;
   for (std::size_t r = 0; r < runs.size(); ++r) {
     const Measurement& run = runs[r];
     if (!run.has_cart()) continue;
     const ForceTrace trace = force_trace(run, plant);
     const double period = run.median_period_s();
-    const std::size_t length = std::max(static_cast<std::size_t>(stretch_s / period), parts * least_of_part);
+    const std::size_t length = std::max(static_cast<std::size_t>(stretch_s / period), parts * min_of_part);
     const auto settled = static_cast<std::size_t>(settled_s / period);
     std::size_t since = 0;
     for (std::size_t k = 1; k < run.size(); ++k) {

@@ -19,7 +19,7 @@ namespace upright {
 
 namespace {
 
-constexpr double most_samples = 60000.0;
+constexpr double max_samples = 60000.0;
 constexpr double trial_samples = 10000.0;
 constexpr double few_samples = 2500.0;
 /// Of the runs that are held out, and of the others, when it is judged.
@@ -27,10 +27,10 @@ constexpr double judged_samples = 20000.0;
 /// A simulation of runs that the fit did not see may be this many times as far off as the largest of some
 /// dozens of draws of the noise. A right model comes to 1; what it is more, its numbers make up for
 /// elsewhere.
-constexpr double most_held_out = 1.2;
+constexpr double max_held_out = 1.2;
 /// What an effect that is not fitted may promise of minus twice the log likelihood: some 25 with up to three
 /// parameters are asked, of which chance gives the best about 10.
-constexpr double most_promised = 40.0;
+constexpr double max_promised = 40.0;
 
 constexpr std::string_view frictions[] = {"viscous_friction",
                                           "coulomb_friction",
@@ -96,7 +96,7 @@ class Identifier {
       result_.residual = "too little moves in these data to show anything";
       return;
     }
-    whole_ = {&runs_, thinned(segments, most_samples)};
+    whole_ = {&runs_, thinned(segments, max_samples)};
     trial_ = {&runs_, thinned(segments, trial_samples)};
     few_ = {&runs_, thinned(segments, few_samples)};
     tell(0.05, "force balance");
@@ -153,13 +153,13 @@ class Identifier {
     if (!left.structured) {
       const ScoreTestResult missing = best_by_score_test(data.train, trained.fit, judged.free, search,
                                                          {"stribeck_friction", "bristle_friction"});
-      left.structured = missing.fall > most_promised;
+      left.structured = missing.fall > max_promised;
       if (left.structured)
         left.sentence = "what is left looks like " + kind_of(missing.effect) +
                         ", which identify does not fit" +
                         text(" (it promises %.3g of minus twice the log likelihood)", missing.fall);
     }
-    if (!left.structured && search.gap_of(judged) > most_held_out * noise.highest) {
+    if (!left.structured && search.gap_of(judged) > max_held_out * noise.highest) {
       left.structured = true;
       left.sentence = text(
           "a simulation of runs that the fit did not see is %.3g times as far off as noise like "
@@ -260,7 +260,7 @@ class Identifier {
   /// How friction changes between rest and sliding shows only where the cart rested and then went.
   bool starts_from_rest() {
     constexpr double rest_s = 0.1;
-    constexpr int fewest = 3;
+    constexpr int min_starts = 3;
     int starts = 0;
     for (const Measurement& run : runs_) {
       if (!run.has_cart()) continue;
@@ -273,11 +273,11 @@ class Identifier {
         since = k;
       }
     }
-    if (starts < fewest)
+    if (starts < min_starts)
       result_.notes.push_back(
           "the cart never goes from rest in these data: nothing is said of the Stribeck rise and of "
           "bristles");
-    return starts >= fewest;
+    return starts >= min_starts;
   }
 
   struct Addition {
@@ -343,11 +343,11 @@ class Identifier {
       names += (names.empty() ? "" : " and ") + std::string(kind);
       const std::size_t effect = effect_number(kind);
       sized = sized && best.plant.find(effect)->values[0] >
-                           policy_.acceptance.least_certainty * sigma_of(best, effect, 0);
+                           policy_.acceptance.min_certainty * sigma_of(best, effect, 0);
     }
-    const bool kept = evidence > policy_.acceptance.least_evidence && sized;
+    const bool kept = evidence > policy_.acceptance.min_evidence && sized;
     const std::string size =
-        text("(evidence %.0f, %.0f is asked for)", evidence, policy_.acceptance.least_evidence);
+        text("(evidence %.0f, %.0f is asked for)", evidence, policy_.acceptance.min_evidence);
     const std::string why = evidence < 0.5 ? "with which the fit is no better"
                             : sized        ? "with which the fit is hardly better " + size
                                            : "whose size is not certain";

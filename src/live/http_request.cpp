@@ -71,7 +71,7 @@ HeadReading read_head(std::string_view text, HttpRequest& request) {
     const std::string_view line = text.substr(begin, length);
     begin = end + line_end.size();
     if (line.empty()) return lines > 0 ? HeadReading::complete : HeadReading::malformed;
-    if (request.field_count == most_header_fields) return HeadReading::too_large;
+    if (request.field_count == max_header_fields) return HeadReading::too_large;
     const bool good = lines == 0 ? read_request_line(line, request) : read_field(line, request);
     if (!good) return HeadReading::malformed;
     ++lines;

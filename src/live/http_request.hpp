@@ -11,7 +11,7 @@ namespace upright {
 /// Browsers send about 1 KiB, and the cookies of every other program on this host name besides.
 inline constexpr std::size_t longest_head_bytes = 8192;
 inline constexpr std::size_t longest_line_bytes = 4096;
-inline constexpr std::size_t most_header_fields = 64;
+inline constexpr std::size_t max_header_fields = 64;
 
 /// Status codes that the server answers with.
 enum class HttpStatus : int {
@@ -31,7 +31,7 @@ struct HttpRequest {
 
   std::string_view method;
   std::string_view path;  ///< without a query
-  std::array<Field, most_header_fields> fields;
+  std::array<Field, max_header_fields> fields;
   std::size_t field_count = 0;
 
   /// The value of a field, whose name is compared without regard to case; empty where it is missing.

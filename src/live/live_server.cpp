@@ -39,11 +39,11 @@ constexpr std::string_view page_text =
     ;
 
 /// Each open page is sent some 12 kB/s; more of them than a class needs would only take time from the log.
-constexpr std::size_t most_streams = 6;
+constexpr std::size_t max_streams = 6;
 /// Overdue connections are looked for at least so often.
 constexpr auto longest_pause = 100ms;
 /// Few enough that none that is taken gives way to another before its request was looked at twice.
-constexpr std::size_t most_accepted_at_once = LiveServer::most_connections / 4;
+constexpr std::size_t max_accepted_at_once = LiveServer::max_connections / 4;
 /// Connections that the kernel holds for us until we take them.
 constexpr int backlog = 512;
 constexpr std::string_view token_header = "X-Upright-Token";
@@ -146,7 +146,7 @@ class LiveServer::Implementation {
  public:
   Implementation(LiveFeed& feed, int port, int cpu, std::function<void()> stop)
       : feed_(feed), stop_(std::move(stop)), token_(random_token()), listener_(port) {
-    polled_.reserve(most_connections + 2);
+    polled_.reserve(max_connections + 2);
     try {
       thread_ = std::thread([this, cpu] { serve(cpu); });
     } catch (const std::system_error&) {
@@ -221,7 +221,7 @@ class LiveServer::Implementation {
   }
 
   void accept_some(Time now) {
-    for (std::size_t i = 0; i < most_accepted_at_once; ++i) {
+    for (std::size_t i = 0; i < max_accepted_at_once; ++i) {
       const int socket = ::accept4(listener_.socket(), nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK);
       if (socket < 0 && (errno == ECONNABORTED || errno == EINTR)) continue;
       if (socket < 0) {
@@ -231,7 +231,7 @@ class LiveServer::Implementation {
       }
       const int yes = 1;
       ::setsockopt(socket, IPPROTO_TCP, TCP_NODELAY, &yes, sizeof yes);
-      if (connections_.size() == most_connections) make_room();
+      if (connections_.size() == max_connections) make_room();
       // Its request may have arrived already.
       attend(connections_.emplace_back(socket, now), POLLIN, now);
     }
@@ -239,7 +239,7 @@ class LiveServer::Implementation {
 
   /// The oldest of those that are no stream gives way: there are always such, streams are few.
   void make_room() {
-    static_assert(most_streams < most_connections);
+    static_assert(max_streams < max_connections);
     connections_.erase(std::find_if(connections_.begin(), connections_.end(), [](const HttpConnection& one) {
       return one.state() != HttpConnection::State::streaming;
     }));
@@ -276,7 +276,7 @@ class LiveServer::Implementation {
   }
 
   void stream(HttpConnection& connection, Time now) {
-    if (feed_.readers() >= most_streams)
+    if (feed_.readers() >= max_streams)
       return refuse(connection, HttpStatus::too_many_pages,
                     "too many pages of this run are open: close one of them", now);
     connection.stream(head(HttpStatus::ok, "text/event-stream") + "\r\n", feed_, now);

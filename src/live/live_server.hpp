@@ -4,7 +4,7 @@
 // stop button needs the token that only the page itself holds.
 //
 // One thread waits for all connections together, and each has fixed limits on what it may send and how long
-// it may take. Connections beyond `most_connections` take the place of the one that has waited longest with
+// it may take. Connections beyond `max_connections` take the place of the one that has waited longest with
 // its request, so that nobody who opens many of them, or sends slowly, keeps the stop button from being
 // heard.
 #pragma once
@@ -29,7 +29,7 @@ class LiveServer {
 
   int port() const;
 
-  static constexpr std::size_t most_connections = 64;
+  static constexpr std::size_t max_connections = 64;
 
  private:
   class Implementation;

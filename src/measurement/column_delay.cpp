@@ -81,8 +81,8 @@ void undo_delays(Measurement& run, const Dataset& dataset) {
   for (std::size_t piece = 0; piece <= run.breaks.size(); ++piece)
     append_piece(run, delays, piece == 0 ? 0 : run.breaks[piece - 1],
                  piece < run.breaks.size() ? run.breaks[piece] : run.size(), kept);
-  constexpr std::size_t fewest = 10;
-  if (kept.size() < fewest)
+  constexpr std::size_t min_samples = 10;
+  if (kept.size() < min_samples)
     throw ConfigError(dataset.file.string() + " is too short for a delay_s of " +
                       exact_text(delays.largest()) +
                       " s: check that delay_s is in seconds, or record a longer run");

@@ -39,10 +39,10 @@ constexpr double hardly_any = 0.3;
 /// No cart on a track travels further, and none of these rigs moves faster for half of a record.
 constexpr double longest_travel_m = 20.0, fastest_cart_mps = 20.0, fastest_pendulum_radps = 100.0;
 /// No motor of such a rig moves its cart at less [V]: a voltage that would be smaller is not in millivolts.
-constexpr double least_driving_v = 0.1;
+constexpr double min_driving_v = 0.1;
 /// Mistakes at once that are looked for; each more must leave a fifth of what is left over without it.
 /// Columns that are swapped have one more mistake at most, since many swaps fit something.
-constexpr std::size_t most_mistakes = 3, most_beside_swap = 1;
+constexpr std::size_t max_mistakes = 3, max_beside_swap = 1;
 const double worth_of_mistake = std::log(far_better);
 /// Of readings that leave nearly the same, the one that is listed first is taken; those that leave no more
 /// than twice as much may be right too.
@@ -86,7 +86,7 @@ class Suspicion {
     const bool bad_time = judge_.period_s() > longest_period_s || judge_.period_s() < shortest_period_s;
     const auto late = with_lateness(judge_, {});
     if (bad_time || fold_ || bad(as_read_.cart) || bad(as_read_.pendulum)) {
-      for (std::size_t count = 1; count <= most_mistakes; ++count) combine({}, 0, count);
+      for (std::size_t count = 1; count <= max_mistakes; ++count) combine({}, 0, count);
       if (late) consider(*late, {lateness});
     }
     if (!fitting_.empty() && best().kinds != std::vector<int>{lateness}) {
@@ -192,7 +192,7 @@ class Suspicion {
           [factor = factor](DataReading& r) { r.time_factor = factor; });
     }
     constexpr double millivolt_v = 1e-3;
-    if (driven && millivolt_v * largest_number() >= least_driving_v)
+    if (driven && millivolt_v * largest_number() >= min_driving_v)
       add_factor(voltage_unit, voltage_channel, millivolt_v, "voltage_v is in millivolts");
     if (cart) {
       add_factor(cart_unit, cart_channel, 1e-3, "cart_m is in millimetres");
@@ -242,7 +242,7 @@ class Suspicion {
     for (std::size_t i = from; i < corrections_.size(); ++i) {
       const Correction& correction = corrections_[i];
       if (std::find(used_.begin(), used_.end(), correction.kind) != used_.end()) continue;
-      if (correction.kind == order && used_.size() + count > 1 + most_beside_swap) continue;
+      if (correction.kind == order && used_.size() + count > 1 + max_beside_swap) continue;
       DataReading next = reading;
       correction.apply(next);
       next.mistakes.push_back(correction.words);
@@ -381,8 +381,8 @@ double usual_rate(const Measurement& run, const std::vector<double>& values) {
 std::string implausible(const Measurement& run) {
   double travel_m = 0.0;
   if (run.has_cart()) {
-    const auto [least, largest] = std::minmax_element(run.cart_m.begin(), run.cart_m.end());
-    travel_m = *largest - *least;
+    const auto [smallest, largest] = std::minmax_element(run.cart_m.begin(), run.cart_m.end());
+    travel_m = *largest - *smallest;
   }
   if (travel_m > longest_travel_m)
     return text("cart_m travels %.3g m, which is impossible for such a rig", travel_m);

@@ -18,22 +18,22 @@ constexpr double infinity = std::numeric_limits<double>::infinity();
 
 /// Window lengths, the shortest first in which accelerations stand out from the sensors' noise.
 constexpr double window_lengths_s[] = {0.08, 0.12, 0.2, 0.3, 0.5};
-constexpr double least_over_noise = 5.0;
+constexpr double min_over_noise = 5.0;
 /// Fewer windows say nothing with certainty.
-constexpr std::size_t fewest_windows = 24;
+constexpr std::size_t min_windows = 24;
 /// Delays and lags of a motor that may be there, and are no mistake.
 constexpr double delays_s[] = {0.0, 0.01, 0.02, 0.04, 0.07, 0.1};
 /// Columns are looked for that are so much later than others.
 constexpr double longest_lateness_s = 0.2;
 /// In each of so many parts of a record it must show, if there are so many windows in it.
-constexpr std::size_t parts = 3, fewest_of_part = 8;
+constexpr std::size_t parts = 3, min_of_part = 8;
 /// By how much a rig may differ from its plant file without anything being wrong with the data: masses,
 /// lengths, gravity over length and motor force; and, to choose between readings, by how much it mostly does.
 constexpr double generous = 4.0, close = 1.2;
 /// A pendulum's zero may be so far off, as a share of gravity: 12 degrees.
-constexpr double most_tilt = 0.21;
+constexpr double max_tilt = 0.21;
 /// A constant force may be so much of the motor's.
-constexpr double most_constant = 0.5;
+constexpr double max_constant = 0.5;
 /// Viscous friction stops no cart faster than in 10 ms, and dry friction is no more than five times its
 /// weight: where the motor drives through a gear, of the mass that it moves.
 constexpr double fastest_decay_per_s = 100.0, largest_friction_of_weight = 5.0;
@@ -127,7 +127,7 @@ ReadingJudge::Motion ReadingJudge::measure(const DataReading& reading, double le
   const MotionWindows windows(time_s, run_.breaks, length_s, margin_s);
   Motion motion;
   const auto shows = [&](const WindowedMotion& m) {
-    return windows.size() >= fewest_windows && rms(m.acceleration) > least_over_noise * m.acceleration_noise;
+    return windows.size() >= min_windows && rms(m.acceleration) > min_over_noise * m.acceleration_noise;
   };
   if (has(reading.column[cart_channel])) {
     motion.cart = windows.motion(channel_of(reading, cart_channel), reading.later_s[cart_channel]);
@@ -197,9 +197,9 @@ std::optional<ReadingJudge::Share> ReadingJudge::cart_share(const DataReading& r
     largest = std::max(largest, std::abs(v));
     ++rows;
   }
-  const std::size_t fewest = range.second - range.first < volts.size() ? fewest_of_part : fewest_windows;
-  if (rows < fewest || !(largest > 0.0)) return std::nullopt;
-  const double constant = most_constant * largest, damping = fastest_decay_per_s * mass;
+  const std::size_t min_rows = range.second - range.first < volts.size() ? min_of_part : min_windows;
+  if (rows < min_rows || !(largest > 0.0)) return std::nullopt;
+  const double constant = max_constant * largest, damping = fastest_decay_per_s * mass;
   const double dry = largest_friction_of_weight * mass * plant_.gravity_mps2 * volts_per_n;
   const auto bounded = [&](double by) {
     return fit.accounted({1.0 / by, 0.0, 0.0, -constant, 0.0}, {by, damping, dry, constant, 0.0});
@@ -244,8 +244,8 @@ ReadingJudge::Share ReadingJudge::pendulum_share(const DataReading& reading, con
             pendulum.acceleration[j]);
   }
   const auto bounded = [&](double by) {
-    return fit.accounted({1.0 / by, 1.0 / by, 0.0, 0.0, -most_tilt},
-                         {by, by, infinity, 0.5 * gravity, most_tilt});
+    return fit.accounted({1.0 / by, 1.0 / by, 0.0, 0.0, -max_tilt},
+                         {by, by, infinity, 0.5 * gravity, max_tilt});
   };
   return {bounded(generous), bounded(close), infinity, fit.squares()};
 }
@@ -273,7 +273,7 @@ namespace {
 using Left = std::array<double, 1 + parts>;
 
 /// The lateness at which least is left: on a grid, on a finer one around its best, and by a parabola.
-Lateness least_left(const std::function<Left(double)>& lefts_at) {
+Lateness best_lateness(const std::function<Left(double)>& lefts_at) {
   const auto left_at = [&](double later_s) { return lefts_at(later_s)[0]; };
   Lateness best;
   const Left none = lefts_at(0.0);
@@ -296,10 +296,10 @@ Lateness least_left(const std::function<Left(double)>& lefts_at) {
   const double bend = before - 2.0 * best.left_at_best + after;
   if (bend > 0.0) best.later_s += std::clamp(0.5 * (before - after) / bend, -1.0, 1.0) * step_s;
   const Left then = lefts_at(best.later_s);
-  best.least_gain = infinity;
+  best.min_gain = infinity;
   for (std::size_t part = 1; part <= parts; ++part)
     if (none[part] >= 0.0 && then[part] >= 0.0)
-      best.least_gain = std::min(best.least_gain, none[part] / std::max(then[part], 1e-9));
+      best.min_gain = std::min(best.min_gain, none[part] / std::max(then[part], 1e-9));
   return best;
 }
 
@@ -319,11 +319,11 @@ std::optional<Lateness> ReadingJudge::lateness_of_angle(const DataReading& readi
   std::vector<double> time_s = run_.time_s;
   for (double& t : time_s) t *= reading.time_factor;
   const MotionWindows windows(time_s, run_.breaks, seen.length_s, 2.0 * longest_lateness_s);
-  if (windows.size() < fewest_windows) return std::nullopt;
+  if (windows.size() < min_windows) return std::nullopt;
   const WindowedMotion cart =
       windows.motion(channel_of(reading, cart_channel), reading.later_s[cart_channel]);
   const std::vector<double> angle = channel_of(reading, theta_channel);
-  return least_left([&](double later_s) {
+  return best_lateness([&](double later_s) {
     const WindowedMotion pendulum = windows.motion(angle, reading.later_s[theta_channel] + later_s);
     Left left{};
     for (std::size_t part = 0; part <= parts; ++part) {
@@ -343,12 +343,12 @@ std::optional<Lateness> ReadingJudge::lateness_of_voltage(const DataReading& rea
   std::vector<double> time_s = run_.time_s;
   for (double& t : time_s) t *= reading.time_factor;
   const MotionWindows windows(time_s, run_.breaks, seen.length_s, 2.0 * longest_lateness_s);
-  if (windows.size() < fewest_windows) return std::nullopt;
+  if (windows.size() < min_windows) return std::nullopt;
   seen.cart = windows.motion(channel_of(reading, cart_channel), reading.later_s[cart_channel]);
   if (seen.theta_shows)
     seen.theta = windows.motion(channel_of(reading, theta_channel), reading.later_s[theta_channel]);
   const std::vector<double>& volts = raw_[reading.column[voltage_channel]];
-  return least_left([&](double later_s) {
+  return best_lateness([&](double later_s) {
     const std::vector<double> held = windows.held(volts, -reading.later_s[voltage_channel] - later_s);
     Left left{};
     for (std::size_t part = 0; part <= parts; ++part) {

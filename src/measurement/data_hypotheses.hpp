@@ -52,7 +52,7 @@ struct Lateness {
   double later_s = 0.0;
   double left = 1.0, left_at_best = 1.0;
   /// The smallest left / left_at_best of the thirds of the record.
-  double least_gain = 1.0;
+  double min_gain = 1.0;
 };
 
 /// Compares readings of one run with a plant.

@@ -178,10 +178,10 @@ std::string dataset_text(const ImportProposal& proposal, const fs::path& folder)
     text += column.column.empty() ? missing_text(column) : column_text(column);
   if (!proposal.others.empty()) {
     text += "  # not used:";
-    constexpr std::size_t most = 40;
-    for (std::size_t i = 0; i < std::min(most, proposal.others.size()); ++i)
+    constexpr std::size_t max_named = 40;
+    for (std::size_t i = 0; i < std::min(max_named, proposal.others.size()); ++i)
       text += (i > 0 ? ", " : " ") + proposal.others[i];
-    text += proposal.others.size() > most ? ", ...\n" : "\n";
+    text += proposal.others.size() > max_named ? ", ...\n" : "\n";
   }
   return text;
 }

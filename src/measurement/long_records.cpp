@@ -68,10 +68,10 @@ std::size_t samples_in(const std::vector<Measurement>& runs) {
 
 }  // namespace
 
-std::vector<Measurement> within_samples(std::vector<Measurement> runs, std::size_t most) {
+std::vector<Measurement> within_samples(std::vector<Measurement> runs, std::size_t max_samples) {
   const std::size_t all = samples_in(runs);
-  if (all <= most) return runs;
-  const double part = static_cast<double>(most) / static_cast<double>(all);
+  if (all <= max_samples) return runs;
+  const double part = static_cast<double>(max_samples) / static_cast<double>(all);
   std::vector<Measurement> kept;
   double owed = 0.5;
   for (Measurement& run : runs) {

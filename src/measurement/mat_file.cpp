@@ -19,9 +19,9 @@ namespace {
 namespace fs = std::filesystem;
 
 /// Of one variable, in memory: far above any record, far below what exhausts a machine.
-constexpr std::size_t most_bytes = std::size_t{1} << 30;
+constexpr std::size_t max_bytes = std::size_t{1} << 30;
 /// Of a matrix or a structure array, in the list of vectors.
-constexpr std::size_t most_listed = 64;
+constexpr std::size_t max_listed = 64;
 constexpr int deepest_level = 16;
 
 struct CloseMat {
@@ -35,7 +35,7 @@ using Variable = std::unique_ptr<matvar_t, FreeVariable>;
 std::size_t element_count(const matvar_t& v) {
   std::size_t count = 1;
   for (int i = 0; i < v.rank; ++i)
-    if (__builtin_mul_overflow(count, v.dims[i], &count)) return most_bytes;
+    if (__builtin_mul_overflow(count, v.dims[i], &count)) return max_bytes;
   return v.rank == 0 ? 0 : count;
 }
 
@@ -162,7 +162,7 @@ class Lister {
     if (level > deepest_level) return;
     if (v.class_type == MAT_C_STRUCT) return add_fields(v, path, level);
     if (v.class_type == MAT_C_CELL) {
-      for (std::size_t i = 0; i < std::min(element_count(v), most_listed); ++i)
+      for (std::size_t i = 0; i < std::min(element_count(v), max_listed); ++i)
         if (matvar_t* cell = cell_of(v, i)) add(*cell, path + "{" + std::to_string(i + 1) + "}", level + 1);
       return;
     }
@@ -172,7 +172,7 @@ class Lister {
       found_.push_back({path, shape->length});
       return;
     }
-    for (std::size_t c = 0; c < std::min(shape->columns, most_listed); ++c) {
+    for (std::size_t c = 0; c < std::min(shape->columns, max_listed); ++c) {
       const std::string number = std::to_string(c + 1);
       found_.push_back(
           {path + (shape->by_rows ? "(" + number + ",:)" : "(:," + number + ")"), shape->length});
@@ -184,7 +184,7 @@ class Lister {
     const std::size_t count = element_count(v);
     char* const* names = Mat_VarGetStructFieldnames(&v);
     const unsigned fields = Mat_VarGetNumberOfFields(&v);
-    for (std::size_t i = 0; i < std::min(count, most_listed); ++i)
+    for (std::size_t i = 0; i < std::min(count, max_listed); ++i)
       for (unsigned f = 0; names != nullptr && f < fields; ++f)
         if (matvar_t* field = field_of(v, names[f], i))
           add(*field, path + (count > 1 ? "(" + std::to_string(i + 1) + ")" : "") + "." + names[f],
@@ -224,7 +224,7 @@ class MatFile::Implementation {
     if (!info) return nullptr;
     const std::size_t size = element_count(*info);
     constexpr std::size_t longest_number = 8;
-    if (size > most_bytes / longest_number)
+    if (size > max_bytes / longest_number)
       throw ConfigError(file_.string() + ": " + name + " has " + std::to_string(size) +
                         " elements, more than a record can have: save the part that matters");
     Mat_Rewind(mat_.get());

@@ -89,12 +89,12 @@ class Collector {
       "(docs/reference/dataset-files.md)";
 
   static std::string columns_of(const CsvTable& table) {
-    constexpr std::size_t most = 20;
+    constexpr std::size_t max_named = 20;
     if (table.names.empty()) return " (the file is empty)";
     std::string text;
-    for (std::size_t i = 0; i < std::min(most, table.names.size()); ++i)
+    for (std::size_t i = 0; i < std::min(max_named, table.names.size()); ++i)
       text += (i > 0 ? ", " : " (the columns are: ") + table.names[i].substr(0, 40);
-    return text + (table.names.size() > most ? ", ...)" : ")");
+    return text + (table.names.size() > max_named ? ", ...)" : ")");
   }
 
   /// A unit in the file is taken at its word where the dataset file says nothing of a scale.
@@ -162,10 +162,10 @@ class Collector {
 
   /// Stamps scatter about the rows' clock and stay near it; else the period is another or rows are missing.
   void refuse_missing_rows() const {
-    constexpr double most_periods = 10.0, most_share = 0.001;
+    constexpr double max_periods = 10.0, max_share = 0.001;
     const double period_s = sources_[time]->period_s, off_s = last_stamp_s_ - last_counted_s_;
     if (period_s == 0.0 || rows_ < 2 ||
-        std::abs(off_s) <= most_periods * period_s + most_share * (last_counted_s_ - first_stamp_s_))
+        std::abs(off_s) <= max_periods * period_s + max_share * (last_counted_s_ - first_stamp_s_))
       return;
     throw ConfigError(
         dataset_.file.string() + ": the time stamps end " + exact_text(off_s) +
@@ -222,8 +222,8 @@ class Collector {
 
 /// A record of which too little is left.
 void refuse_too_short(const Measurement& m, const Dataset& dataset) {
-  constexpr std::size_t fewest = 10;
-  if (m.size() >= fewest) return;
+  constexpr std::size_t min_samples = 10;
+  if (m.size() >= min_samples) return;
   const std::string head = dataset.file.string() + ":1: " + std::to_string(m.size()) + " samples" +
                            (m.missing_rows > 0 ? " without a missing cell" : "") +
                            (dataset.from_s || dataset.to_s ? " from from_s to to_s" : "") +
@@ -236,7 +236,7 @@ void refuse_too_short(const Measurement& m, const Dataset& dataset) {
 /// Gaps so near to each other that nothing is left to be followed between them.
 void refuse_gaps_everywhere(const Measurement& m, const Dataset& dataset) {
   // A fit begins 0.1 s after a gap (cut_segments), and a quarter of a second is the least it can judge.
-  constexpr double least_s = 0.35;
+  constexpr double min_s = 0.35;
   double longest_s = 0.0;
   std::size_t first = 0;
   for (std::size_t i = 0; i <= m.breaks.size(); ++i) {
@@ -244,7 +244,7 @@ void refuse_gaps_everywhere(const Measurement& m, const Dataset& dataset) {
     longest_s = std::max(longest_s, m.time_s[end - 1] - m.time_s[first]);
     first = end;
   }
-  if (m.breaks.empty() || longest_s >= least_s) return;
+  if (m.breaks.empty() || longest_s >= min_s) return;
   throw ConfigError(
       dataset.file.string() + ": " + std::to_string(m.missing_rows) +
       " rows have a cell without a number, at most " + exact_text(longest_s) +

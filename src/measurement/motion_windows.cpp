@@ -8,8 +8,8 @@ namespace upright {
 
 namespace {
 
-constexpr std::size_t fewest_samples = 6;  ///< of a window: twice what a parabola needs
-constexpr std::size_t most_windows = 4000;
+constexpr std::size_t min_samples = 6;  ///< of a window: twice what a parabola needs
+constexpr std::size_t max_windows = 4000;
 
 }  // namespace
 
@@ -17,12 +17,12 @@ MotionWindows::MotionWindows(const std::vector<double>& time_s, const std::vecto
                              double length_s, double margin_s)
     : time_s_(time_s), length_s_(length_s) {
   const double duration_s = time_s.back() - time_s.front(), whole_s = length_s + 2.0 * margin_s;
-  const double step_s = std::max(0.5 * length_s, duration_s / most_windows);
+  const double step_s = std::max(0.5 * length_s, duration_s / max_windows);
   const double period_s = duration_s / static_cast<double>(time_s.size() - 1);
   auto next_break = breaks.begin();
   std::size_t first = 0;
   // Counted: where stamps are huge, a step added to them may be nothing.
-  for (std::size_t number = 0; number < 2 * most_windows; ++number) {
+  for (std::size_t number = 0; number < 2 * max_windows; ++number) {
     const double from_s = time_s.front() + step_s * static_cast<double>(number);
     if (from_s + whole_s > time_s.back()) break;
     while (time_s[first] < from_s) ++first;
@@ -38,7 +38,7 @@ MotionWindows::MotionWindows(const std::vector<double>& time_s, const std::vecto
     whole = whole && (next_break == breaks.end() || *next_break > last);
     while (first < last && time_s[first] < from_s + margin_s) ++first;
     while (last > first && time_s[last] > from_s + margin_s + length_s) --last;
-    if (whole && last - first + 1 >= fewest_samples) windows_.emplace_back(first, last);
+    if (whole && last - first + 1 >= min_samples) windows_.emplace_back(first, last);
     while (first > 0 && time_s[first - 1] >= from_s) --first;
   }
 }

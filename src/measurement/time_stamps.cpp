@@ -10,9 +10,9 @@ namespace {
 
 /// Windows of so many rows, each followed by a polynomial of so many coefficients.
 constexpr Eigen::Index rows = 15, coefficients = 5;
-constexpr std::size_t fewest_stamp_windows = 24, most_stamp_windows = 4000;
+constexpr std::size_t min_stamp_windows = 24, max_stamp_windows = 4000;
 /// Steps of stamps differ by this share of their mean before anything is looked for.
-constexpr double least_scatter = 0.02;
+constexpr double min_scatter = 0.02;
 /// The motion leaves so many times as much with the stamps as with a steady clock.
 constexpr double better_with_stamps = 5.0;
 
@@ -37,7 +37,7 @@ double left_of(const Window& time, const Window& values) {
 std::vector<std::size_t> windows_of(const Measurement& run) {
   const auto length = static_cast<std::size_t>(rows);
   std::vector<std::size_t> firsts;
-  const std::size_t step = std::max(length, run.size() / most_stamp_windows);
+  const std::size_t step = std::max(length, run.size() / max_stamp_windows);
   for (std::size_t first = 0; first + length <= run.size(); first += step) {
     const auto next = std::upper_bound(run.breaks.begin(), run.breaks.end(), first);
     if (next == run.breaks.end() || *next >= first + length) firsts.push_back(first);
@@ -55,7 +55,7 @@ double median(std::vector<double> values) {
 
 std::optional<ScatteredStamps> find_scatter(const Measurement& run) {
   const std::vector<std::size_t> firsts = windows_of(run);
-  if (firsts.size() < fewest_stamp_windows) return std::nullopt;
+  if (firsts.size() < min_stamp_windows) return std::nullopt;
   Window steady;
   for (Eigen::Index i = 0; i < rows; ++i) steady[i] = static_cast<double>(i);
   std::vector<double> periods, scatters;
@@ -72,7 +72,7 @@ std::optional<ScatteredStamps> find_scatter(const Measurement& run) {
   // Over the whole record the stamps scatter least, where no rows are missing.
   const double mean_s = (run.time_s.back() - run.time_s.front()) / static_cast<double>(run.size() - 1);
   if (std::abs(mean_s - found.period_s) < same_period * found.period_s) found.period_s = mean_s;
-  if (found.scatter_s < least_scatter * found.period_s) return std::nullopt;
+  if (found.scatter_s < min_scatter * found.period_s) return std::nullopt;
   for (const std::vector<double>* channel : {&run.cart_m, &run.theta_rad}) {
     if (channel->empty()) continue;
     double stamped = 0.0, clocked = 0.0;

@@ -16,9 +16,9 @@ MatrixXd inverse(const MatrixXd& matrix) {
   return matrix.inverse();
 }
 
-std::optional<MatrixXd> inverse_if_regular(const MatrixXd& matrix, double least_rcond) {
+std::optional<MatrixXd> inverse_if_regular(const MatrixXd& matrix, double min_rcond) {
   const Eigen::FullPivLU<MatrixXd> factored(matrix);
-  if (!factored.isInvertible() || factored.rcond() < least_rcond) return std::nullopt;
+  if (!factored.isInvertible() || factored.rcond() < min_rcond) return std::nullopt;
   return factored.inverse();
 }
 

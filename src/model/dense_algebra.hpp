@@ -14,8 +14,8 @@ Eigen::VectorXcd eigenvalues(const Eigen::MatrixXd& matrix);
 Eigen::MatrixXd inverse(const Eigen::MatrixXd& matrix);
 
 /// Inverse of an n x n matrix by complete pivoting; absent where it is singular, or its reciprocal condition
-/// number below `least_rcond`.
-std::optional<Eigen::MatrixXd> inverse_if_regular(const Eigen::MatrixXd& matrix, double least_rcond);
+/// number below `min_rcond`.
+std::optional<Eigen::MatrixXd> inverse_if_regular(const Eigen::MatrixXd& matrix, double min_rcond);
 
 /// Solution x of a x = b for a regular n x n matrix.
 Eigen::VectorXcd solve(const Eigen::MatrixXcd& a, const Eigen::VectorXcd& b);

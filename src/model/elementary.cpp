@@ -63,11 +63,11 @@ ReducedAngle reduced(double angle) {
   constexpr double direct = 0.78539816339744827900;  // pi / 4
   if (std::abs(angle) <= direct) return {angle, 0.0, 0};
   // Up to so many quarter turns the products with the parts of pi / 2, of 33 bits each, are exact.
-  constexpr double most_quarter_turns = 1 << 20;
+  constexpr double max_quarter_turns = 1 << 20;
   constexpr double quarter_turns_per_rad = 2.0 / std::numbers::pi;
   constexpr double first = 1.57079632673412561417e+00, second = 6.07710050630396597660e-11,
                    third = 2.02226624879595063154e-21;
-  if (!(std::abs(angle) * quarter_turns_per_rad < most_quarter_turns))
+  if (!(std::abs(angle) * quarter_turns_per_rad < max_quarter_turns))
     angle = std::remainder(angle, 2.0 * std::numbers::pi);
   const double turns = nearest_integer(angle * quarter_turns_per_rad);
   const double near = angle - turns * first;

@@ -124,10 +124,10 @@ DiscreteRiccatiSolution solve_discrete_riccati(const MatrixXd& a, const MatrixXd
   MatrixXd f = a - b * weight.solve(s.transpose());
   MatrixXd g = symmetric_part(b * weight.solve(b.transpose()));
   MatrixXd h = symmetric_part(q - s * weight.solve(s.transpose()));
-  constexpr int most_doublings = 60;
+  constexpr int max_doublings = 60;
   constexpr double converged = 1e-15;
   bool done = false;
-  for (int i = 0; i < most_doublings && !done; ++i) {
+  for (int i = 0; i < max_doublings && !done; ++i) {
     const Eigen::PartialPivLU<MatrixXd> lu(MatrixXd::Identity(n, n) + g * h);
     const MatrixXd w_f = lu.solve(f), w_g = lu.solve(g);
     const MatrixXd grown = f.transpose() * h * w_f;

@@ -183,7 +183,7 @@ std::string sentence_of_overrun(const LoopOutcome& o, const LoopLimits& limits, 
     cause = "the loop woke late because it has no real-time scheduling: ";
     remedy = "grant it (see upright doctor), reduce the processor's load, or lower sample_rate_hz";
   }
-  return "more than " + std::to_string(limits.most_periods_late) + " periods in a row overran, starting" +
+  return "more than " + std::to_string(limits.max_periods_late) + " periods in a row overran, starting" +
          when + "; " + cause + remedy;
 }
 

@@ -86,7 +86,7 @@ std::string loop_text(const RunSetup& setup) {
          "\n  coast_s: " + exact_text(limits.coast_s) +
          "\n  fall_angle_rad: " + exact_text(limits.fall_angle_rad) +
          "\n  watchdog_s: " + exact_text(limits.watchdog_s) +
-         "\n  most_periods_late: " + std::to_string(limits.most_periods_late) +
+         "\n  most_periods_late: " + std::to_string(limits.max_periods_late) +
          "\n  spin_us: " + exact_text(static_cast<double>(limits.spin_ns) / 1e3) +
          "\n  encoder_watch: " + encoder_assumptions_text(limits.encoders) +
          "\n  delay_is_exact: " + yes(delay.exact()) + "  # false: linear between samples\n" +
@@ -230,8 +230,8 @@ RunDirectory::RunDirectory(const std::filesystem::path& parent, const std::strin
                       problem.message() + "): name another with --out");
   started_utc_ = utc_now("%Y-%m-%dT%H:%M:%SZ");
   const std::string name = utc_now("%Y%m%dT%H%M%SZ") + "-" + label;
-  constexpr int most_tries = 10000;
-  for (int i = 1; i <= most_tries; ++i) {
+  constexpr int max_tries = 10000;
+  for (int i = 1; i <= max_tries; ++i) {
     path_ = parent / (i == 1 ? name : name + "-" + std::to_string(i));
     if (std::filesystem::create_directory(path_, problem)) {
       hold();

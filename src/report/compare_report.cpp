@@ -14,7 +14,7 @@ namespace upright {
 
 namespace {
 
-constexpr std::size_t most_drawn = 6;  // more curves in one plot are not distinguishable
+constexpr std::size_t max_drawn = 6;  // more curves in one plot are not distinguishable
 
 std::string in_units(double value, const Quantity& quantity) {
   return number_text(value * quantity.per_si_unit, 3) + " " + std::string(quantity.unit);
@@ -151,12 +151,12 @@ void write_compare_report(const std::vector<RunBehaviour>& runs, const std::file
 
 void add_overlays(HtmlPage& page, const std::vector<RunBehaviour>& runs, const std::string& heading) {
   std::vector<RunData> data;
-  for (std::size_t k = 0; k < std::min(runs.size(), most_drawn); ++k)
+  for (std::size_t k = 0; k < std::min(runs.size(), max_drawn); ++k)
     data.push_back(load_run_data(runs[k].run));
   page.section(heading);
   page.stack(overlays(runs, data, &RunData::drawn),
-             runs.size() > most_drawn ? "The first " + std::to_string(most_drawn) + " runs are drawn."
-                                      : "Complete runs.");
+             runs.size() > max_drawn ? "The first " + std::to_string(max_drawn) + " runs are drawn."
+                                     : "Complete runs.");
   page.section("The last " + number_text(closing_s) + " seconds");
   page.stack(overlays(runs, data, &RunData::closing),
              "Time is counted from the start of this section of each run.");

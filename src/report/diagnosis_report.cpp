@@ -242,7 +242,7 @@ void add_traces(HtmlPage& page, const std::filesystem::path& file) {
       {},
       "RMS of measured minus simulated. Open-loop simulation with the recorded voltages, in segments. Each "
       "segment starts from the initial state that fits the model best."};
-  constexpr std::size_t most_shown = 3;
+  constexpr std::size_t max_shown = 3;
   for (std::size_t r = 0; r < runs.size(); ++r) {
     std::vector<Plot> plots;
     for (const auto& [column, label, unit] :
@@ -274,7 +274,7 @@ void add_traces(HtmlPage& page, const std::filesystem::path& file) {
       plots.push_back(errors);
     }
     align(plots);
-    if (r < most_shown)
+    if (r < max_shown)
       page.figures(plots, "Held-out run " + runs[r] + ": before and after the effects were added.");
   }
   page.table(table);
@@ -290,8 +290,8 @@ std::string difference(const std::string& from, const std::string& to) {
     return lines;
   };
   const std::vector<std::string> a = lines_of(from), b = lines_of(to);
-  constexpr std::size_t most_pairs = 4'000'000;  // far more than plant files have
-  if (b.size() > 0 && a.size() > most_pairs / b.size()) return "too long to compare\n";
+  constexpr std::size_t max_pairs = 4'000'000;  // far more than plant files have
+  if (b.size() > 0 && a.size() > max_pairs / b.size()) return "too long to compare\n";
   std::vector<std::vector<std::size_t>> common(a.size() + 1, std::vector<std::size_t>(b.size() + 1, 0));
   for (std::size_t i = a.size(); i-- > 0;)
     for (std::size_t j = b.size(); j-- > 0;)

@@ -73,11 +73,11 @@ std::vector<SweepRun> simulate(const Plant& plant, const RunRecord& run,
   const double drawn_to_s = std::min(1.2 * longest, DelayLine::longest_delay_s);
   for (int i = 0; i <= count; ++i) cases.push_back({theta0, drawn_to_s * i / count});
   std::vector<SweepRun> runs;
-  const std::size_t most = std::max<std::size_t>(1, sweep_group_size(config));
-  for (std::size_t begin = 0; begin < cases.size(); begin += most) {
+  const std::size_t group_size = std::max<std::size_t>(1, sweep_group_size(config));
+  for (std::size_t begin = 0; begin < cases.size(); begin += group_size) {
     const SweepExecutor::Group group(
         cases.begin() + static_cast<std::ptrdiff_t>(begin),
-        cases.begin() + static_cast<std::ptrdiff_t>(std::min(begin + most, cases.size())));
+        cases.begin() + static_cast<std::ptrdiff_t>(std::min(begin + group_size, cases.size())));
     const std::vector<SweepRun> done = run_sweep_group(config, group);
     runs.insert(runs.end(), done.begin(), done.end());
   }
@@ -129,12 +129,12 @@ void add_sweep(HtmlPage& page, const std::filesystem::path& folder, const std::s
   plot.y.label = "angle amplitude [degree]";
   plot.y.logarithmic = true;
   plot.height_px = 400;
-  constexpr double least_degree = 1e-3;
+  constexpr double min_degree = 1e-3;
   Series line{"simulated", {}, {}, Series::Style::line, color::soft};
   double simulated_oscillates = std::nan(""), simulated_falls = std::nan("");
   for (const SweepRun& r : simulated) {
     line.x.push_back(1e3 * r.start.delay_s);
-    line.y.push_back(std::max(r.theta_amplitude_rad * degrees_per_radian, least_degree));
+    line.y.push_back(std::max(r.theta_amplitude_rad * degrees_per_radian, min_degree));
     const Outcome outcome = r.outcome(sweep.stable_below_rad);
     if (outcome != Outcome::stable && std::isnan(simulated_oscillates))
       simulated_oscillates = r.start.delay_s;
@@ -146,7 +146,7 @@ void add_sweep(HtmlPage& page, const std::filesystem::path& folder, const std::s
     for (const TrialResult& r : trials)
       if (r.outcome == outcome) {
         points.x.push_back(1e3 * r.trial.delay_s);
-        points.y.push_back(std::max(r.theta_amplitude_rad * degrees_per_radian, least_degree));
+        points.y.push_back(std::max(r.theta_amplitude_rad * degrees_per_radian, min_degree));
       }
     if (!points.x.empty()) plot.series.push_back(points);
   }

@@ -19,7 +19,7 @@ namespace {
 // Room around the axes, in heights of a text: half a tick's text at the right; ticks and label below; the
 // scale of a heat map of magnitudes; at least so much at the left, so that most plots of a page align.
 constexpr double line_heights = 1.5, right_heights = 2.0, bottom_heights = 4.0, scale_heights = 8.5,
-                 least_left_heights = 6.0;
+                 min_left_heights = 6.0;
 
 int heights(const Plot& plot, double count) {
   return static_cast<int>(count * plot.text_px);
@@ -321,7 +321,7 @@ int key_lines(const Plot& plot) {
   double widest = 0.0;
   for (const KeyEntry& entry : key)
     widest = std::max(widest, text_width_px(entry.name, plot.text_px) + swatch_px);
-  const double room = plot.width_px - heights(plot, least_left_heights + right_heights);
+  const double room = plot.width_px - heights(plot, min_left_heights + right_heights);
   const int columns = std::max(1, static_cast<int>(room / std::max(widest, 1.0)));
   return (static_cast<int>(key.size()) + columns - 1) / columns;
 }
@@ -526,8 +526,8 @@ Series histogram(const std::vector<std::pair<double, std::uint64_t>>& values, st
   series.name = name;
   series.style = Series::Style::bars;
   if (values.empty() || bins == 0) return series;
-  const auto [least, most] = std::minmax_element(values.begin(), values.end());
-  const double low = least->first, high = most->first;
+  const auto [smallest, largest] = std::minmax_element(values.begin(), values.end());
+  const double low = smallest->first, high = largest->first;
   const double width =
       std::max((high - low) / static_cast<double>(bins), 1e-9 * std::max(1.0, std::abs(high)));
   for (std::size_t i = 0; i < bins; ++i) series.x.push_back(low + (static_cast<double>(i) + 0.5) * width);
@@ -566,7 +566,7 @@ int left_px_of(const Plot& plot) {
   for (const Tick& tick : ticks_of(span_of(plot.y, ranges_of(plot).y, height, false, plot.text_px)))
     widest = std::max(widest, text_width_px(tick.text, plot.text_px));
   constexpr double label_heights = 2.5;  // the axis's own label, and the tick
-  return std::max(heights(plot, least_left_heights), heights(plot, label_heights) + static_cast<int>(widest));
+  return std::max(heights(plot, min_left_heights), heights(plot, label_heights) + static_cast<int>(widest));
 }
 
 void align(std::vector<Plot>& plots) {

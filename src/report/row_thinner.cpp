@@ -28,7 +28,7 @@ constexpr std::uint64_t first_block_rows = 64;  // of which seldom more than 18 
 void RowThinner::add(const LogRecord& row) {
   kept_.push_back({rows_++, row});
   if (block_rows_ > 1 && rows_ % block_rows_ == 0) thin(block_begin_);
-  if (kept_.size() <= most_rows) return;
+  if (kept_.size() <= max_rows) return;
   block_rows_ = std::max(first_block_rows, 2 * block_rows_);
   thin(0);
 }

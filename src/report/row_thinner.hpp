@@ -9,12 +9,12 @@
 
 namespace upright {
 
-/// Keeps all rows of a run of up to `most_rows`. In longer runs it keeps some rows of each block: the first,
+/// Keeps all rows of a run of up to `max_rows`. In longer runs it keeps some rows of each block: the first,
 /// the last, and for each drawn quantity the minimum, the maximum and one that is not a number, so no peak
 /// and no gap is lost. Blocks grow with the run.
 class RowThinner {
  public:
-  static constexpr std::size_t most_rows = 200'000;
+  static constexpr std::size_t max_rows = 200'000;
 
   void add(const LogRecord& row);
   /// In their order.

@@ -117,8 +117,7 @@ bool gather_rows(const std::filesystem::path& samples, const ProgressCallback& p
     for (Event& event : seen) event.rows += (row.flags & event.flags) != 0 ? 1 : 0;
     thinner.add(row);
     closing.push_back(row);
-    while (seconds_of(closing.front()) < seconds_of(row) - closing_s ||
-           closing.size() > RowThinner::most_rows)
+    while (seconds_of(closing.front()) < seconds_of(row) - closing_s || closing.size() > RowThinner::max_rows)
       closing.pop_front();
   }
   for (const Event& event : seen) data.outcome_facts.emplace_back(event.name, std::to_string(event.rows));

@@ -133,8 +133,8 @@ void write_simulation_report(const SimulationTitle& title, const std::vector<Mea
                                : "Run " + runs.front().name + ", the first of " +
                                      std::to_string(runs.size()) + " runs. The table has all.");
   page.table(errors_of(runs, simulations));
-  constexpr std::size_t most_shown = 6;
-  for (std::size_t r = 0; r < std::min(runs.size(), most_shown); ++r) {
+  constexpr std::size_t max_shown = 6;
+  for (std::size_t r = 0; r < std::min(runs.size(), max_shown); ++r) {
     page.section(runs[r].name);
     std::vector<Plot> plots;
     for (const ShownChannel& channel : channels_of(runs[r], simulations[r])) {
@@ -144,8 +144,8 @@ void write_simulation_report(const SimulationTitle& title, const std::vector<Mea
     plots.push_back(voltage_of(runs[r], simulations[r], closed_loop));
     page.stack(plots, "Each piece starts from the state that fits its first samples.");
   }
-  if (runs.size() > most_shown)
-    page.paragraph("The plots show the first " + std::to_string(most_shown) +
+  if (runs.size() > max_shown)
+    page.paragraph("The plots show the first " + std::to_string(max_shown) +
                    " runs. simulated.csv has the curves of all.");
   page.write(file);
 }

@@ -34,9 +34,9 @@ bool fit(const AxisSpan& axis, const std::vector<Tick>& ticks) {
 
 std::string fixed(double value, double step) {
   const int decimals = std::max(0, static_cast<int>(-std::floor(std::log10(step) + tolerance)));
-  constexpr int most_decimals = 6;
+  constexpr int max_decimals = 6;
   const double largest = 1e6;
-  if (decimals > most_decimals || std::abs(value) >= largest) {
+  if (decimals > max_decimals || std::abs(value) >= largest) {
     char text[32];
     std::snprintf(text, sizeof text, "%.4g", value);
     return text;
@@ -50,8 +50,8 @@ std::vector<Tick> at_step(const AxisSpan& axis, double step) {
   std::vector<Tick> ticks;
   const double first = std::ceil(axis.low / step - tolerance),
                last = std::floor(axis.high / step + tolerance);
-  constexpr double most = 2000.0;
-  const int count = static_cast<int>(std::clamp(last - first + 1.0, 0.0, most));
+  constexpr double max_ticks = 2000.0;
+  const int count = static_cast<int>(std::clamp(last - first + 1.0, 0.0, max_ticks));
   ticks.reserve(static_cast<std::size_t>(count));
   for (int i = 0; i < count; ++i) ticks.push_back({(first + i) * step, fixed((first + i) * step, step)});
   return ticks;

@@ -83,7 +83,7 @@ void ControlLoop::stop(LoopOutcome& outcome, StopReason reason, std::uint64_t fi
 void ControlLoop::stop_without_news(const Wake& wake, StopReason reason, std::uint64_t first_bad,
                                     LoopOutcome& outcome) noexcept {
   const std::int64_t taken_ns = std::max<std::int64_t>(0, read_done_ns_ - phase_.due_ns(wake.tick));
-  if (static_cast<std::uint64_t>(taken_ns / phase_.period_ns) > limits_.most_periods_late)
+  if (static_cast<std::uint64_t>(taken_ns / phase_.period_ns) > limits_.max_periods_late)
     stop(outcome, StopReason::overrun, wake.tick);
   else
     stop(outcome, reason, first_bad);
@@ -225,7 +225,7 @@ void ControlLoop::count_missed(const Wake& wake, LoopOutcome& outcome) noexcept 
   row_.flags |= row_flag::missed;
   after_gap_ = true;
   outcome.counts.missed += wake.missed;
-  if (periods_late_ > limits_.most_periods_late && !stopped_)
+  if (periods_late_ > limits_.max_periods_late && !stopped_)
     stop(outcome, StopReason::overrun, first_late_tick_);
 }
 
@@ -252,7 +252,7 @@ void ControlLoop::attribute_overrun(const Wake& wake, std::int64_t end_ns, LoopO
     row_.flags |= row_flag::overrun_wake;
     ++counts.overruns_wake;
   }
-  if (periods_late_ > limits_.most_periods_late && !stopped_)
+  if (periods_late_ > limits_.max_periods_late && !stopped_)
     stop(outcome, StopReason::overrun, first_late_tick_);
 }
 

@@ -58,21 +58,21 @@ OverrunLimit overrun_limit(const std::optional<Plant>& model, const ControlConfi
   OverrunLimit limit;
   if (model && model->pendulum) {
     limit.tolerance = overrun_tolerance(*model, control);
-    limit.most_periods_late = limit_for(*limit.tolerance, control.period_s());
+    limit.max_periods_late = limit_for(*limit.tolerance, control.period_s());
     limit.sentence = limit.tolerance->sentence;
     limit.warning = warning_for(*limit.tolerance, *model, control);
   } else {
-    limit.most_periods_late = unknown_limit(control.period_s());
+    limit.max_periods_late = unknown_limit(control.period_s());
     limit.sentence = "unknown without a model of the rig (--plant), assumed to be " +
                      milliseconds(unknown_tolerance_s, "%.4g");
   }
-  limit.sentence += "; the run stops when more than " + std::to_string(limit.most_periods_late) +
+  limit.sentence += "; the run stops when more than " + std::to_string(limit.max_periods_late) +
                     " periods in a row overrun";
   return limit;
 }
 
 void apply(const OverrunLimit& overrun, LoopLimits& limits) {
-  limits.most_periods_late = overrun.most_periods_late;
+  limits.max_periods_late = overrun.max_periods_late;
   limits.delay_exceeded = !overrun.warning.empty();
 }
 

@@ -13,7 +13,7 @@
 namespace upright {
 
 struct OverrunLimit {
-  std::uint64_t most_periods_late = 0;        ///< for LoopLimits
+  std::uint64_t max_periods_late = 0;         ///< for LoopLimits
   std::optional<OverrunTolerance> tolerance;  ///< none: there is no model of a pendulum to find it from
   std::string sentence;  ///< the delay that the loop tolerates, and the limit that follows
   std::string warning;   ///< one sentence where the loop will oscillate or fall; else empty

@@ -57,8 +57,8 @@ void complete(RunDirectory& directory, const LoopLimits& limits, SessionResult& 
 
 std::uint64_t default_periods_late(double period_s) {
   constexpr double tolerated_s = 0.05;
-  constexpr std::uint64_t at_least = 3;
-  return std::max(at_least, static_cast<std::uint64_t>(std::ceil(tolerated_s / period_s)));
+  constexpr std::uint64_t min_periods = 3;
+  return std::max(min_periods, static_cast<std::uint64_t>(std::ceil(tolerated_s / period_s)));
 }
 
 void require_spin_fits(double spin_us, double period_s) {

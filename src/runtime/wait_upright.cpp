@@ -18,10 +18,11 @@ constexpr double still_within_rad = 0.03;  // a hand is not steadier
 class Hold {
  public:
   explicit Hold(const RigFile& file)
-      : most_rad_(std::min(nearly_upright_rad, 0.5 * file.fall_angle_rad)), track_m_(file.track_limit_m) {}
+      : max_angle_rad_(std::min(nearly_upright_rad, 0.5 * file.fall_angle_rad)),
+        track_m_(file.track_limit_m) {}
 
   bool long_enough(const Pose& pose, std::int64_t now_ns) {
-    const bool good = std::abs(pose.theta_rad) < most_rad_ && std::abs(pose.cart_m) < track_m_;
+    const bool good = std::abs(pose.theta_rad) < max_angle_rad_ && std::abs(pose.cart_m) < track_m_;
     if (!good || !held_ || std::abs(pose.theta_rad - where_rad_) > still_within_rad) {
       held_ = good;
       where_rad_ = pose.theta_rad;
@@ -31,7 +32,7 @@ class Hold {
   }
 
  private:
-  double most_rad_, track_m_;
+  double max_angle_rad_, track_m_;
   double where_rad_ = 0.0;
   std::int64_t since_ns_ = 0;
   bool held_ = false;

@@ -19,8 +19,8 @@ namespace upright {
 
 namespace {
 
-constexpr std::int64_t most_values = 1'000'000;
-constexpr double most_runs = 1e8;
+constexpr std::int64_t max_values = 1'000'000;
+constexpr double max_runs = 1e8;
 
 /// The decimal number that is meant: 0.12 * 7 / 120 is 0.007 and not the sum of its roundings.
 double rounded(double value) {
@@ -31,7 +31,7 @@ double rounded(double value) {
 
 std::vector<double> spaced(const YamlMap& map, const Range& range) {
   const double from = map.number("from", range), to = map.number("to", range);
-  const auto count = map.integer("count", 1, most_values);
+  const auto count = map.integer("count", 1, max_values);
   const bool logarithmic = map.has("spacing") && map.choice("spacing", {"linear", "log"}) == "log";
   map.finish();
   if (count > 1 && !(to > from))
@@ -152,7 +152,7 @@ SweepConfig read_sweep_file(const std::filesystem::path& file) {
   config.delay_s = read_delays(map);
   const double runs =
       static_cast<double>(config.theta0_rad.size()) * static_cast<double>(config.delay_s.size());
-  if (runs > most_runs)
+  if (runs > max_runs)
     map.fail("theta0_deg", "and delay_s together make too many runs",
              "use fewer values, for at most 1e8 runs");
   setup.duration_s = map.number("duration_s", Range{0.0, 1e5, true});

@@ -429,13 +429,13 @@ class Paper : private PaperPage {
       results[seed] = run_with_events(setup, {3.0 * degree, 0.15});
     });
     std::size_t fell = 0;
-    double most = 0.0;
+    double largest_rad = 0.0;
     for (const LoopResult& result : results) {
       fell += result.fell() ? 1 : 0;
-      most = std::max(most, result.theta_amplitude_rad);
+      largest_rad = std::max(largest_rad, result.theta_amplitude_rad);
     }
     return "| " + model + " | " + std::to_string(fell) + " of " + std::to_string(seeds) + " | " +
-           number_text(most / degree, 2) + " degree |";
+           number_text(largest_rad / degree, 2) + " degree |";
   }
 
   void basin_with_predictor(const std::filesystem::path& file) {

@@ -123,7 +123,7 @@ std::string range_of(const Series& falls) {
 
 /// From which delay each start falls.
 Series falls_of(const LoopSetup& setup, unsigned threads) {
-  constexpr double longest_s = 0.12, least_deg = 0.1, most_deg = 10.0;
+  constexpr double longest_s = 0.12, min_deg = 0.1, max_deg = 10.0;
   constexpr int starts = 12;
   SweepConfig config;
   config.engine = SweepEngine::reproducible;
@@ -131,7 +131,7 @@ Series falls_of(const LoopSetup& setup, unsigned threads) {
   for (int i = 0; i <= std::lround(longest_s * 1e3); ++i) config.delay_s.push_back(1e-3 * i);
   for (int i = 0; i <= starts; ++i)
     config.theta0_rad.push_back(
-        least_deg * elementary::power(most_deg / least_deg, static_cast<double>(i) / starts) * degree);
+        min_deg * elementary::power(max_deg / min_deg, static_cast<double>(i) / starts) * degree);
   Series line;
   for (const Transition& t : find_transitions(config, *make_thread_executor(config, threads))) {
     line.x.push_back(t.falls_from_s);

@@ -129,7 +129,7 @@ TEST(CommandLine, ACardThatIsNotThereIsADeviceErrorWithItsRemedy) {
   EXPECT_FALSE(std::filesystem::exists(folder.path() / "runs")) << "nothing ran";
 }
 
-TEST(CommandLine, AQuanserLibraryThatIsNotThereIsADeviceErrorWithItsRemedy) {
+TEST(CommandLine, AMissingQuanserLibraryIsADeviceErrorWithRemedy) {
   const TemporaryFolder folder;
   const CommandResult result = run_upright(
       "run --unchecked --rig " + shell_quoted(UPRIGHT_SOURCE_DIR "/config/rigs/quanser-q2-usb.yaml") +

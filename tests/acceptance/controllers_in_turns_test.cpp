@@ -54,7 +54,7 @@ class ControllersInTurns : public ::testing::Test {
 constexpr std::size_t directory_column = 4, outcome_column = 6, theta0_column = 7, controller_column = 12,
                       gains_column = 13;
 
-TEST_F(ControllersInTurns, RunFromTheSameStartsReplayAndAreComparedInPairs) {
+TEST_F(ControllersInTurns, StartAlikeReplayAndAreComparedInPairs) {
   const fs::path experiment_file = file("seven: " + gains("exponential") + ", quiet: " + gains("quiet"),
                                         "repeats: 3, theta0_deg: [1, 2, 3]");
   const CommandResult result = experiment(experiment_file, "--json");
@@ -105,7 +105,7 @@ TEST_F(ControllersInTurns, RunFromTheSameStartsReplayAndAreComparedInPairs) {
       2);
 }
 
-TEST_F(ControllersInTurns, GoOnWhereTheyWereInterruptedAndNotWithOtherGains) {
+TEST_F(ControllersInTurns, GoOnAfterAStopAndNotWithOtherGains) {
   const fs::path own = folder_.write("own.yaml", read_text(gains("viscous")));
   const fs::path experiment_file =
       file("seven: " + gains("exponential") + ", own: " + own.string(), "repeats: 2");

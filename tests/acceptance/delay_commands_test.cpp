@@ -184,7 +184,7 @@ TEST(Run, StaysUpLateWithThePredictorAndReplaysBitForBitAnywhere) {
   EXPECT_EQ(run_upright(run_line("exponential", folder, "--duration 20 --delay 0.15")).exit_code, 3);
 }
 
-TEST(Design, MakesAnExtendedKalmanFilterThatRunsAndReplaysBitForBit) {
+TEST(Design, MakesAnExtendedKalmanFilterThatReplaysBitForBit) {
   const TemporaryFolder folder;
   const std::string made = (folder.path() / "quieter.yaml").string();
   const Json design = json_from("design " + plant("exponential") + " --estimator extended_kalman --out " +

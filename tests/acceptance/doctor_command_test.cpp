@@ -103,7 +103,7 @@ TEST(Doctor, GivesOneDocumentWhoseVerdictFollowsFromItsFindings) {
   }
 }
 
-TEST(Doctor, MeasuresTheLinkAndFindsTheHangingPendulumWithTheMotorOff) {
+TEST(Doctor, MeasuresTheLinkAndFindsTheHangingPendulum) {
   const Visit v = visit({"--theta0-deg", "180"}, "--json");
   const Json document = parsed(v.result);
   ASSERT_FALSE(document.at("link").is_null());

@@ -105,7 +105,7 @@ TEST(ExperimentCommand, ADelaySweepFindsWhereItOscillatesAndFalls) {
   }
 }
 
-TEST(ExperimentCommand, TheUnattendedSweepOfTheConfigurationFindsItsTransitions) {
+TEST(ExperimentCommand, TheUnattendedSweepFindsItsTransitions) {
   const TemporaryFolder folder;
   const fs::path out = folder.path() / "out";
   const CommandResult result = run_upright("experiment " + config + "experiments/delay-sweep-swing-up.yaml" +

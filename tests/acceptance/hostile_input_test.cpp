@@ -176,7 +176,7 @@ TEST(HostileYaml, IsRefusedAtOnce) {
 }
 
 /// Nobody else may change what a run left behind, and a umask that keeps others from reading is kept to.
-TEST(RunDirectory, HasNoMorePermissionsThanTheUmaskAndNoWriterButItsOwner) {
+TEST(RunDirectory, FollowsTheUmaskAndHasNoWriterButItsOwner) {
   const TemporaryFolder folder;
   const auto mode_of = [](const std::filesystem::path& path) {
     struct stat status {};

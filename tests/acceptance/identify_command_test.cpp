@@ -144,7 +144,7 @@ TEST(IdentifyCommand, SaysWhenItsNumbersDoNotExplainTheData) {
   }
 }
 
-TEST(IdentifyCommand, ComesWithinThreePercentOfThePublishedValuesOfEmps) {
+TEST(IdentifyCommand, ComesWithinThreePercentOfEmpsPublished) {
   const char* data = std::getenv("UPRIGHT_DATA");
   if (data == nullptr)
     GTEST_SKIP()

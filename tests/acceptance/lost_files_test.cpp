@@ -52,7 +52,7 @@ TEST_F(LostFiles, ARunWhoseFolderIsRemovedStops) {
   }
 }
 
-TEST_F(LostFiles, ARunWhoseSamplesAreRemovedOrCutStopsAndSaysSoInItsRecord) {
+TEST_F(LostFiles, ARunWhoseSamplesAreRemovedOrCutStopsAndSaysSo) {
   const std::pair<const char*, std::function<void(const fs::path&)>> cases[] = {
       {"was removed", [](const fs::path& run) { fs::remove(run / "samples.csv"); }},
       {"was moved or replaced",

@@ -44,7 +44,7 @@ TEST(RunOverrunLimit, IsTheTightestBeyondTheSlidingMargin) {
   EXPECT_EQ(before, 3);
 }
 
-TEST(RunOverrunLimit, OneLoudSentenceSaysThatTheLoopWillOscillateOrFall) {
+TEST(RunOverrunLimit, OneSentenceSaysThatTheLoopOscillatesOrFalls) {
   const TemporaryFolder folder;
   const CommandResult loud = run_upright(run_at("0.020", folder));
   EXPECT_NE(loud.err.find("WILL OSCILLATE OR FALL"), std::string::npos) << loud.err;
@@ -81,7 +81,7 @@ std::string sentence_in(const fs::path& run) {
   return text.substr(at, text.find('\n', at) - at);
 }
 
-TEST(ExperimentOverrunLimit, AFallBeyondTheMarginNamesTheDelayAsARunDoes) {
+TEST(ExperimentOverrunLimit, AFallBeyondTheMarginNamesTheDelay) {
   const TemporaryFolder folder;
   const fs::path file = folder.write(
       "test.yaml", "experiment:\n  name: test\n  why: a test\n  gains: " + config +

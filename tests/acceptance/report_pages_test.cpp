@@ -22,7 +22,7 @@ const std::string config = UPRIGHT_SOURCE_DIR "/config/";
 const std::string rig = " --rig " + config + "rigs/simulated.yaml";
 
 constexpr int narrow_px = 400, wide_px = 1200;
-constexpr double least_font_px = 9.0;
+constexpr double min_font_px = 9.0;
 
 /// What a page measures itself: its width, the smallest text of its drawings, and the cells that are narrower
 /// than their longest word.
@@ -67,7 +67,7 @@ class ReportPages : public ::testing::Test {
       EXPECT_LE(found.at("width").get<int>(), width) << name << " scrolls sideways";
       EXPECT_TRUE(found.at("broken").empty()) << name << " at " << width << ": " << found.at("broken").dump();
       if (found.at("texts").get<int>() > 0) {
-        EXPECT_GE(found.at("smallest").get<double>(), least_font_px) << name << " at " << width;
+        EXPECT_GE(found.at("smallest").get<double>(), min_font_px) << name << " at " << width;
       }
       fs::create_directories(UPRIGHT_PICTURES);
       std::ofstream(fs::path(UPRIGHT_PICTURES) / (name + "-" + std::to_string(width) + ".png"),

@@ -89,7 +89,7 @@ TEST_F(SweepCommand, ReportDrawsTheMap) {
   EXPECT_EQ(margins.find("model,critical_delay_s,crossing_radps\nnear rest,0."), 0u) << margins;
 }
 
-TEST_F(SweepCommand, ReportDrawsTheLinearCriticalDelayOfTheContinuousLoop) {
+TEST_F(SweepCommand, ReportDrawsTheLinearCriticalDelay) {
   std::ofstream(file()) << "sweep:\n  plant: " << source
                         << "/config/plants/exponential.yaml\n  gains: " << source
                         << "/config/gains/exponential.yaml\n  loop: continuous\n"
@@ -152,7 +152,7 @@ TEST_F(SweepCommand, RefusesBadInputWithTheRemedyAndWritesNothing) {
 
 /// The rig's plant with its limits against the paper's experiment: 0.025 s for gain (7), 0.023 s for gain
 /// (10).
-TEST_F(SweepCommand, OnePlantFilePredictsTheMeasuredFallsOfBothControllers) {
+TEST_F(SweepCommand, OnePlantFilePredictsTheFallsOfBothControllers) {
   const std::pair<const char*, double> measured[] = {{"rig-exponential", 0.025},
                                                      {"rig-exponential-gain10", 0.023}};
   for (const auto& [name, falls_s] : measured) {

@@ -81,7 +81,7 @@ TEST(UnfinishedSearch, IdentifyAnswersASignalWithWhatItHasFound) {
   EXPECT_FALSE(fs::exists(out / "plant.yaml"));
 }
 
-TEST(UnfinishedSearch, ItsBoundGivesTheSameAnswerOnAnyNumberOfCores) {
+TEST(UnfinishedSearch, ItsAnswerIsTheSameOnAnyNumberOfCores) {
   const TemporaryFolder folder;
   const fs::path data = experiment_in(folder, 6.0);
   std::string said;
@@ -97,7 +97,7 @@ TEST(UnfinishedSearch, ItsBoundGivesTheSameAnswerOnAnyNumberOfCores) {
   unsetenv("UPRIGHT_THREADS");
 }
 
-TEST(UnfinishedSearch, TakesWholePiecesOfAnExperimentAndNamesTheOthers) {
+TEST(UnfinishedSearch, TakesWholePiecesAndNamesTheOthers) {
   const TemporaryFolder folder;
   const fs::path data = experiment_in(folder, 6.0);
   // As if the second piece had been broken off: its run is there, and not among the trials.

@@ -166,7 +166,7 @@ double evidence_without(const Case& blind) {
 }
 
 /// How much less likely a pair makes the data without one of the two.
-double least_evidence(const Case& blind, const std::vector<Measurement>& runs, const DataJudgement& data) {
+double min_evidence(const Case& blind, const std::vector<Measurement>& runs, const DataJudgement& data) {
   double evidence = data.base.objective - data.truth.objective;
   const std::vector<std::size_t> hidden = hidden_effects(blind);
   if (hidden.size() < 2) return evidence;
@@ -191,7 +191,7 @@ DataJudgement judge_data(const Case& blind, const std::vector<Measurement>& runs
   data.base = fit_structure(runs, blind.believed, blind.believed, {}, start_noise(blind));
   data.truth = fit_structure(runs, blind.believed, blind.rig.plant, hidden, data.base.point.noise);
   record["evidence"] = data.base.objective - data.truth.objective;
-  const double evidence = least_evidence(blind, runs, data);
+  const double evidence = min_evidence(blind, runs, data);
   record["least_evidence"] = evidence;
   record["shown"] = evidence > shown_evidence;
   if (blind.request.condition == Condition::laboratory && evidence > shown_evidence) {

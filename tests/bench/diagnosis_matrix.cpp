@@ -71,9 +71,9 @@ struct Flags {
   std::optional<Size> size;
   Condition condition = Condition::quantized;
   int runs = 0, jobs = 1;
-  double most_samples = 12000.0;
+  double max_samples = 12000.0;
   bool timing = false;
-  double most_seconds = 900.0;
+  double max_seconds = 900.0;
 };
 
 /// One round: every effect of the registry once, rigs with nothing hidden, eight pairs, each unknown twice.
@@ -105,13 +105,13 @@ Request request_of(const Flags& flags, std::size_t number, std::string& label) {
     request.size = static_cast<Size>(std::mt19937_64(request.seed)() % 3);
   request.condition = flags.condition;
   request.runs = flags.runs;
-  request.most_samples = flags.most_samples;
+  request.max_samples = flags.max_samples;
   if (flags.timing) {
     const bool laboratory = flags.condition == Condition::laboratory;
     request.runs = laboratory ? 7 : 6;
     request.rate_hz = laboratory ? 1000.0 : 500.0;
     request.duration_s = 10.0;
-    request.most_samples = request.runs * request.rate_hz * request.duration_s;
+    request.max_samples = request.runs * request.rate_hz * request.duration_s;
   }
   if (label == "pair") {
     request.hidden = random_pair(request.seed);
@@ -316,13 +316,13 @@ void run_case(const Flags& flags, std::size_t number, int to) {
   send(to, record, "judgement of the data");
   const DataJudgement data = judge_data(blind, runs, record);
   send(to, record, "diagnosis");
-  limit_processor_time(flags.most_seconds);
+  limit_processor_time(flags.max_seconds);
   const double cpu_before = cpu_seconds();
   const auto begin = std::chrono::steady_clock::now();
   const Diagnosis d = diagnose(blind.believed, runs);
   record["wall_s"] = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   record["cpu_s"] = cpu_seconds() - cpu_before;
-  limit_processor_time(judgement_share * flags.most_seconds);
+  limit_processor_time(judgement_share * flags.max_seconds);
   describe_diagnosis(d, record);
   send(to, record, "judgement of the diagnosis");
   judge_name(blind, runs, data, d, record);
@@ -339,7 +339,7 @@ void append_line(const std::string& file, const std::string& line) {
 }
 
 void run_in_child(const Flags& flags, std::size_t number, int to) {
-  limit_processor_time(judgement_share * flags.most_seconds);
+  limit_processor_time(judgement_share * flags.max_seconds);
   try {
     run_case(flags, number, to);
   } catch (const std::exception& problem) {
@@ -456,8 +456,8 @@ Flags parse(int argc, char** argv) {
       {"--size", [&](const std::string& value) { flags.size = size_named(value); }},
       {"--runs", [&](const std::string& value) { flags.runs = std::stoi(value); }},
       {"--jobs", [&](const std::string& value) { flags.jobs = std::max(1, std::stoi(value)); }},
-      {"--samples", [&](const std::string& value) { flags.most_samples = std::stod(value); }},
-      {"--seconds", [&](const std::string& value) { flags.most_seconds = std::stod(value); }},
+      {"--samples", [&](const std::string& value) { flags.max_samples = std::stod(value); }},
+      {"--seconds", [&](const std::string& value) { flags.max_seconds = std::stod(value); }},
       {"--out", [&](const std::string& value) { flags.out = value; }},
       {"--records", [&](const std::string& value) { flags.records.push_back(value); }},
       {"--markdown", [&](const std::string& value) { flags.markdown = value; }},

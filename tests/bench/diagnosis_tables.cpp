@@ -90,11 +90,11 @@ struct Figure {
   bool known = false, holds = false;
 };
 
-Figure share_figure(const std::string& name, const Share& share, double goal, bool at_least = true) {
-  Figure figure{name, (at_least ? ">= " : "<= ") + number(100.0 * goal) + " %",
-                share.text_with_bound(!at_least)};
+Figure share_figure(const std::string& name, const Share& share, double goal, bool is_lower_bound = true) {
+  Figure figure{name, (is_lower_bound ? ">= " : "<= ") + number(100.0 * goal) + " %",
+                share.text_with_bound(!is_lower_bound)};
   figure.known = share.count > 0.0;
-  figure.holds = at_least ? share.value() >= goal : share.value() <= goal;
+  figure.holds = is_lower_bound ? share.value() >= goal : share.value() <= goal;
   return figure;
 }
 

@@ -46,7 +46,7 @@ RunSetup setup_for(const Setting& setting) {
   setup.limits.track_limit_m = setup.rig.track_limit_m;
   setup.limits.fall_angle_rad = setup.rig.fall_angle_rad;
   setup.limits.watchdog_s = setup.rig.watchdog_s;
-  setup.limits.most_periods_late = default_periods_late(setup.control.period_s());
+  setup.limits.max_periods_late = default_periods_late(setup.control.period_s());
   return setup;
 }
 

@@ -43,9 +43,9 @@ def loop_piece(options, seconds, folder, spin_us):
 
 
 def cyclictest_piece(options, seconds):
-    most_us = 100_000
+    max_us = 100_000
     command = ["cyclictest", "-q", "-m", "-p", options.priority, "-i", 1_000_000 // options.rate, "-l", seconds * options.rate,
-               "-a", options.cpu, "-t", 1, "-h", most_us]
+               "-a", options.cpu, "-t", 1, "-h", max_us]
     done = subprocess.run([str(word) for word in command], capture_output=True, text=True, check=True)
     late_us = []
     for line in done.stdout.splitlines():

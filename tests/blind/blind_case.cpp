@@ -42,7 +42,7 @@ Plant random_plant(Random& random, bool pendulum) {
 std::vector<Plan> choose_plans(const Request& request, const std::string& campaign, double rate_hz,
                                const Plant& believed, Random& random) {
   int runs = request.runs > 0 ? request.runs : std::uniform_int_distribution<int>(1, 6)(random);
-  const double total_s = request.most_samples / rate_hz;
+  const double total_s = request.max_samples / rate_hz;
   runs = std::max(1, std::min(runs, static_cast<int>(total_s / 4.0)));
   const double volts_per_mps = damping_of(believed) / believed.motor.force_per_volt_n;
   std::array<double, 4> gains{};
@@ -247,9 +247,9 @@ Case make_case(const Request& request) {
   Case blind;
   blind.request = request;
   double rate_hz = one_of(random, std::array{100.0, 200.0, 250.0, 500.0, 500.0, 1000.0, 2000.0});
-  constexpr double least_seconds = 6.0;
+  constexpr double min_seconds = 6.0;
   if (request.rate_hz > 0.0) rate_hz = request.rate_hz;
-  while (request.most_samples / rate_hz < least_seconds) rate_hz *= 0.5;
+  while (request.max_samples / rate_hz < min_seconds) rate_hz *= 0.5;
   blind.campaign = choose_campaign(request, rate_hz, random);
   blind.believed = random_plant(random, blind.campaign != "cart_alone");
   blind.plans = choose_plans(request, blind.campaign, rate_hz, blind.believed, random);

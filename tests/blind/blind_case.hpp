@@ -33,7 +33,7 @@ struct Request {
   std::uint64_t seed = 1;
   Condition condition = Condition::quantized;
   int runs = 0;  ///< 0: by the seed
-  double most_samples = 12000.0;
+  double max_samples = 12000.0;
   double rate_hz = 0.0;     ///< 0: by the seed
   double duration_s = 0.0;  ///< of each run; 0: by the seed
 };

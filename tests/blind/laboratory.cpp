@@ -42,7 +42,7 @@ Plant draw_plant(Random& random, bool pendulum, double reach) {
 /// 1 to 8 runs of 2 to 60 s, as many as the samples allow.
 std::vector<double> draw_durations(const Request& request, double rate_hz, Random& random) {
   int runs = request.runs > 0 ? request.runs : std::uniform_int_distribution<int>(1, 8)(random);
-  const double total_s = request.most_samples / rate_hz;
+  const double total_s = request.max_samples / rate_hz;
   std::vector<double> durations;
   double left_s = total_s;
   constexpr double shortest_s = 2.0, longest_s = 60.0;

@@ -29,8 +29,8 @@ Action signalled(int number) {
   return [number](const Running& run) { return kill(run.controller, number) == 0; };
 }
 
-bool limit(pid_t process, __rlimit_resource resource, rlim_t most) {
-  const rlimit limits{most, most};
+bool limit(pid_t process, __rlimit_resource resource, rlim_t max_value) {
+  const rlimit limits{max_value, max_value};
   return prlimit(process, resource, &limits, nullptr) == 0;
 }
 

@@ -213,7 +213,7 @@ std::optional<StoppedRun> stopped_run(Setting& setting, bool for_good) {
 
 class QuanserStop : public testing::TestWithParam<bool> {};
 
-TEST_P(QuanserStop, IsAtZeroVoltsByTheCardsWatchdogWhenTheCardIsSilent) {
+TEST_P(QuanserStop, IsAtZeroVoltsByTheWatchdogOfASilentCard) {
   const bool for_good = GetParam();
   const char* cell = for_good ? "device watchdog: 0 V within 100 ms, reported as not confirmed, exit code 4"
                               : "device watchdog: 0 V within 100 ms, confirmed as soon as it responds";

@@ -37,8 +37,8 @@ class RecordedRig final : public Rig {
  public:
   RecordedRig(std::unique_ptr<Rig> rig, Clock& clock, const Calibration& calibration)
       : rig_(std::move(rig)), clock_(clock), scaler_(calibration) {
-    constexpr std::size_t most_rows = 20000;
-    rows_.reserve(most_rows);
+    constexpr std::size_t max_rows = 20000;
+    rows_.reserve(max_rows);
   }
   void open() override { rig_->open(); }
   RigReading read() noexcept override {

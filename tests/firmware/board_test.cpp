@@ -163,7 +163,7 @@ TEST_P(Firmware, NeitherNoiseNorRefusedRequestsFeedTheWatchdog) {
   EXPECT_LT(static_cast<double>(board.last_on()) / Board::hz, asked_s + 0.101);
 }
 
-TEST_P(Firmware, ARequestFeedsTheWatchdogWhenItIsWholeWhateverFollowsIt) {
+TEST_P(Firmware, AWholeRequestFeedsTheWatchdogWhateverFollows) {
   constexpr double watchdog_s = 0.02, before_s = 0.0012;
   drive(6.0);
   write(watchdog, 20);

@@ -93,7 +93,7 @@ INSTANTIATE_TEST_SUITE_P(Effects, OneHiddenEffect,
                                          Hidden{"drive_compliance", {1e-4}}),
                          [](const auto& test) { return test.param.kind; });
 
-TEST(Diagnosis, NamesAConstantForceTogetherWithWhatItCannotBeToldFrom) {
+TEST(Diagnosis, NamesAConstantForceWithItsIndistinguishableEffects) {
   const Diagnosis d = diagnose_hidden({{"constant_force", {0.3}}}, 12, 8.0);
   ASSERT_FALSE(d.effects.empty());
   const FoundEffect& first = d.effects.front();
@@ -191,7 +191,7 @@ class Blind : public testing::TestWithParam<BlindCase> {
          .size = c.size,
          .seed = c.seed,
          .condition = c.disturbed ? blind::Condition::disturbed : blind::Condition::quantized,
-         .most_samples = 4000.0});
+         .max_samples = 4000.0});
     diagnosis_ = diagnose(case_.believed, measure_all(case_));
   }
 

@@ -142,15 +142,15 @@ TEST_F(LiveServerLimits, RequestsWithoutEndTakeNoMemory) {
   };
   for (const auto& one : cases) {
     const double before_mib = resident_mib();
-    double most_mib = before_mib;
+    double max_mib = before_mib;
     std::atomic<bool> over{false};
     std::thread watcher([&] {
-      for (; !over; std::this_thread::sleep_for(2ms)) most_mib = std::max(most_mib, resident_mib());
+      for (; !over; std::this_thread::sleep_for(2ms)) max_mib = std::max(max_mib, resident_mib());
     });
     const double sent_mib = send_without_end(one.begin, one.more);
     over = true;
     watcher.join();
-    EXPECT_LT(most_mib - before_mib, 4.0) << one.what << ": " << sent_mib << " MiB were sent";
+    EXPECT_LT(max_mib - before_mib, 4.0) << one.what << ": " << sent_mib << " MiB were sent";
   }
   expect_stop();
 }

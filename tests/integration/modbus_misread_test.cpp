@@ -23,7 +23,7 @@ constexpr int watchdog_address = 18;
 class Device {
  public:
   Device()
-      : context_(modbus_new_tcp("127.0.0.1", 0)), registers_(modbus_mapping_new(0, 0, most_registers, 0)) {
+      : context_(modbus_new_tcp("127.0.0.1", 0)), registers_(modbus_mapping_new(0, 0, max_registers, 0)) {
     listener_ = modbus_tcp_listen(context_, 1);
     thread_ = std::thread([this] { serve(); });
   }
@@ -56,7 +56,7 @@ class Device {
   }
 
  private:
-  static constexpr int most_registers = 40;
+  static constexpr int max_registers = 40;
 
   void serve() {
     while (!ending_) {

@@ -98,7 +98,7 @@ TEST(QuanserCard, PutsOutTheVoltageThroughTheAmplifiersGainAndSign) {
   EXPECT_EQ(bench.last().analog_v, 0.0);
 }
 
-TEST(QuanserCard, AnExpiredWatchdogConfirmsZeroVoltsAndLocksTheCard) {
+TEST(QuanserCard, AnExpiredWatchdogGivesZeroVoltsAndLocksTheCard) {
   Bench bench;
   bench.rig->open();
   ASSERT_EQ(bench.rig->write(2.0), RigFault::none);
@@ -123,7 +123,7 @@ TEST(QuanserCard, ASecondControllerIsRefused) {
   EXPECT_NE(refusal_of(*second).find("already has a controller"), std::string::npos);
 }
 
-TEST(QuanserCard, OpeningIsTriedThreeTimesAndThenRefusedWithTheRemedy) {
+TEST(QuanserCard, OpeningIsTriedThreeTimesAndThenRefused) {
   Bench bench(fake_card_rig(), {"--failed-openings", "3"});
   const std::string sentence = refusal_of(*bench.rig);
   EXPECT_NE(sentence.find("error 108: board not found"), std::string::npos) << sentence;

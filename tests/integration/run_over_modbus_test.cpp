@@ -388,7 +388,7 @@ void signal_run(int signal_number) {
                 "zero volts in time");
 }
 
-TEST(Signalled, IsAtZeroVoltsWithinAPeriodWithACompleteRunDirectory) {
+TEST(Signalled, IsAtZeroVoltsInAPeriodWithACompleteRunDirectory) {
   for (const int signal_number : {SIGINT, SIGTERM})
     if (!IsSkipped()) in_real_time([&] { signal_run(signal_number); });
 }

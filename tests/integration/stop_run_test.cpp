@@ -139,7 +139,7 @@ TEST(StopRun, SaysSoInJsonTooAndNamesTheDevicesWatchdog) {
   });
 }
 
-TEST(StopRun, GoesOnAfterABusyDeviceWithinTheWatchdogsTimeAndNamesItBeyond) {
+TEST(StopRun, GoesOnAfterABusyDeviceWithinTheWatchdogsTime) {
   in_real_time([] {
     StopRun run;
     run.device->begin(Trouble::busy, 0.5 * watchdog_s);

@@ -157,7 +157,7 @@ TEST_F(GpioLines, AnEnableThatIsActiveLowIsHighWhileOff) {
   EXPECT_TRUE(sim.level(enable_line));
 }
 
-TEST_F(GpioLines, AVoltageThatDidNotGoOutEnablesNothingAndDoesNotBeat) {
+TEST_F(GpioLines, AnUnsentVoltageEnablesNothingAndDoesNotBeat) {
   const auto rig = opened();
   behind.write_fault = RigFault::link_lost;
   const bool before = sim.level(beat_line);

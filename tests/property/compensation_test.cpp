@@ -82,7 +82,7 @@ int falls_of(const Plant& plant, const Make& make) {
   return fell;
 }
 
-TEST_P(Compensation, StaysUpTo150MillisecondsWithEveryParameter5PercentOff) {
+TEST_P(Compensation, StaysUpTo150MsWithEveryParameter5PercentOff) {
   const Plant plant = plant_named(GetParam()), model = plant_named("viscous");
   for (const double delay_s : {0.01, 0.05, 0.1, 0.15}) {
     const ControlConfig config = compensated(model, delay_s);

@@ -126,7 +126,7 @@ LoopOutcome end_of(const BalancedRig& balanced, Sticks what = Sticks::nothing, d
   LoopLimits limits = rig_limits(rig, balanced.plant);
   limits.periods = static_cast<std::uint64_t>(10.0 * rate_hz);
   limits.track_limit_m = 100.0;
-  limits.most_periods_late = 1;
+  limits.max_periods_late = 1;
   RowMemory memory;
   const SignalFlag no_signal{0};
   LiveStatus live;

@@ -52,14 +52,14 @@ std::vector<Subject> subjects() {
 
 /// How many records two nearby runs stay together.
 std::size_t regular_records(const Plant& plant, const RunCase& run, const RecordedRun& from) {
-  constexpr double aside_rad = 1e-9, most_growth = 1e3;
+  constexpr double aside_rad = 1e-9, max_growth = 1e3;
   RunCase beside = run;
   beside.theta0_rad += aside_rad;
   const RecordedRun other = record<EventEngine<double>>(plant, beside);
   const Extent extent(from);
   const std::size_t both = std::min(from.states.size(), other.states.size());
   for (std::size_t i = 0; i < both; ++i)
-    if (extent.distance(from.states[i], other.states[i]) > most_growth * aside_rad / extent.theta_rad)
+    if (extent.distance(from.states[i], other.states[i]) > max_growth * aside_rad / extent.theta_rad)
       return i;
   return both;
 }

@@ -174,13 +174,13 @@ const char* current_mutant() {
 }
 
 void feed(const Diet& diet, const Folder& folder, std::uint64_t count, const Reader& reader) {
-  constexpr std::uint64_t most_failures = 5;
+  constexpr std::uint64_t max_failures = 5;
   const Mutator mutator(diet.texts);
   const std::uint64_t first = number_of("UPRIGHT_MUTANT_SEED", 1);
   const fs::path file = folder.path() / diet.name;
   Tally tally;
   watch_for_crashes();
-  for (std::uint64_t seed = first; seed < first + count && tally.failed < most_failures; ++seed) {
+  for (std::uint64_t seed = first; seed < first + count && tally.failed < max_failures; ++seed) {
     std::snprintf(current, sizeof current, "%s, seed %llu, %s\n", diet.kind,
                   static_cast<unsigned long long>(seed), file.c_str());
     const std::string text = mutator.mutant(seed);

@@ -45,7 +45,7 @@ std::vector<std::string> plants() {
   std::vector<std::string> texts = own_texts("plants");
   for (std::size_t i = 0; i < effect_registry().size(); ++i) {
     const EffectInfo& info = effect_registry()[i];
-    std::array<double, most_effect_parameters> values{};
+    std::array<double, max_effect_parameters> values{};
     for (std::size_t k = 0; k < info.parameters.size(); ++k) values[k] = info.parameters[k].typical;
     Plant plant = good_plant();
     plant.set(i, values);

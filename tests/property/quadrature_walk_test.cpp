@@ -98,7 +98,7 @@ TEST(QuadratureWalk, NoLossOfNumberedEdgesPassesUnnoticed) {
   }
 }
 
-TEST(QuadratureWalk, WithoutNumbersALossIsNoticedOrChangesTheCountsByWholeCycles) {
+TEST(QuadratureWalk, AnUnnoticedLossChangesCountsByWholeCycles) {
   // What levels alone can tell, and why a rate limit stands beside them.
   std::mt19937 random(13);
   int noticed = 0;

@@ -154,7 +154,7 @@ std::string refusal_of(const std::function<void()>& what) {
   }
 }
 
-TEST(ExperimentFolder, RefusesTrialsOfAnImpossibleDelayOrFolderAtTheirLine) {
+TEST(ExperimentFolder, RefusesTrialsOfAnImpossibleDelayOrFolder) {
   const Folder folder;
   const fs::path made = make_experiment(folder.path(), short_experiments()[10]);
   const std::string journal = text_of(made / "trials.csv");

@@ -160,7 +160,7 @@ Ended begin_beyond(const std::string& piece, double cart_m, double cart_mps, dou
   limits.track_limit_m = setup.rig.track_limit_m;
   limits.fall_angle_rad = setup.rig.fall_angle_rad;
   limits.watchdog_s = 1.0;
-  limits.most_periods_late = 1;
+  limits.max_periods_late = 1;
   limits.coast_s = setup.rig.coast_s;
   RowMemory memory;
   const SignalFlag no_signal{0};
@@ -176,7 +176,7 @@ Ended begin_beyond(const std::string& piece, double cart_m, double cart_mps, dou
 
 const std::string balance = "{kind: closed_loop, set_points_m: [0], hold_s: 2, start: swing_up}";
 
-TEST(BeyondTheTrackLimit, AScriptBringsTheCartBack) {
+TEST(TrackLimit, AScriptBringsTheCartBack) {
   for (const double lean_rad : {0.2, 0.5, 1.5, std::numbers::pi})
     for (const double side : {1.0, -1.0})
       for (const double cart_mps : {0.0, 0.8, 1.5}) {
@@ -189,7 +189,7 @@ TEST(BeyondTheTrackLimit, AScriptBringsTheCartBack) {
       }
 }
 
-TEST(BeyondTheTrackLimit, AReversedAmplifierIsNoticedWithinCentimetres) {
+TEST(TrackLimit, AReversedAmplifierIsNoticedWithinCentimetres) {
   for (const double side : {1.0, -1.0}) {
     const Ended ended = begin_beyond(balance, side * 0.402, 0.0, std::numbers::pi, -1.0);
     EXPECT_EQ(ended.outcome.reason, StopReason::track_limit);
@@ -198,7 +198,7 @@ TEST(BeyondTheTrackLimit, AReversedAmplifierIsNoticedWithinCentimetres) {
   }
 }
 
-TEST(BeyondTheTrackLimit, WhatDoesNotBringItBackEndsAtOnce) {
+TEST(TrackLimit, WhatDoesNotBringItBackEndsAtOnce) {
   for (const char* piece : {"{kind: sign_check, largest_v: 4}", "{kind: observe, duration_s: 5}",
                             "{kind: free_decay, angle_deg: 30, duration_s: 5}"}) {
     const Ended ended = begin_beyond(piece, 0.41, 0.0, std::numbers::pi, 1.0);

@@ -61,8 +61,8 @@ void count(const char* kind, const Excused& excused) {
 /// Waits until half a second has passed without a stall, because stalls come in groups.
 void await_calm() {
   constexpr auto calm = std::chrono::milliseconds(500);
-  constexpr int most_waits = 20;
-  for (int i = 0; i < most_waits; ++i) {
+  constexpr int max_waits = 20;
+  for (int i = 0; i < max_waits; ++i) {
     const Since begin;
     std::this_thread::sleep_for(calm);
     if (!detector().stall_in(begin.until_now())) return;
@@ -94,7 +94,7 @@ bool in_real_time(const std::function<void()>& attempt) {
     if (!excused || testing::Test::HasFailure()) return true;
     std::printf("!! attempt %d met a stall of the machine of %s: %s\n", made,
                 words_of(excused->stall).c_str(), excused->what.c_str());
-    if (made == most_attempts) {
+    if (made == max_attempts) {
       count("skip", *excused);
       [] {
         GTEST_SKIP() << "every attempt met a stall of this machine, so timing results are meaningless: "

@@ -15,7 +15,7 @@
 namespace upright::test {
 
 /// The largest number of attempts. If one attempt in three meets a stall, one test in 81 is skipped.
-inline constexpr int most_attempts = 4;
+inline constexpr int max_attempts = 4;
 
 /// Repeats an attempt as long as a stall excuses it. False: every attempt met a stall, and the test is
 /// skipped.

@@ -90,7 +90,7 @@ class StallDetector::SerialLine {
 class StallDetector::Watcher {
  public:
   explicit Watcher(std::unique_ptr<SerialLine> line)
-      : stalls_(most_stalls), line_(std::move(line)), thread_([this] { watch(); }) {}
+      : stalls_(max_stalls), line_(std::move(line)), thread_([this] { watch(); }) {}
   explicit Watcher(int processor) : Watcher(std::unique_ptr<SerialLine>()) {
     cpu_set_t here;
     CPU_ZERO(&here);
@@ -122,7 +122,7 @@ class StallDetector::Watcher {
     std::atomic<double> end_s{0.0};
   };
   /// Enough for 5 minutes of the shortest and most frequent stalls.
-  static constexpr std::size_t most_stalls = 20'000;
+  static constexpr std::size_t max_stalls = 20'000;
 
   void watch() {
     LateWakes wakes;
@@ -139,7 +139,7 @@ class StallDetector::Watcher {
     const std::size_t count = count_;
     if (count > 0 && stalls_[count - 1].begin_s == stall.begin_s) {
       stalls_[count - 1].end_s = stall.end_s;
-    } else if (count < most_stalls) {
+    } else if (count < max_stalls) {
       stalls_[count].begin_s = stall.begin_s;
       stalls_[count].end_s = stall.end_s;
       count_ = count + 1;

@@ -199,7 +199,7 @@ blind::Request laboratory(std::uint64_t seed, std::vector<std::string> hidden = 
 
 TEST(LaboratoryCase, FollowsFromItsRequest) {
   blind::Request request = laboratory(21, {"coulomb_friction"});
-  request.most_samples = 1500.0;
+  request.max_samples = 1500.0;
   const blind::Case one = make_case(request), same = make_case(request);
   request.seed = 22;
   const blind::Case other = make_case(request);
@@ -219,11 +219,11 @@ TEST(LaboratoryCase, FollowsFromItsRequest) {
 TEST(LaboratoryCase, StaysWithinWhatItStates) {
   std::set<double> rates;
   double lightest_kg = 1e9, heaviest_kg = 0.0;
-  std::size_t unquantised = 0, most_runs = 0;
+  std::size_t unquantised = 0, max_runs = 0;
   constexpr std::uint64_t cases = 60;
   for (std::uint64_t seed = 0; seed < cases; ++seed) {
     blind::Request request = laboratory(seed);
-    request.most_samples = 4000.0;  // two seconds at the highest rate
+    request.max_samples = 4000.0;  // two seconds at the highest rate
     const blind::Case one = make_case(request);
     lightest_kg = std::min(lightest_kg, one.believed.cart_mass_kg);
     heaviest_kg = std::max(heaviest_kg, one.believed.cart_mass_kg);
@@ -231,7 +231,7 @@ TEST(LaboratoryCase, StaysWithinWhatItStates) {
     EXPECT_NEAR(one.rig.plant.motor.back_emf_n_per_mps / one.believed.motor.back_emf_n_per_mps, 1.0, 0.05);
     unquantised += one.rig.cart_step_m == 0.0 ? 1u : 0u;
     EXPECT_EQ(one.rig.cart_step_m == 0.0, one.rig.cart_noise_m > 0.0);
-    most_runs = std::max(most_runs, one.plans.size());
+    max_runs = std::max(max_runs, one.plans.size());
     double samples = 0.0;
     for (const blind::Plan& plan : one.plans) {
       rates.insert(plan.rate_hz);
@@ -239,7 +239,7 @@ TEST(LaboratoryCase, StaysWithinWhatItStates) {
       EXPECT_LE(plan.duration_s, 60.0);
       samples += plan.rate_hz * plan.duration_s;
     }
-    EXPECT_LE(samples, one.request.most_samples * (1.0 + 1e-9));
+    EXPECT_LE(samples, one.request.max_samples * (1.0 + 1e-9));
     EXPECT_LE(one.plans.size(), 8u);
   }
   EXPECT_LT(lightest_kg, 1.0);
@@ -250,7 +250,7 @@ TEST(LaboratoryCase, StaysWithinWhatItStates) {
   EXPECT_EQ(*rates.rbegin(), 2000.0);
   EXPECT_GT(unquantised, cases / 4);
   EXPECT_LT(unquantised, 3 * cases / 4);
-  EXPECT_GE(most_runs, 6u);
+  EXPECT_GE(max_runs, 6u);
 }
 
 TEST(LaboratoryCase, HidesEveryKind) {
@@ -259,7 +259,7 @@ TEST(LaboratoryCase, HidesEveryKind) {
   std::uint64_t seed = 100;
   for (const std::string& kind : kinds) {
     blind::Request request = laboratory(++seed, {kind});
-    request.most_samples = 1000.0;
+    request.max_samples = 1000.0;
     const blind::Case one = make_case(request);
     const bool known = effect_number(kind) < effect_count;
     EXPECT_EQ(one.hidden.size(), known ? 1u : 0u) << kind;

@@ -159,7 +159,7 @@ TEST_F(ComediRigTest, RefusesWiringTheCardDoesNotHave) {
   EXPECT_TRUE(says(refusal(file), "remove lines"));
 }
 
-TEST_F(ComediRigTest, RefusesCountersOfUnknownDriversUnlessTheyArePlain) {
+TEST_F(ComediRigTest, RefusesCountersOfUnknownDriversUnlessPlain) {
   card().driver = "somebodys";
   RigFile file = multiq3_file();
   const std::string sentence = refusal(file);
@@ -213,7 +213,7 @@ TEST_F(ComediRigTest, RefusesACardThatCannotCountInQuadrature) {
   EXPECT_TRUE(says(refusal(ni_file()), "for quadrature")) << refusal(ni_file());
 }
 
-TEST_F(ComediRigTest, RefusesCountsOfAnEarlierStartWhereCountersBeginAnew) {
+TEST_F(ComediRigTest, RefusesCountsOfAnEarlierStart) {
   fake_cards()[device] = fake_ni_pcimio();
   RigFile file = ni_file();
   file.calibration.zero_at_start = false;

@@ -97,7 +97,7 @@ TEST(VelocityEstimator, FollowsTheContinuousFilterExactly) {
     }
 }
 
-TEST(VelocityEstimator, GivesARampItsSlopeAndAConstantExactlyNothing) {
+TEST(VelocityEstimator, GivesARampItsSlopeAndAConstantZero) {
   VelocityEstimator estimator(make_estimator_step(filter(50.0, 0.9), 0.001));
   estimator.start(0.3);
   for (int k = 0; k < 100; ++k) EXPECT_EQ(estimator.step(0.3), 0.0);

@@ -56,7 +56,7 @@ class CountRetries(unittest.TestCase):
         self.assertNotIn("fault_test: Fault.A", out)
 
     def test_fails_above_each_budget(self):
-        for kind, most in (("retry", BUDGET.MOST_RETRIES), ("skip", BUDGET.MOST_STALLED_SKIPS), ("absent", BUDGET.MOST_OTHER_SKIPS)):
+        for kind, most in (("retry", BUDGET.MAX_RETRIES), ("skip", BUDGET.MAX_STALLED_SKIPS), ("absent", BUDGET.MAX_OTHER_SKIPS)):
             self.assertEqual(count(lines(kind, most))[0], 0, kind)
             code, _, err = count(lines(kind, most + 1))
             self.assertEqual(code, 1, kind)

@@ -314,7 +314,7 @@ TEST_F(DataCheck, IsSilentAboutEveryEffectThatACaseHides) {
     request.seed = ++seed;
     request.runs = 2;
     request.duration_s = 5.0;
-    request.most_samples = 3000.0;
+    request.max_samples = 3000.0;
     request.condition = seed % 2 == 0 ? blind::Condition::disturbed : blind::Condition::quantized;
     const blind::Case hidden = blind::make_case(request);
     const auto found = find_mistakes(blind::measure_all(hidden), hidden.believed);

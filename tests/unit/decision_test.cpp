@@ -62,9 +62,9 @@ TEST(Addition, MustBePossibleAndLeaveOthersSo) {
 }
 
 TEST(Addition, NeedsEvidenceBeyondItsPrice) {
-  EXPECT_EQ(rule_of(addition(p.least_evidence, 0.0, 5.0)), Rule::shown_throughout);
-  EXPECT_EQ(rule_of(addition(below(p.least_evidence), 0.0, 5.0)), Rule::too_little_evidence);
-  Evidence priced = addition(p.least_evidence + 20.0, 0.0, 5.0);
+  EXPECT_EQ(rule_of(addition(p.min_evidence, 0.0, 5.0)), Rule::shown_throughout);
+  EXPECT_EQ(rule_of(addition(below(p.min_evidence), 0.0, 5.0)), Rule::too_little_evidence);
+  Evidence priced = addition(p.min_evidence + 20.0, 0.0, 5.0);
   priced.penalty = 20.0;
   EXPECT_EQ(rule_of(priced), Rule::shown_throughout);
   priced.penalty = 21.0;
@@ -77,8 +77,8 @@ TEST(Addition, IsRefusedWhereHeldOutRunsSpeakAgainstIt) {
 }
 
 TEST(Addition, MustShowAllAlongTheTrainingRuns) {
-  EXPECT_EQ(rule_of(addition(500.0, 0.0, p.least_t)), Rule::chance);
-  EXPECT_EQ(rule_of(addition(500.0, 0.0, above(p.least_t))), Rule::shown_throughout);
+  EXPECT_EQ(rule_of(addition(500.0, 0.0, p.min_t)), Rule::chance);
+  EXPECT_EQ(rule_of(addition(500.0, 0.0, above(p.min_t))), Rule::shown_throughout);
 }
 
 TEST(Addition, HasHeldOutRunsAsAWitnessOfItsT) {
@@ -96,11 +96,11 @@ TEST(Addition, HasNoWitnessWhereTrainingRunsSayNoMoreThanChance) {
 }
 
 TEST(Addition, IsBorneOutByTrainingAndHeldOutRuns) {
-  EXPECT_EQ(rule_of(addition(p.least_evidence_of_each, 1000.0, 5.0)), Rule::too_little_evidence);
-  EXPECT_EQ(rule_of(addition(above(p.least_evidence_of_each), 1000.0, 5.0)), Rule::borne_out);
-  EXPECT_EQ(rule_of(addition(1000.0, p.least_evidence_of_each, 5.0)), Rule::shown_throughout);
-  EXPECT_EQ(rule_of(addition(1000.0, above(p.least_evidence_of_each), 5.0)), Rule::borne_out);
-  const double half = 0.5 * p.least_evidence_together;
+  EXPECT_EQ(rule_of(addition(p.min_evidence_of_each, 1000.0, 5.0)), Rule::too_little_evidence);
+  EXPECT_EQ(rule_of(addition(above(p.min_evidence_of_each), 1000.0, 5.0)), Rule::borne_out);
+  EXPECT_EQ(rule_of(addition(1000.0, p.min_evidence_of_each, 5.0)), Rule::shown_throughout);
+  EXPECT_EQ(rule_of(addition(1000.0, above(p.min_evidence_of_each), 5.0)), Rule::borne_out);
+  const double half = 0.5 * p.min_evidence_together;
   EXPECT_EQ(rule_of(addition(half, half, 5.0)), Rule::too_little_evidence);
   EXPECT_EQ(rule_of(addition(half, half + 0.1, 5.0)), Rule::borne_out);
 }
@@ -112,10 +112,10 @@ TEST(Addition, NeedsNoTWithOverwhelmingEvidence) {
 
 TEST(Addition, NeedsNoTWhereNumbersOfThePlantNeedNotBeSoFarOff) {
   Evidence e = addition(500.0, 0.0, 0.5);
-  e.improvement.prior = p.least_evidence;
+  e.improvement.prior = p.min_evidence;
   e.at_equal_noise = e.improvement;
   EXPECT_EQ(rule_of(e), Rule::chance);
-  e.improvement.prior = above(p.least_evidence);
+  e.improvement.prior = above(p.min_evidence);
   e.at_equal_noise = e.improvement;
   EXPECT_EQ(rule_of(e), Rule::plant_numbers);
 }
@@ -126,8 +126,8 @@ TEST(Addition, NeedsALittleTWhereTheSensorsNoiseIsLeft) {
     e.simulated_gap = gap;
     return rule_of(e);
   };
-  EXPECT_EQ(rule(4.5, p.least_t_of_sensors, 1.0), Rule::chance);
-  EXPECT_EQ(rule(4.5, above(p.least_t_of_sensors), 1.0), Rule::sensors_noise_left);
+  EXPECT_EQ(rule(4.5, p.min_t_of_sensors, 1.0), Rule::chance);
+  EXPECT_EQ(rule(4.5, above(p.min_t_of_sensors), 1.0), Rule::sensors_noise_left);
   EXPECT_EQ(rule(p.equally_good_evidence, 1.6, 1.0), Rule::chance);
   EXPECT_EQ(rule(above(p.equally_good_evidence), 1.6, 1.0), Rule::sensors_noise_left);
   EXPECT_EQ(rule(4.5, 1.6, p.sensors_gap), Rule::chance);
@@ -136,9 +136,9 @@ TEST(Addition, NeedsALittleTWhereTheSensorsNoiseIsLeft) {
 
 TEST(Addition, MustBeOfACertainSize) {
   Evidence e = addition(60.0, 0.0, 5.0);  // less than four times the square of the certainty
-  e.certainty = p.least_certainty;
+  e.certainty = p.min_certainty;
   EXPECT_EQ(rule_of(e), Rule::shown_throughout);
-  e.certainty = below(p.least_certainty);
+  e.certainty = below(p.min_certainty);
   EXPECT_EQ(rule_of(e), Rule::uncertain_size);
   e.is_correction = true;
   EXPECT_EQ(rule_of(e), Rule::shown_throughout);
@@ -148,9 +148,9 @@ TEST(Addition, GoesOnWhereItsFitIsLessCertainThanItsEvidence) {
   Evidence e = addition(9.0 * p.unconverged_evidence_ratio, 0.0, 5.0);
   e.certainty = 3.0;
   EXPECT_EQ(missing_of(e), MissingFit::converged);
-  e.certainty_converged = below(p.least_certainty);
+  e.certainty_converged = below(p.min_certainty);
   EXPECT_EQ(rule_of(e), Rule::uncertain_size);
-  e.certainty_converged = p.least_certainty;
+  e.certainty_converged = p.min_certainty;
   EXPECT_EQ(rule_of(e), Rule::shown_throughout);
   e.certainty = above(3.0);
   e.certainty_converged.reset();
@@ -161,9 +161,9 @@ TEST(Addition, MayBeMadeCertainByAllRuns) {
   Evidence e = addition(21.0, 20.0, 5.0);
   e.certainty = 3.0;
   EXPECT_EQ(missing_of(e), MissingFit::all_runs);
-  e.certainty_of_all_runs = p.least_certainty;
+  e.certainty_of_all_runs = p.min_certainty;
   EXPECT_EQ(rule_of(e), Rule::borne_out);
-  e.certainty_of_all_runs = below(p.least_certainty);
+  e.certainty_of_all_runs = below(p.min_certainty);
   EXPECT_EQ(rule_of(e), Rule::uncertain_size);
 }
 
@@ -174,7 +174,7 @@ TEST(Addition, MustSimulateAsWellAsSegmentsCanShow) {
     return rule_of(e);
   };
   EXPECT_EQ(rule(0, 0.0, 100.0), Rule::shown_throughout) << "no data are held out";
-  const double by_four = p.worse_simulation_by_chance + 0.5 * p.least_simulation_scatter;
+  const double by_four = p.worse_simulation_by_chance + 0.5 * p.min_simulation_scatter;
   EXPECT_EQ(rule(4, 0.1, by_four), Rule::simulates_worse);
   EXPECT_EQ(rule(4, 0.1, below(by_four)), Rule::shown_throughout);
   EXPECT_EQ(rule(4, 2.0, by_four), Rule::shown_throughout) << "four segments that scatter show less";
@@ -185,8 +185,8 @@ TEST(Addition, IsFollowedInDoubtWithOverwhelmingEvidenceOnly) {
   const auto against = [](double train, double t_value) { return rule_of(addition(train, -5.0, t_value)); };
   EXPECT_EQ(against(p.overwhelming_evidence, 5.0), Rule::held_out_against);
   EXPECT_EQ(against(above(p.overwhelming_evidence), 5.0), Rule::held_out_in_doubt);
-  EXPECT_EQ(against(2000.0, p.least_t), Rule::held_out_against);
-  EXPECT_EQ(against(2000.0, above(p.least_t)), Rule::held_out_in_doubt);
+  EXPECT_EQ(against(2000.0, p.min_t), Rule::held_out_against);
+  EXPECT_EQ(against(2000.0, above(p.min_t)), Rule::held_out_in_doubt);
   Evidence uncertain = addition(2000.0, -5.0, 5.0);
   uncertain.certainty = 1.0;
   uncertain.certainty_converged = 1.0;
@@ -223,9 +223,9 @@ TEST(Addition, WaitsForTheSimulationsThatARuleAsksFor) {
 }
 
 TEST(Exchange, IsForWhatIsBetter) {
-  const double least = policy.distinction.indistinguishable_evidence;
-  EXPECT_EQ(rule_of(evidence(Change::exchange, least, 1.0, 0.0)), Rule::no_better);
-  EXPECT_EQ(rule_of(evidence(Change::exchange, above(least), 1.0, 0.0)), Rule::better);
+  const double threshold = policy.distinction.indistinguishable_evidence;
+  EXPECT_EQ(rule_of(evidence(Change::exchange, threshold, 1.0, 0.0)), Rule::no_better);
+  EXPECT_EQ(rule_of(evidence(Change::exchange, above(threshold), 1.0, 0.0)), Rule::better);
   EXPECT_EQ(rule_of(evidence(Change::exchange, 100.0, 0.0, 0.0)), Rule::no_better);
   EXPECT_EQ(rule_of(evidence(Change::exchange, 100.0, above(0.0), 0.0)), Rule::better);
   Evidence cheaper = evidence(Change::exchange, 0.0, 1.0, 0.0);
@@ -247,11 +247,11 @@ TEST(Exchange, IsForWhatIsAsGoodAndPlainer) {
   EXPECT_EQ(rule(-0.5 * p.equally_good_evidence, 0.1 - 0.5 * p.equally_good_evidence), Rule::plainer);
 }
 
-TEST(Exchange, AsksOfWhatStandsInThatItIsPossibleCertainAndSimulates) {
+TEST(Exchange, AsksThatTheSubstituteIsPossibleAndCertain) {
   Evidence e = evidence(Change::exchange, 100.0, 1.0, 0.0);
-  e.certainty = p.least_certainty;
+  e.certainty = p.min_certainty;
   EXPECT_EQ(rule_of(e), Rule::better);
-  e.certainty = below(p.least_certainty);
+  e.certainty = below(p.min_certainty);
   EXPECT_EQ(rule_of(e), Rule::uncertain_size);
   e.plausible = false;
   EXPECT_EQ(rule_of(e), Rule::cannot_be);
@@ -273,17 +273,17 @@ TEST(Simplification, MustSaveWhatItsParametersCost) {
 }
 
 TEST(Pair, NeedsEvidenceAndNoHeldOutRunsAgainstIt) {
-  EXPECT_EQ(rule_of(evidence(Change::pair, below(p.least_evidence), 0.0, 0.0)), Rule::too_little_evidence);
-  EXPECT_EQ(rule_of(evidence(Change::pair, p.least_evidence, 0.0, 0.0)), Rule::better);
-  EXPECT_EQ(rule_of(evidence(Change::pair, p.least_evidence, below(0.0), 0.0)), Rule::held_out_against);
+  EXPECT_EQ(rule_of(evidence(Change::pair, below(p.min_evidence), 0.0, 0.0)), Rule::too_little_evidence);
+  EXPECT_EQ(rule_of(evidence(Change::pair, p.min_evidence, 0.0, 0.0)), Rule::better);
+  EXPECT_EQ(rule_of(evidence(Change::pair, p.min_evidence, below(0.0), 0.0)), Rule::held_out_against);
 }
 
 TEST(Keeping, NeedsALittleLessTThanAdding) {
-  const double least_t = p.kept_t_share * p.least_t;
-  EXPECT_EQ(rule_of(evidence(Change::keep, 100.0, 0.0, least_t)), Rule::chance);
-  EXPECT_EQ(rule_of(evidence(Change::keep, 100.0, 0.0, above(least_t))), Rule::still_shown);
-  EXPECT_EQ(rule_of(evidence(Change::keep, p.least_evidence, 0.0, 2.5)), Rule::chance);
-  EXPECT_EQ(rule_of(evidence(Change::keep, above(p.least_evidence), 0.0, 2.5)), Rule::still_shown);
+  const double min_t = p.kept_t_share * p.min_t;
+  EXPECT_EQ(rule_of(evidence(Change::keep, 100.0, 0.0, min_t)), Rule::chance);
+  EXPECT_EQ(rule_of(evidence(Change::keep, 100.0, 0.0, above(min_t))), Rule::still_shown);
+  EXPECT_EQ(rule_of(evidence(Change::keep, p.min_evidence, 0.0, 2.5)), Rule::chance);
+  EXPECT_EQ(rule_of(evidence(Change::keep, above(p.min_evidence), 0.0, 2.5)), Rule::still_shown);
   EXPECT_EQ(rule_of(evidence(Change::keep, 20.0, 21.0, 5.0)), Rule::borne_out);
 }
 
@@ -328,22 +328,22 @@ TEST(BestContender, IsChosenByHeldOutRunsAmongEquals) {
   EXPECT_EQ(best_of({{spring, 100.0, 4.0}, {force, 100.0, 0.0}}, p), 1u);
 }
 
-TEST(Indistinguishable, IsWhatLosesLittleEvidenceOrLessThanItsScatter) {
+TEST(Indistinguishable, IsWhatLosesLittleEvidence) {
   const DistinctionPolicy& d = policy.distinction;
   EXPECT_TRUE(is_indistinguishable(below(d.indistinguishable_evidence), 100.0, d));
   EXPECT_FALSE(is_indistinguishable(d.indistinguishable_evidence, 100.0, d));
   EXPECT_TRUE(is_indistinguishable(100.0, below(d.scattered_t), d));
   EXPECT_FALSE(is_indistinguishable(100.0, d.scattered_t, d));
-  EXPECT_TRUE(is_indistinguishable(below(d.most_scattered_evidence), 0.0, d));
-  EXPECT_FALSE(is_indistinguishable(d.most_scattered_evidence, 0.0, d));
+  EXPECT_TRUE(is_indistinguishable(below(d.max_scattered_evidence), 0.0, d));
+  EXPECT_FALSE(is_indistinguishable(d.max_scattered_evidence, 0.0, d));
 }
 
 TEST(Alternative, TakesTheCertaintyOfAnEffectAway) {
   const DistinctionPolicy& d = policy.distinction;
-  EXPECT_TRUE(reduces_certainty(below(d.least_distance), 100.0, d));
-  EXPECT_FALSE(reduces_certainty(d.least_distance, 100.0, d));
-  EXPECT_TRUE(reduces_certainty(below(3.0), 3.0 / d.least_loss, d));
-  EXPECT_FALSE(reduces_certainty(3.0, 3.0 / d.least_loss, d));
+  EXPECT_TRUE(reduces_certainty(below(d.min_distance), 100.0, d));
+  EXPECT_FALSE(reduces_certainty(d.min_distance, 100.0, d));
+  EXPECT_TRUE(reduces_certainty(below(3.0), 3.0 / d.min_loss, d));
+  EXPECT_FALSE(reduces_certainty(3.0, 3.0 / d.min_loss, d));
 }
 
 }  // namespace

@@ -158,7 +158,7 @@ TEST(SampledMargin, TendsToTheContinuousOneAtHighRates) {
   EXPECT_NEAR(sampled, continuous, 5e-3 * continuous);
 }
 
-TEST(SampledMargin, PredictorBearsExtraDelayAndItsLoopIsTheUndelayedOne) {
+TEST(SampledMargin, LoopWithPredictorIsTheUndelayedOne) {
   const Plant plant = plant_named("viscous");
   ControlConfig config = gains_named("viscous");
   config.delay_s = 0.1;
@@ -214,31 +214,31 @@ TEST(OverrunLimit, OnlyTightensAsTheDelayGrows) {
   for (double delay_s = 0.0; delay_s < 0.12; delay_s += 0.001) {
     config.delay_s = delay_s;
     const OverrunLimit limit = overrun_limit(plant_named("exponential"), config);
-    EXPECT_LE(limit.most_periods_late, before) << delay_s;
+    EXPECT_LE(limit.max_periods_late, before) << delay_s;
     EXPECT_EQ(limit.warning.empty(), delay_s < 0.01415) << delay_s << limit.warning;
-    before = limit.most_periods_late;
+    before = limit.max_periods_late;
   }
   EXPECT_EQ(before, 3u);
 }
 
-TEST(OverrunLimit, WithoutAModelIsTighterThanWhatLeavesTimeBeforeAFallAndSaysSo) {
+TEST(OverrunLimit, WithoutAModelIsTighterAndSaysSo) {
   ControlConfig config = gains_named("exponential");
   const OverrunLimit limit = overrun_limit(std::nullopt, config);
   EXPECT_FALSE(limit.tolerance);
-  EXPECT_EQ(limit.most_periods_late, 10u);
+  EXPECT_EQ(limit.max_periods_late, 10u);
   EXPECT_NE(limit.sentence.find("unknown"), std::string::npos) << limit.sentence;
   EXPECT_EQ(limit.warning, "");
   config.sample_rate_hz = 100.0;
-  EXPECT_EQ(overrun_limit(std::nullopt, config).most_periods_late, 3u);
+  EXPECT_EQ(overrun_limit(std::nullopt, config).max_periods_late, 3u);
 }
 
-TEST(OverrunLimit, GainsThatStabilizeNothingAreToldFromADelayThatIsTooLong) {
+TEST(OverrunLimit, UnstableGainsAreToldFromADelayThatIsTooLong) {
   ControlConfig config = gains_named("exponential");
   config.gains.pendulum_angle_v_per_rad *= -1.0;
   const OverrunLimit limit = overrun_limit(plant_named("exponential"), config);
   ASSERT_TRUE(limit.tolerance);
   EXPECT_FALSE(limit.tolerance->stabilized);
-  EXPECT_EQ(limit.most_periods_late, 3u);
+  EXPECT_EQ(limit.max_periods_late, 3u);
   EXPECT_NE(limit.warning.find("do not stabilize"), std::string::npos) << limit.warning;
 }
 

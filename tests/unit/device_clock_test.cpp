@@ -69,7 +69,7 @@ TEST(DeviceClock, FollowsADriftWithoutMissingACycle) {
   }
 }
 
-TEST(DeviceClock, ACycleWithoutItsSampleCountsAsLostAndKeepsItsNumber) {
+TEST(DeviceClock, ACycleWithoutItsSampleIsLostAndKeepsItsNumber) {
   const Followed followed = follow(arrivals(10'000, 500.0, [](int i) { return i % 20 == 7 ? -1 : 0; }));
   EXPECT_EQ(followed.empty, 500);
   EXPECT_EQ(followed.timing.lost, 500u);
@@ -107,7 +107,7 @@ TEST(DeviceClock, ASampleThatComesAfterItsCycleIsPassedOver) {
   EXPECT_EQ(followed.timing.lost, 0u);
 }
 
-TEST(DeviceClock, PeriodsThatTheLoopSleptThroughAreMissedAsWithATimer) {
+TEST(DeviceClock, PeriodsSleptThroughAreMissedAsWithATimer) {
   LoopPhase phase{0, period_ns, 0};
   DeviceClock clock;
   ASSERT_TRUE(clock.take({1, 5'000'000}, phase));

@@ -198,7 +198,7 @@ TEST_P(Effect, IsNotThereAtItsNeutralValue) {
   const EffectInfo& info = effect_registry()[GetParam()];
   if (!std::isfinite(info.parameters[0].neutral) || info.kind == "motor_lag") return;
   Plant plant = paper_plant();
-  std::array<double, most_effect_parameters> values{};
+  std::array<double, max_effect_parameters> values{};
   for (std::size_t i = 0; i < info.parameters.size(); ++i)
     values[i] =
         std::isfinite(info.parameters[i].neutral) ? info.parameters[i].neutral : info.parameters[i].typical;
@@ -230,7 +230,7 @@ TEST(Registry, IsWhole) {
     offset += info.parameters.size();
     EXPECT_FALSE(info.equation.empty() || info.meaning.empty()) << info.kind;
     ASSERT_FALSE(info.parameters.empty()) << info.kind;
-    ASSERT_LE(info.parameters.size(), most_effect_parameters) << info.kind;
+    ASSERT_LE(info.parameters.size(), max_effect_parameters) << info.kind;
     for (const ParameterInfo& parameter : info.parameters) {
       EXPECT_FALSE(parameter.name.empty() || parameter.unit.empty() || parameter.meaning.empty())
           << info.kind;

@@ -22,13 +22,13 @@ double units_off(double value, long double truth) {
   return static_cast<double>(std::abs(static_cast<long double>(value) - truth)) / unit;
 }
 
-/// The largest error over random arguments of every magnitude up to `most`.
+/// The largest error over random arguments of every magnitude up to `largest`.
 template <class Function, class Truth>
-double worst(const Function& function, const Truth& truth, double most) {
+double worst(const Function& function, const Truth& truth, double largest) {
   constexpr int samples = 20000;
   std::mt19937_64 random(1);
   double worst = 0.0;
-  for (double scale = most; scale > 1e-3; scale *= 0.25) {
+  for (double scale = largest; scale > 1e-3; scale *= 0.25) {
     std::uniform_real_distribution<double> within(-scale, scale);
     for (int i = 0; i < samples; ++i) {
       const double x = within(random);

@@ -64,7 +64,7 @@ TEST(EncoderWatch, TakesABriefPulseOfAStrongVoltageForNoProof) {
   EXPECT_EQ(found_s, 0.5);
 }
 
-TEST(EncoderWatch, FindsAPendulumThatDoesNotCountWhileTheCartIsShaken) {
+TEST(EncoderWatch, FindsAStuckPendulumEncoderOverAShakenCart) {
   EncoderWatch watch = ip02_watch();
   const double found_s = found_after_s(watch, 5.0, StuckEncoder::pendulum, [](std::uint64_t tick) {
     const double cart_m = 0.02 * std::sin(0.05 * static_cast<double>(tick));
@@ -73,7 +73,7 @@ TEST(EncoderWatch, FindsAPendulumThatDoesNotCountWhileTheCartIsShaken) {
   EXPECT_LT(found_s, 0.2);
 }
 
-TEST(EncoderWatch, LetsACartAccelerateEvenlyUnderAPendulumThatLeans) {
+TEST(EncoderWatch, LetsACartAccelerateUnderALeaningPendulum) {
   EncoderWatch watch = ip02_watch();
   const double found_s = found_after_s(watch, 2.0, StuckEncoder::none, [](std::uint64_t tick) {
     const double t = static_cast<double>(tick) * period_s;

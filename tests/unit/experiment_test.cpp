@@ -37,7 +37,7 @@ ExperimentSetup setup_with(const std::string& piece, const std::string& plant = 
   return setup;
 }
 
-TEST(ExperimentFile, EveryPieceOfTheConfigurationReadsBackFromItsText) {
+TEST(ExperimentFile, EveryPieceOfTheConfigurationReadsBack) {
   int pieces = 0;
   for (const auto& entry : fs::recursive_directory_iterator(config / "experiments")) {
     if (entry.path().extension() != ".yaml") continue;
@@ -109,7 +109,7 @@ TEST(ExperimentScript, ARampFindsTheBreakawayVoltageOfThePlant) {
   EXPECT_EQ(ramps, 4);
 }
 
-TEST(ExperimentScript, AConstantVoltageReachesItsTerminalVelocityInBothDirections) {
+TEST(ExperimentScript, AConstantVoltageReachesTerminalVelocity) {
   ExperimentSetup setup = setup_with("{kind: constant_voltage, voltages_v: [3]}", "viscous.yaml");
   setup.plant.pendulum.reset();
   const Rehearsal r = rehearse(setup.experiment.pieces.front(), setup);
@@ -154,7 +154,7 @@ Piece sweep_piece(double stable_below_rad = 0.0) {
   return Piece{sweep};
 }
 
-TEST(DelaySweep, OrdersDelaysSoThatFallsComeLateAndFindsBothTransitions) {
+TEST(DelaySweep, OrdersDelaysSoThatFallsComeLate) {
   const std::vector<Piece> pieces = {sweep_piece()};
   const double oscillates_s[2] = {0.0103, 0.0121}, falls_s[2] = {0.0217, 0.0233};
   std::vector<TrialResult> done;
@@ -256,10 +256,10 @@ TEST(SignCheck, PulsesUpToItsLargestVoltageHoweverLow) {
   for (const double largest_v : {1e-9, 0.3, 0.5, 1.0, 1.2, 4.0}) {
     ExperimentSetup setup = setup_with("{kind: sign_check, largest_v: " + exact_text(largest_v) + "}");
     setup.plant.set(effect_number("coulomb_friction"), std::vector<double>{5.0});  // nothing moves
-    double most_v = 0.0;
+    double max_v = 0.0;
     for (const LogRecord& row : rehearse(setup.experiment.pieces.front(), setup).rows)
-      most_v = std::max(most_v, std::abs(row.voltage_v));
-    EXPECT_EQ(most_v, largest_v);
+      max_v = std::max(max_v, std::abs(row.voltage_v));
+    EXPECT_EQ(max_v, largest_v);
   }
 }
 

@@ -16,7 +16,7 @@ Plant cart_alone() {
   return plant;
 }
 
-TEST(Fit, TakesSlidingWhereTheModelRestsForAForceAndNotForSensorNoise) {
+TEST(Fit, TakesSlidingWhereTheModelRestsForAForce) {
   Plant believed = cart_alone();
   believed.set("coulomb_friction", {0.41});
   blind::Rig rig{.plant = believed};

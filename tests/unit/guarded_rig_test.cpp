@@ -59,7 +59,7 @@ TEST(GuardedRig, RefusesASingleJumpAndGoesOn) {
   EXPECT_EQ(rig->read().fault, RigFault::corrupt_reply) << "it counts anew";
 }
 
-TEST(GuardedRig, GivesUpCountsThatStayWhereTheyJumpedUntilItIsOpenedAgain) {
+TEST(GuardedRig, GivesUpJumpedCountsUntilItIsOpenedAgain) {
   const auto rig =
       guarded(std::make_unique<ListedRig>(std::vector<std::int64_t>{0, 5000, 5000, 5000, 0}), ip02());
   rig->open();

@@ -136,7 +136,7 @@ TEST_F(JoinedRigTest, ServesTheOutputFirstAndReadsEveryPart) {
   EXPECT_EQ(cart.last_v, -1.0) << "only the output is given a voltage";
 }
 
-TEST_F(JoinedRigTest, KnowsOfItsStopWhatItsOutputKnowsAndStopsTheOthersAllTheSame) {
+TEST_F(JoinedRigTest, StopsAllPartsAndKnowsWhatItsOutputKnows) {
   const auto rig = three();
   rig->open();
   output.stop = {};

@@ -99,7 +99,7 @@ TEST(LiveFrames, CountTheLatenessOfEveryRowInItsBin) {
   EXPECT_NEAR(late.at("worst_us").get<double>(), 20000.0, 1.0);
 }
 
-TEST(LiveFrames, CountPeriodsWithoutARowAndRowsThatDidNotComeThrough) {
+TEST(LiveFrames, CountPeriodsWithoutARowAndLostRows) {
   FrameMaker maker(scene());
   maker.add(row(0));
   maker.add(row(4));

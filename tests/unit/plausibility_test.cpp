@@ -26,9 +26,9 @@ std::vector<std::size_t> certain(double value, bool is_correction) {
       {is_correction}, policy);
 }
 
-TEST(Correction, IsThereFromItsLeastCertaintyOn) {
-  EXPECT_TRUE(certain(below(policy.least_z), true).empty());
-  EXPECT_EQ(certain(policy.least_z, true).size(), 1u);
+TEST(Correction, IsThereFromItsMinimumCertaintyOn) {
+  EXPECT_TRUE(certain(below(policy.min_z), true).empty());
+  EXPECT_EQ(certain(policy.min_z, true).size(), 1u);
   EXPECT_EQ(certain(0.0, false).size(), 1u) << "what is no correction stays";
 }
 
@@ -44,8 +44,8 @@ TEST(Correction, FollowsWhereOneThatIsAlikeIsSetBack) {
 }
 
 TEST(Correction, MustIncludeNothingOnAllRunsNoLonger) {
-  EXPECT_FALSE(is_certain_of_all_runs(below(policy.least_certainty_of_all_runs), policy));
-  EXPECT_TRUE(is_certain_of_all_runs(policy.least_certainty_of_all_runs, policy));
+  EXPECT_FALSE(is_certain_of_all_runs(below(policy.min_certainty_of_all_runs), policy));
+  EXPECT_TRUE(is_certain_of_all_runs(policy.min_certainty_of_all_runs, policy));
 }
 
 TEST(Correction, IsAsBelievedWithinWhatCoefficientsMove) {
@@ -70,10 +70,10 @@ TEST(Scale, IsDoubtfulBeyondADataSheet) {
 }
 
 TEST(AngleOffset, ShowsFromAStepAndAHalfOn) {
-  const double step = 0.001, least = policy.least_angle_offset_steps * step;
-  EXPECT_FALSE(shows_on_encoder(below(least), step, policy));
-  EXPECT_TRUE(shows_on_encoder(least, step, policy));
-  EXPECT_TRUE(shows_on_encoder(-least, step, policy));
+  const double step = 0.001, min_offset = policy.min_angle_offset_steps * step;
+  EXPECT_FALSE(shows_on_encoder(below(min_offset), step, policy));
+  EXPECT_TRUE(shows_on_encoder(min_offset, step, policy));
+  EXPECT_TRUE(shows_on_encoder(-min_offset, step, policy));
 }
 
 TEST(Bristles, AreShortWithinATenthOfTheTravel) {
@@ -85,10 +85,10 @@ TEST(Bristles, AreShortWithinATenthOfTheTravel) {
 
 TEST(HeldOutRuns, MayBeAsFarOffAgainAsAllRunsAre) {
   constexpr ResidualPolicy residual;
-  EXPECT_FALSE(is_held_out_too_far_off(residual.most_excess, 0.5, residual));
-  EXPECT_TRUE(is_held_out_too_far_off(above(residual.most_excess), 0.5, residual));
-  EXPECT_FALSE(is_held_out_too_far_off(1.5 * residual.most_excess, 1.5, residual));
-  EXPECT_TRUE(is_held_out_too_far_off(above(1.5 * residual.most_excess), 1.5, residual));
+  EXPECT_FALSE(is_held_out_too_far_off(residual.max_excess, 0.5, residual));
+  EXPECT_TRUE(is_held_out_too_far_off(above(residual.max_excess), 0.5, residual));
+  EXPECT_FALSE(is_held_out_too_far_off(1.5 * residual.max_excess, 1.5, residual));
+  EXPECT_TRUE(is_held_out_too_far_off(above(1.5 * residual.max_excess), 1.5, residual));
 }
 
 TEST(Runs, MoveEnoughBeyondTheStepsOfASensor) {
@@ -100,8 +100,8 @@ TEST(Runs, MoveEnoughBeyondTheStepsOfASensor) {
     run.known_theta_noise_rad = 1.0;
     return moves_enough({run}, excitation);
   };
-  EXPECT_FALSE(moves(excitation.least_steps - 1e-9));
-  EXPECT_TRUE(moves(excitation.least_steps + 1e-9));
+  EXPECT_FALSE(moves(excitation.min_steps - 1e-9));
+  EXPECT_TRUE(moves(excitation.min_steps + 1e-9));
 }
 
 }  // namespace

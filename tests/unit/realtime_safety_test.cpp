@@ -209,7 +209,7 @@ TEST(RealtimeSafety, TheModbusRigNeitherAllocatesNorLocks) {
 
 /// The pendulum's counts over Modbus, the cart's and the voltage on a card: at rest, where everything is
 /// zero.
-TEST(RealtimeSafety, TheComediRigAndARigOfPartsNeitherAllocateNorLock) {
+TEST(RealtimeSafety, ComediAndJoinedRigsNeitherAllocateNorLock) {
   test::in_real_time([] {
     test::fake_cards()["/dev/comedi0"] = test::fake_multiq3();
     RigFile file = patient_modbus();
@@ -248,7 +248,7 @@ TEST(RealtimeSafety, TheQuanserRigNeitherAllocatesNorLocks) {
   expect_safe_on_card(test::fake_card_rig());
 }
 
-TEST(RealtimeSafety, TheQuanserRigOnTheCardsClockNeitherAllocatesNorLocks) {
+TEST(RealtimeSafety, TheQuanserRigNeitherAllocatesNorLocks) {
   expect_safe_on_card(test::on_the_cards_clock(test::fake_card_rig()));
 }
 

@@ -22,7 +22,7 @@ namespace fs = std::filesystem;
 using test::TemporaryFolder;
 using test::text_of;
 
-TEST(DurationHistogram, BoundsQuantilesFromAboveByAnEighthOfAnOctave) {
+TEST(DurationHistogram, BoundsQuantilesByAnEighthOfAnOctave) {
   DurationHistogram histogram;
   for (int i = 1; i <= 100000; ++i) histogram.add(i);
   for (const double part : {0.001, 0.5, 0.99, 0.999}) {
@@ -100,7 +100,7 @@ TEST(RunLog, CountsWhatTheQueueCouldNotHold) {
       << log.failure();
 }
 
-TEST(ReadSamples, LeavesOutALastLineThatWasCutAndWhatAPowerCutLeaves) {
+TEST(ReadSamples, LeavesOutWhatAPowerCutLeaves) {
   TemporaryFolder folder;
   const fs::path file = folder.path() / "samples.csv";
   const std::string header = std::string(sample_columns) + "\n";

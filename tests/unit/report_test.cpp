@@ -271,7 +271,7 @@ TEST(RowThinner, LosesNoPeakAndNoGapOfALongRun) {
     thinner.add(row);
   }
   const std::vector<LogRecord> rows = thinner.take();
-  EXPECT_LE(rows.size(), RowThinner::most_rows);
+  EXPECT_LE(rows.size(), RowThinner::max_rows);
   EXPECT_GT(rows.size(), 20'000u) << "several for each column of pixels";
   EXPECT_TRUE(std::is_sorted(rows.begin(), rows.end(),
                              [](const LogRecord& a, const LogRecord& b) { return a.tick < b.tick; }));

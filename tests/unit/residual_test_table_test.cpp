@@ -36,7 +36,7 @@ struct Threshold {
 };
 
 const Threshold thresholds[] = {
-    {"dependence", "certainty", [](ResidualTests& s, double v) { s.certainty = v; }, policy.least_dependence,
+    {"dependence", "certainty", [](ResidualTests& s, double v) { s.certainty = v; }, policy.min_dependence,
      1},
     {"bursts", "dispersion", [](ResidualTests& s, double v) { s.dispersion = v; }, policy.bursts, 1},
     {"heavy_tails", "kurtosis",
@@ -48,7 +48,7 @@ const Threshold thresholds[] = {
      [](ResidualTests& s, double v) {
        s.tails = {6.0, v};
      },
-     policy.least_dependence, 1},
+     policy.min_dependence, 1},
     {"lasting_bursts", "kurtosis",
      [](ResidualTests& s, double v) {
        s.tails.kurtosis = v;
@@ -76,7 +76,7 @@ const Threshold thresholds[] = {
        s.certainty = v;
      },
      policy.suspected_dependence, 1},
-    {"excess", "excess", [](ResidualTests& s, double v) { s.excess = v; }, policy.most_excess, 1},
+    {"excess", "excess", [](ResidualTests& s, double v) { s.excess = v; }, policy.max_excess, 1},
     {"uneven_with_dependence", "dispersion",
      [](ResidualTests& s, double v) {
        s.dispersion = v;

@@ -228,7 +228,7 @@ TEST(RigLimits, AssumeAnIp02WhereNoBoundIsKnown) {
   EXPECT_LT(rig_limits(rig, plant).encoders.longest_pendulum_m, 0.7);
 }
 
-TEST(SentenceOfAnEnd, AsksForRealTimeSchedulingOnlyWhereItWasNotGranted) {
+TEST(SentenceOfAnEnd, AsksForRealTimeOnlyWhereItWasNotGranted) {
   LoopOutcome outcome = ended_by(StopReason::overrun, 500);
   outcome.counts.overruns_wake = 4;
   EXPECT_TRUE(says(sentence_of(outcome, {}), "grant it"));
@@ -238,7 +238,7 @@ TEST(SentenceOfAnEnd, AsksForRealTimeSchedulingOnlyWhereItWasNotGranted) {
   EXPECT_TRUE(says(sentence_of(outcome, {}), "check the link"));
 }
 
-TEST(Session, RunsAreReplayedBitForBitAlsoWithDelayJitterNoiseAndGaps) {
+TEST(Session, RunsWithDelayJitterNoiseAndGapsReplayBitForBit) {
   TemporaryFolder folder;
   RigFile rig = simulated_file();
   rig.simulated->theta_noise_rad = 5e-4;
@@ -468,7 +468,7 @@ TEST(Session, StopsWhereTheCartWouldRollToTheTrackLimit) {
   EXPECT_LT(run_with(0.1), track_end_m);
 }
 
-TEST(Session, GivesNoVoltageAfterMorePeriodsWereMissedThanItTolerates) {
+TEST(Session, GivesNoVoltageAfterTooManyMissedPeriods) {
   TemporaryFolder folder;
   int writes_before = 0;
   const TestRun run =

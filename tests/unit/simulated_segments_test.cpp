@@ -50,7 +50,7 @@ TEST(SimulateSegments, OfTheTruePlantLeavesTheEncodersSteps) {
   }
 }
 
-TEST(SimulateSegments, FindsTheBasinOfTheInitialStateOnACoggedTrack) {
+TEST(SimulateSegments, FindsTheBasinOfTheStartOnACoggedTrack) {
   blind::Rig rig{.plant = rig_plant()};
   rig.plant.remove(effect_number("coulomb_friction"));
   rig.plant.set("cogging_force", {0.58, 0.0156, -2.3});
@@ -110,16 +110,16 @@ TEST(BlindRun, BacklashHidesHalfThePlayEitherWay) {
   EXPECT_NEAR(largest, 1e-3, 2.0 * rig.cart_step_m);
 }
 
-TEST(BlindCase, HidesWhatWasAskedForAndLeavesOutTheUnknownInTheTwin) {
+TEST(BlindCase, HidesTheUnknownAndLeavesItOutInTheTwin) {
   for (std::uint64_t seed = 1; seed <= 3; ++seed) {
     const blind::Case blind =
-        blind::make_case({.hidden = {"gusts"}, .seed = seed, .runs = 1, .most_samples = 1500.0});
+        blind::make_case({.hidden = {"gusts"}, .seed = seed, .runs = 1, .max_samples = 1500.0});
     EXPECT_EQ(blind.rig.unknown, blind::Unknown::gusts);
     const auto with = measure_all(blind), without = measure_all(blind, true);
     EXPECT_NE(with[0].cart_m, without[0].cart_m);
   }
   const blind::Case hidden =
-      blind::make_case({.hidden = {"cable_spring"}, .seed = 4, .runs = 1, .most_samples = 1500.0});
+      blind::make_case({.hidden = {"cable_spring"}, .seed = 4, .runs = 1, .max_samples = 1500.0});
   EXPECT_EQ(hidden.believed.find("cable_spring"), nullptr);
   EXPECT_NE(hidden.rig.plant.find("cable_spring"), nullptr);
 }

@@ -32,7 +32,7 @@ inline RunSetup setup_for(const RigFile& rig, double duration_s, double theta0_d
   setup.limits = rig_limits(rig, read_plant_file(rig.simulated->plant));
   setup.limits.coast_s = 0.0;
   setup.limits.periods = static_cast<std::uint64_t>(duration_s * setup.control.sample_rate_hz);
-  setup.limits.most_periods_late = default_periods_late(setup.control.period_s());
+  setup.limits.max_periods_late = default_periods_late(setup.control.period_s());
   return setup;
 }
 

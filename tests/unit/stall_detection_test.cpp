@@ -95,10 +95,10 @@ bool finds_just_the_stop() {
 }
 
 TEST(StallDetector, FindsWhenAProcessStoodStill) {
-  constexpr int most_samples = 50;
+  constexpr int max_samples = 50;
   int samples = 1;
-  while (!finds_just_the_stop() && samples < most_samples) ++samples;
-  EXPECT_LT(samples, most_samples) << "none was found within a few periods of the detector";
+  while (!finds_just_the_stop() && samples < max_samples) ++samples;
+  EXPECT_LT(samples, max_samples) << "none was found within a few periods of the detector";
 }
 
 /// Whether a thread that works for several times a stall's length was taken for none.
@@ -111,10 +111,10 @@ bool works_without_stall(const StallDetector& detector) {
 
 TEST(StallDetector, DoesNotTakeABusyProcessForOne) {
   const StallDetector detector;
-  constexpr int most_spells = 100;
+  constexpr int max_spells = 100;
   int spells = 1;
-  for (; !works_without_stall(detector) && spells < most_spells; ++spells) sleep_s(0.1);
-  EXPECT_LT(spells, most_spells) << "the machine may stall in some of them, not in all";
+  for (; !works_without_stall(detector) && spells < max_spells; ++spells) sleep_s(0.1);
+  EXPECT_LT(spells, max_spells) << "the machine may stall in some of them, not in all";
 }
 
 /// Wakes that are so late, one after the other; the last that was said of a stall.
@@ -167,11 +167,11 @@ TEST(Interval, OverlapsWhatItTouches) {
 TEST(Stall, ThatOverlapsExcusesTimingAndAfterAllAttemptsSkips) {
   const Sample sample = run_sample("FailsOnTimingInEveryStall");
   EXPECT_EQ(sample.exit_code, 0) << sample.out;
-  EXPECT_EQ(sample.attempts(), static_cast<std::size_t>(most_attempts));
+  EXPECT_EQ(sample.attempts(), static_cast<std::size_t>(max_attempts));
   EXPECT_NE(sample.out.find("[  SKIPPED ]"), std::string::npos) << sample.out;
-  EXPECT_EQ(count_of(sample.counted, "retry\tSample.FailsOnTimingInEveryStall\t"), most_attempts - 1u);
+  EXPECT_EQ(count_of(sample.counted, "retry\tSample.FailsOnTimingInEveryStall\t"), max_attempts - 1u);
   EXPECT_EQ(count_of(sample.counted, "skip\tSample.FailsOnTimingInEveryStall\t"), 1u);
-  EXPECT_EQ(count_of(sample.counted, "\n"), static_cast<std::size_t>(most_attempts));
+  EXPECT_EQ(count_of(sample.counted, "\n"), static_cast<std::size_t>(max_attempts));
 }
 
 TEST(Stall, ThatIsOverLetsTheNextAttemptPass) {

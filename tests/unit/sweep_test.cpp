@@ -70,7 +70,7 @@ TEST(FastLoop, AgreesWithTheEventEngineOnBristles) {
   expect_lanes_agree(sampled("dynamic"), 5e-6);
 }
 
-TEST(FastLoop, AgreesWithTheEventEngineOnAnEffectOutsideTheCommonSets) {
+TEST(FastLoop, AgreesWithTheEventEngineOnAnUncommonEffect) {
   Plant plant = read_plant_file(source + "/config/plants/viscous.yaml");
   plant.set("cable_spring", {3.0, 0.05});
   plant.set("quadratic_drag", {1.5});
@@ -173,7 +173,7 @@ TEST(ContinuousLanes, HoldToTheTruthOnBristles) {
   expect_continuous_lanes_hold(continuous("dynamic"), 1e-6);
 }
 
-TEST(ContinuousLanes, HoldToTheTruthWithCornersInTheActuatorAndAnInputDelay) {
+TEST(ContinuousLanes, AgreeWithActuatorCornersAndAnInputDelay) {
   for (const char* name : {"exponential", "dynamic"}) {
     Plant plant = read_plant_file(source + "/config/plants/" + name + ".yaml");
     plant.set("voltage_saturation", {8.0});
@@ -333,7 +333,7 @@ TEST_F(SweepFolder, TakesAPredictorAlong) {
   }
 }
 
-TEST_F(SweepFolder, GivesTheSameBytesForAnyNumberOfThreadsAndAfterAStop) {
+TEST_F(SweepFolder, HasTheSameBytesForAnyThreadsAndAfterAStop) {
   const SweepConfig config = read_sweep_file(write(text_with("", "")));
   const auto one = make_thread_executor(config, 1), three = make_thread_executor(config, 3);
   run_sweep(config, folder_ / "one", {}, *one);

@@ -161,10 +161,10 @@ TEST(Phase, IsWithinHalfATurn) {
 TEST(Power, GrowsWithTheParametersThatHaveToBePaidFor) {
   const SelectionPolicy policy;
   const double one = standard_errors_to_be_shown(force, false, policy);
-  EXPECT_DOUBLE_EQ(one, std::sqrt(policy.acceptance.least_evidence) + policy.power.power_z);
+  EXPECT_DOUBLE_EQ(one, std::sqrt(policy.acceptance.min_evidence) + policy.power.power_z);
   EXPECT_GT(standard_errors_to_be_shown(effect_number("cogging_force"), false, policy), one);
   EXPECT_DOUBLE_EQ(standard_errors_to_be_shown(effect_number("cart_mass"), true, policy),
-                   policy.correction.least_z + policy.power.power_z);
+                   policy.correction.min_z + policy.power.power_z);
 }
 
 TEST(Power, LetsHideOnlyTheFrictionThatThePlantLacks) {

@@ -11,7 +11,7 @@ HEADER = """/// When an effect is added.
 struct AcceptancePolicy {
   /// [evidence] The least evidence,
   /// beyond the price. Chosen.
-  double least_evidence = 25.0;
+  double min_evidence = 25.0;
 %s  double share = 1.0 / 3.0;
 };
 
@@ -31,7 +31,7 @@ def limits(header):
 class WriteReference(unittest.TestCase):
     def test_copies_values_units_and_comments(self):
         lines = limits(HEADER % "  /// [1] A share.\n")
-        self.assertIn("| `least_evidence` | 25 | evidence | The least evidence, beyond the price. Chosen. |", lines)
+        self.assertIn("| `min_evidence` | 25 | evidence | The least evidence, beyond the price. Chosen. |", lines)
         self.assertIn("| `share` | 1 / 3 | - | A share. |", lines)
         self.assertIn("### Acceptance", lines)
 

@@ -52,7 +52,7 @@ class Controller {
 
   /// The voltage for a sample. A state estimator predicts through samples that are missing since the
   /// last step. Without one they are interpolated linearly between the samples on both sides. At most
-  /// `most_missing_periods` are bridged in this way; after a longer gap the controller restarts from
+  /// `max_missing_periods` are bridged in this way; after a longer gap the controller restarts from
   /// rest.
   ControlOutput step(const ControlInput& input) noexcept;
 
@@ -60,7 +60,7 @@ class Controller {
   const DelayLine& delay_line() const { return delay_; }   ///< the delay of the feedback
   double amplifier_limit_v() const { return limit_v_; }    ///< the limit of the voltage [V]
 
-  static constexpr std::uint64_t most_missing_periods = 1000;  ///< the longest gap that is bridged [periods]
+  static constexpr std::uint64_t max_missing_periods = 1000;  ///< the longest gap that is bridged [periods]
 
  private:
   void begin(const ControlInput& input) noexcept;

@@ -55,17 +55,17 @@ class CartPath {
   void clear() noexcept { count_ = filling_ = 0; }  ///< forgets everything
   /// True when an interval was completed.
   bool add(double time_s, double cart_m) noexcept;
-  /// Root mean square residual of the best parabola [m]; 0 with fewer than `fewest` intervals.
+  /// Root mean square residual of the best parabola [m]; 0 with fewer than `min_points` intervals.
   double rms_from_parabola_m() const noexcept;
   double duration_s() const noexcept;  ///< from the first to the last kept interval [s]
 
  private:
-  static constexpr std::size_t most = 32, fewest = 8;
+  static constexpr std::size_t max_points = 32, min_points = 8;
   static constexpr double interval_s = 0.01;
   struct Point {
     double time_s = 0.0, cart_m = 0.0;
   };
-  std::array<Point, most> points_{};
+  std::array<Point, max_points> points_{};
   std::size_t count_ = 0, next_ = 0;
   Point sum_;
   double first_s_ = 0.0;

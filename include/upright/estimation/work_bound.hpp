@@ -18,7 +18,7 @@ class BoundReached : public std::exception {
 class WorkBound {
  public:
   /// The bound, in samples processed.
-  explicit WorkBound(double most_samples) : left_samples_(most_samples) {}
+  explicit WorkBound(double max_samples) : left_samples_(max_samples) {}
 
   void count(double samples) { left_samples_ -= samples; }  ///< so many samples were processed
   void grant(double samples) { left_samples_ = samples; }   ///< so many samples are left from now on

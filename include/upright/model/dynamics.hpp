@@ -276,7 +276,7 @@ class Dynamics {
   /// Greatest rate of the motion in this state [1/s]; engines keep their steps below a fraction of its
   /// inverse. Without `bristles`, the rate of the bristles is excluded.
   double fastest_rate_radps(const PlantState<S>& state, bool bristles = true) const {
-    const double mass = value_of(least_cart_inertia());
+    const double mass = value_of(min_cart_inertia());
     const double v = value_of(state.cart_mps);
     double rate = value_of(base_.back_emf_n_per_mps) / mass + std::abs(value_of(state.theta_radps));
     for_each_effect([&]<std::size_t I>() {
@@ -298,7 +298,7 @@ class Dynamics {
   S bristle_damping() const { return sum_of_bristles<false>(); }   ///< of the bristles [N s/m]
 
   /// Smallest inertia that a force on the cart acts on [kg].
-  S least_cart_inertia() const {
+  S min_cart_inertia() const {
     if (!model_.has_pendulum) return total_mass_;
     return total_mass_ - coupling_ * coupling_ / base_.inertia_about_pivot_kgm2;
   }

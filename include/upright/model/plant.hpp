@@ -32,8 +32,8 @@ struct Motor {
 
 /// One effect of a plant: its index in the registry and its parameter values in declared order.
 struct PlantEffect {
-  std::size_t number = 0;                               ///< index in the registry
-  std::array<double, most_effect_parameters> values{};  ///< in declared order; the rest is unused
+  std::size_t number = 0;                              ///< index in the registry
+  std::array<double, max_effect_parameters> values{};  ///< in declared order; the rest is unused
 };
 
 /// Whether an effect is a level of dry friction. Of a force table its values decide.

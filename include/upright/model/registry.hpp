@@ -16,7 +16,7 @@
 namespace upright {
 
 constexpr std::size_t effect_count = std::tuple_size_v<AllEffects>;  ///< the number of effects
-constexpr std::size_t most_effect_parameters = 16;                   ///< no effect has more parameters
+constexpr std::size_t max_effect_parameters = 16;                    ///< no effect has more parameters
 
 /// The type of effect I.
 template <std::size_t I>

@@ -42,7 +42,7 @@ struct LoopLimits {
   /// Stop when there was no fresh reading, or no successful write, for longer than this.
   double watchdog_s = 0.0;
   /// Stop when more consecutive periods than this ended late or were missed.
-  std::uint64_t most_periods_late = 0;
+  std::uint64_t max_periods_late = 0;
   /// Without voltage, a cart coasts for this many seconds times its velocity.
   double coast_s = 0.0;
   std::int64_t spin_ns = 0;          ///< final part of each wait in which the loop polls the clock

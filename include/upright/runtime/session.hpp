@@ -15,7 +15,7 @@
 
 namespace upright {
 
-/// The default of LoopLimits::most_periods_late: the periods in 50 ms, at least 3. Far above the delays
+/// The default of LoopLimits::max_periods_late: the periods in 50 ms, at least 3. Far above the delays
 /// of a kernel without real-time scheduling, far below the time in which the pendulum falls.
 std::uint64_t default_periods_late(double period_s);
 
@@ -27,7 +27,7 @@ std::string gap_of_encoder_watch(const RigFile& rig);
 
 /// The limits of a run from a rig file: track, coast, fall, watchdog, the assumptions of the encoder
 /// watch (what the rig's plant implies, where it is known, and the file's section `encoder_watch`), and
-/// whether the signs have been checked. The caller sets `periods`, `most_periods_late` and
+/// whether the signs have been checked. The caller sets `periods`, `max_periods_late` and
 /// `delay_exceeded`. Throws ConfigError where the encoder watch lacks a bound.
 LoopLimits rig_limits(const RigFile& rig, const std::optional<Plant>& plant);
 

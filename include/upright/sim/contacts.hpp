@@ -288,13 +288,13 @@ class EventBudget {
   /// Called before each step.
   bool spent(double time_s) {
     if (time_s - window_begin_s_ >= window_s) restart(time_s);
-    return events_ >= most_events;
+    return events_ >= max_events;
   }
   void count() { ++events_; }  ///< counts one event
 
  private:
   static constexpr double window_s = 1e-4;
-  static constexpr int most_events = 24;
+  static constexpr int max_events = 24;
   double window_begin_s_ = 0.0;
   int events_ = 0;
 };
@@ -348,14 +348,14 @@ struct ActuatorCorners {
 /// The motion over one step as a polynomial in time about `at_s`; `factor[k]` multiplies (t - at_s)^k.
 /// Passed to step sinks under a varying voltage; dense output for delayed feedback.
 struct DenseStep {
-  static constexpr int most_factors = 13;                 ///< of the longest polynomial
-  double begin_s = 0.0;                                   ///< where the step begins [s]
-  double end_s = 0.0;                                     ///< where the step ends [s]
-  double at_s = 0.0;                                      ///< the time about which it is expanded [s]
-  int factors = 0;                                        ///< how many factors are in use
-  bool ends_at_event = false;                             ///< the acceleration is discontinuous at `end_s`
-  bool ends_at_corner = false;                            ///< the derivative of the acceleration is
-  std::array<PlantState<double>, most_factors> factor{};  ///< of each power of time
+  static constexpr int max_factors = 13;                 ///< of the longest polynomial
+  double begin_s = 0.0;                                  ///< where the step begins [s]
+  double end_s = 0.0;                                    ///< where the step ends [s]
+  double at_s = 0.0;                                     ///< the time about which it is expanded [s]
+  int factors = 0;                                       ///< how many factors are in use
+  bool ends_at_event = false;                            ///< the acceleration is discontinuous at `end_s`
+  bool ends_at_corner = false;                           ///< the derivative of the acceleration is
+  std::array<PlantState<double>, max_factors> factor{};  ///< of each power of time
 };
 
 /// Sets the flags of a step that ends at `found`; null: it ends at nothing.

@@ -30,8 +30,8 @@ class CvodeEngine {
   /// As in EventEngine.
   void start(const PlantState<double>& state, double time_s = 0.0, double voltage_v = 0.0);
   void advance(double duration_s, double voltage_v);  ///< under a constant voltage
-  /// Under a voltage that varies, in steps of at most `most_step_s`.
-  void advance(double duration_s, const Volts& volts, double most_step_s, const Sink& sink);
+  /// Under a voltage that varies, in steps of at most `max_step_s`.
+  void advance(double duration_s, const Volts& volts, double max_step_s, const Sink& sink);
 
   const PlantState<double>& state() const;                                 ///< the state now
   Outputs<double> outputs() const { return dynamics().measure(state()); }  ///< what the sensors show now

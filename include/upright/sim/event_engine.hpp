@@ -84,9 +84,9 @@ class EventEngine {
   requires(std::is_same_v<S, double>&& std::is_invocable_r_v<
            double, Volts, double, const PlantState<double>&>) void advance(double duration_s,
                                                                            const Volts& volts,
-                                                                           double most_step_s,
+                                                                           double max_step_s,
                                                                            const Sink& sink) {
-    const bool lag = dynamics_.has_motor_lag() && dynamics_.motor_time_constant_s() > least_lag_s;
+    const bool lag = dynamics_.has_motor_lag() && dynamics_.motor_time_constant_s() > min_lag_s;
     const auto command = [&](double t, const PlantState<double>& s) { return volts(t, s); };
     if (!lag) state_.motor_v = dynamics_.actuate(command(time_s_, state_));
     settle();
@@ -98,7 +98,7 @@ class EventEngine {
       update_bristle_step_limit(lag ? state_.motor_v : plain_.actuate(command(time_s_, state_)));
       double rate = motion_rate();
       if (lag) rate += 1.0 / dynamics_.motor_time_constant_s();
-      const double step = even_step(end_s - time_s_, std::min(rate_step(rate), most_step_s));
+      const double step = even_step(end_s - time_s_, std::min(rate_step(rate), max_step_s));
       const auto along = [&](double t) { return driven_rk4(command, lag, t).end; };
       const DrivenStep driven = driven_rk4(command, lag, step);
       auto found =
@@ -177,9 +177,9 @@ class EventEngine {
   std::uint64_t step_count() const { return step_count_; }
 
  private:
-  static constexpr double least_lag_s = 1e-6;
+  static constexpr double min_lag_s = 1e-6;
   static constexpr double smallest_step_s = 1e-13;
-  static constexpr double most_rate_radps = 2e6;
+  static constexpr double max_rate_radps = 2e6;
 
   struct Found {
     Watch watch;
@@ -254,7 +254,7 @@ class EventEngine {
   /// Greatest rate of the motion itself, bounded so that no plant causes unbounded work.
   double motion_rate() const {
     const double rate = plain_.fastest_rate_radps(plain_state(state_), false) + bristle_change_radps_;
-    return std::min(rate, most_rate_radps);
+    return std::min(rate, max_rate_radps);
   }
 
   double rate_step(double rate) const {
@@ -274,7 +274,7 @@ class EventEngine {
       // A lag shorter than the shortest step has settled within it.
       if (gap_v > settled_v)
         rate = std::min(rate + options_.step_fraction / value_of(dynamics_.motor_time_constant_s()),
-                        most_rate_radps);
+                        max_rate_radps);
     }
     return even_step(remaining, rate_step(rate));
   }

@@ -13,11 +13,11 @@ namespace upright {
 template <class Engine, class S>
 class BasicSimulator {
  public:
-  /// `most_commands`: the largest number of commands within the input delay (input delay times command
+  /// `max_commands`: the largest number of commands within the input delay (input delay times command
   /// rate, and a margin).
   explicit BasicSimulator(const PlantModel<S>& model, const EngineOptions& options = {},
-                          std::size_t most_commands = 4096)
-      : engine_(model, options), delay_s_(engine_.dynamics().input_delay_s()), waiting_(most_commands) {}
+                          std::size_t max_commands = 4096)
+      : engine_(model, options), delay_s_(engine_.dynamics().input_delay_s()), waiting_(max_commands) {}
 
   /// Starts at a time, with the voltage that has acted until then.
   void start(const PlantState<S>& state, double time_s = 0.0, double acting_v = 0.0) {

@@ -63,7 +63,7 @@ template <class Value>
 Request request_for(Call call, hil::Channels channels, unsigned count, const Value* values) {
   Request request;
   request.call = call;
-  request.count = std::min<unsigned>(count, upright::fake_hil::most_channels);
+  request.count = std::min<unsigned>(count, upright::fake_hil::max_channels);
   for (unsigned i = 0; i < request.count; ++i) {
     request.channels[i] = channels[i];
     if (values != nullptr) request.values[i] = static_cast<double>(values[i]);
@@ -80,7 +80,7 @@ template <class Value>
 hil::Error ask(hil::Card card, Call call, hil::Channels channels, unsigned count, Value* values) {
   const Reply reply = asked(card, request_for<Value>(call, channels, count, nullptr));
   if (reply.result < 0) return reply.result;
-  for (unsigned i = 0; i < std::min<unsigned>(count, upright::fake_hil::most_channels); ++i)
+  for (unsigned i = 0; i < std::min<unsigned>(count, upright::fake_hil::max_channels); ++i)
     values[i] = static_cast<Value>(reply.values[i]);
   return reply.result;
 }

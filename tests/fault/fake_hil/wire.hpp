@@ -8,7 +8,7 @@
 
 namespace upright::fake_hil {
 
-inline constexpr std::size_t most_channels = 32;
+inline constexpr std::size_t max_channels = 32;
 
 enum class Call : std::uint32_t {
   open,
@@ -40,14 +40,14 @@ enum class Call : std::uint32_t {
 struct Request {
   Call call = Call::open;
   std::uint32_t count = 0;
-  std::array<std::uint32_t, most_channels> channels{};
-  std::array<double, most_channels> values{};
+  std::array<std::uint32_t, max_channels> channels{};
+  std::array<double, max_channels> values{};
   std::array<char, 128> text{};
 };
 
 struct Reply {
   std::int32_t result = 0;
-  std::array<double, most_channels> values{};
+  std::array<double, max_channels> values{};
   std::array<char, 128> text{};
 };
 

@@ -58,8 +58,8 @@ class MotionRange {
 
   /// Takes one sample.
   void take(double time_s, double theta_rad, double cart_m) {
-    theta_most_ = std::max(theta_most_, std::abs(theta_rad));
-    cart_most_ = std::max(cart_most_, std::abs(cart_m));
+    theta_max_ = std::max(theta_max_, std::abs(theta_rad));
+    cart_max_ = std::max(cart_max_, std::abs(cart_m));
     if (time_s < window_begin_s_) return;
     theta_low_ = std::min(theta_low_, theta_rad);
     theta_high_ = std::max(theta_high_, theta_rad);
@@ -69,14 +69,14 @@ class MotionRange {
 
   /// Writes the amplitudes.
   void into(LoopResult& result) const {
-    result.theta_amplitude_rad = result.fell() ? theta_most_ : 0.5 * (theta_high_ - theta_low_);
-    result.cart_amplitude_m = result.fell() ? cart_most_ : 0.5 * (cart_high_ - cart_low_);
+    result.theta_amplitude_rad = result.fell() ? theta_max_ : 0.5 * (theta_high_ - theta_low_);
+    result.cart_amplitude_m = result.fell() ? cart_max_ : 0.5 * (cart_high_ - cart_low_);
   }
 
  private:
   static constexpr double infinite = std::numeric_limits<double>::infinity();
   double window_begin_s_;
-  double theta_most_ = 0.0, cart_most_ = 0.0;
+  double theta_max_ = 0.0, cart_max_ = 0.0;
   double theta_low_ = infinite, theta_high_ = -infinite, cart_low_ = infinite, cart_high_ = -infinite;
 };
 
