@@ -204,6 +204,37 @@ TEST(Design, MakesAnExtendedKalmanFilterThatReplaysBitForBit) {
   EXPECT_NE(replayed.out.find("bit for bit"), std::string::npos);
 }
 
+TEST(Design, ForADelayWithoutAPredictorTheMarginGrows) {
+  const TemporaryFolder folder;
+  const std::string made = (folder.path() / "slow-link.yaml").string();
+  const Json design = json_from("design " + plant("viscous") + " --estimator kalman --for-delay 0.03 --out " +
+                                shell_quoted(made) + " --json");
+  const Json& margin = design["margin"];
+  EXPECT_LE(margin["cost_loss"].get<double>(), 0.3);
+  EXPECT_GT(margin["critical_delay_s"].get<double>(), 1.3 * margin["lqr_critical_delay_s"].get<double>());
+  EXPECT_EQ(design["trials"]["fell"].get<int>(), 0);
+  const Json judged = json_from("margin " + plant("viscous") + " " + shell_quoted(made) + " --json");
+  EXPECT_NEAR(judged["sampled_sliding"]["critical_delay_s"].get<double>(),
+              margin["critical_delay_s"].get<double>(), 1e-6);
+  EXPECT_NEAR(judged["sampled_sliding_unmodelled"]["critical_delay_s"].get<double>(),
+              0.03 + design["estimator"]["bears_unmodelled_delay_s"].get<double>(), 1e-6);
+  const CommandResult run = run_upright(
+      "run --rig " + shell_quoted(config_folder + "rigs/simulated.yaml") + " --gains " + shell_quoted(made) +
+      " --fast --theta0-deg 3 --duration 20 --out " + shell_quoted(folder.path().string()));
+  EXPECT_EQ(run.exit_code, 0) << run.out << run.err;
+}
+
+TEST(Design, RefusesFlagsOfADelayThatContradictEachOther) {
+  const auto error_of = [](const std::string& flags) {
+    const CommandResult result = run_upright("design " + plant("viscous") + " " + flags);
+    EXPECT_EQ(result.exit_code, 2) << flags;
+    return result.err;
+  };
+  EXPECT_NE(error_of("--for-delay 0.02 --delay 0.02").find("give one of the two"), std::string::npos);
+  EXPECT_NE(error_of("--cost-loss 0.2").find("add --for-delay"), std::string::npos);
+  EXPECT_NE(error_of("--for-delay 0.2").find("raise --cost-loss"), std::string::npos);
+}
+
 TEST(Run, SaysAtItsStartWhatTheGainsTolerate) {
   const TemporaryFolder folder;
   const CommandResult run = run_upright(run_line("exponential", folder, "--duration 1"));

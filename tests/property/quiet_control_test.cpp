@@ -143,6 +143,28 @@ TEST_P(QuietControl, NoneOf100FallsWithEveryParameter20PercentOff) {
   }
 }
 
+/// The plant with every number of its file 20 percent off: the inertia stays that of the same kind of body.
+Plant rig_off(Plant plant, unsigned seed) {
+  const double about_pivot_kgm2 = plant.pendulum->inertia_about_pivot_kgm2();
+  const auto square = [](const Pendulum& p) { return p.mass_kg * p.length_to_com_m * p.length_to_com_m; };
+  const double shape = about_pivot_kgm2 / square(*plant.pendulum);
+  plant = perturbed_plant(plant, seed, 0.2);
+  plant.pendulum->given_inertia_kgm2 = shape * square(*plant.pendulum);
+  return plant;
+}
+
+TEST_P(QuietControl, NoneOf100FallsOnARigThatIs20PercentOff) {
+  for (const double delay_s : {0.0, 0.025}) {
+    ControlConfig config = quiet();
+    config.delay_s = delay_s;
+    std::atomic<int> fell{0};
+    parallel_for(100, [&](std::size_t seed) {
+      if (run_of(rig_off(plant, static_cast<unsigned>(seed)), config, model, 3.0, 8.0).fell) ++fell;
+    });
+    EXPECT_EQ(fell, 0) << delay_s;
+  }
+}
+
 TEST_P(QuietControl, FrictionThatTheModelHasWrongHuntsNoMore) {
   if (!extended) GTEST_SKIP() << "not applicable: this estimator has no friction model";
   const ControlConfig with = quiet();

@@ -108,6 +108,49 @@ TEST(SampledDesign, TendsToTheContinuousGainAtHighRates) {
 }
 
 /// Random systems with one unstable part at least, all of it within reach of the input.
+TEST(GainCost, IsTheSumAlongTheWorstStart) {
+  const Plant plant = sliding_plant(plant_named("exponential"));
+  const GainCost cost(plant, {}, 100.0, 1000.0);
+  const std::array<double, 4> best = design_sampled_gains(plant, {}, 100.0, 1000.0, 0.0).design.gains;
+  EXPECT_NEAR(cost.loss(best), 0.0, 1e-9);
+  std::array<double, 4> other = best;
+  other[0] *= 0.5;
+  other[2] *= 0.8;
+  const double loss = cost.loss(other);
+  EXPECT_GT(loss, 0.0);
+  // Witness: the cost summed along the steps of the sampled plant.
+  const LinearPlant linear = linearize(plant, 100.0);
+  const auto integral = [&](const std::array<double, 4>& gains, const Eigen::Vector4d& start) {
+    Eigen::RowVector4d k(gains.data());
+    const SampledPlant step = hold_input(linear.a, linear.b * linear.actuator_slope, 1e-3);
+    Eigen::Vector4d s = start;
+    double sum = 0.0;
+    for (int i = 0; i < 20000; ++i) {
+      const double volts = k * s;
+      sum += 5000.0 * s(0) * s(0) + 3000.0 * s(1) * s(1) + 20.0 * (s(2) * s(2) + s(3) * s(3)) + volts * volts;
+      s = step.a * s + step.b * volts;
+    }
+    return sum;
+  };
+  // The integral is a quadratic form of the start.
+  const auto form = [&](const std::array<double, 4>& gains) {
+    const Eigen::Matrix4d unit = Eigen::Matrix4d::Identity();
+    Eigen::Matrix4d costs;
+    for (int i = 0; i < 4; ++i)
+      for (int j = 0; j < 4; ++j)
+        cost(i, j) =
+            0.25 * (integral(gains, unit.col(i) + unit.col(j)) - integral(gains, unit.col(i) - unit.col(j)));
+    return costs;
+  };
+  const Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::Matrix4d> ratios(form(other), form(best));
+  EXPECT_NEAR(loss, ratios.eigenvalues().maxCoeff() - 1.0, 0.01 * loss);
+}
+
+TEST(GainCost, IsInfiniteForGainsThatDoNotHoldThePlant) {
+  const GainCost cost(sliding_plant(plant_named("viscous")), {}, 100.0, 1000.0);
+  EXPECT_TRUE(std::isinf(cost.loss({0.0, 0.0, 0.0, 0.0})));
+}
+
 class RandomSystem : public testing::TestWithParam<unsigned> {
  protected:
   std::mt19937 random{GetParam()};
