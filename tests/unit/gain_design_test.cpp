@@ -138,7 +138,7 @@ TEST(GainCost, IsTheSumAlongTheWorstStart) {
     Eigen::Matrix4d costs;
     for (int i = 0; i < 4; ++i)
       for (int j = 0; j < 4; ++j)
-        cost(i, j) =
+        costs(i, j) =
             0.25 * (integral(gains, unit.col(i) + unit.col(j)) - integral(gains, unit.col(i) - unit.col(j)));
     return costs;
   };
