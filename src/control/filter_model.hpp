@@ -4,22 +4,11 @@
 
 #include <Eigen/Core>
 
+#include "kalman_step.hpp"
 #include "upright/control/gain_file.hpp"
 #include "upright/model/plant.hpp"
 
 namespace upright {
-
-/// Index of a state.
-enum FilterState : Eigen::Index {
-  filter_cart,           ///< [m]
-  filter_theta,          ///< [rad] from upright
-  filter_cart_velocity,  ///< [m/s]
-  filter_pendulum_rate,  ///< [rad/s]
-  filter_motor,          ///< [V] after a motor lag; without one it stays zero
-  filter_cart_force,     ///< [N] on the cart, beyond the model
-  filter_angle_zero,     ///< [rad] reading of the sensor at upright, beyond the model
-  filter_states
-};
 
 using FilterVector = Eigen::Matrix<double, filter_states, 1>;
 using FilterMatrix = Eigen::Matrix<double, filter_states, filter_states>;

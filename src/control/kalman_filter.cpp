@@ -9,36 +9,55 @@
 
 namespace upright {
 
+namespace {
+
+KalmanStep::Column column_of(const FilterVector& vector) {
+  KalmanStep::Column column;
+  std::copy(vector.begin(), vector.end(), column.begin());
+  return column;
+}
+
+}  // namespace
+
 KalmanFilter::KalmanFilter(const ControlConfig& config, const Plant& plant)
-    : actuator_(make_model<double>(plant)),
+    : model_(make_model<double>(plant)),
+      actuator_(model_),
       cart_(make_estimator_step(config.estimator, config.period_s())),
       pendulum_(cart_) {
   const ContinuousModel model = continuous_model(plant);
   const double period_s = config.period_s();
   const WholePeriods input = whole_periods(model.input_delay_s, period_s);
-  input_periods_ = input.whole;
+  step_.input_periods = input.whole;
   input_fraction_ = input.fraction;
-  step_ = step_over(model, period_s);
+  const ModelStep whole = step_over(model, period_s);
+  step_.late = column_of(whole.b);
+  step_.constant = column_of(whole.constant);
   if (input_fraction_ > 0.0) {
     const ModelStep first = step_over(model, input_fraction_ * period_s),
                     rest = step_over(model, (1.0 - input_fraction_) * period_s);
-    early_ = rest.a * first.b;
-    step_.b = rest.b;
+    step_.early = column_of(rest.a * first.b);
+    step_.late = column_of(rest.b);
   }
-  gain_ =
+  const auto gain =
       kalman_gain(model, process_noise_of(config.state_estimator, plant), config.state_estimator, period_s);
-  scale_ = model.sensor_scale;
-  offset_ = model.sensor_offset;
+  for (Eigen::Index i = 0; i < 2; ++i) {
+    const auto at = static_cast<std::size_t>(i);
+    step_.gain[at] = column_of(gain.col(i));
+    step_.scale[at] = model.sensor_scale(i);
+    step_.offset[at] = model.sensor_offset(i);
+  }
+  for (Eigen::Index i = 0; i < filter_states; ++i)
+    step_.a[static_cast<std::size_t>(i)] = column_of(whole.a.col(i));
   slope_ = model.actuator_slope;
-  rejecting_v_per_n_ = -model.volts_per_newton / slope_;
-  share_ = config.rejection.share;
-  known_force_n_ = model.known_force_n + actuator_.actuate(0.0) / model.volts_per_newton;
-  if (const PlantEffect* zone = plant.find("voltage_dead_zone")) dead_zone_v_ = zone->values[0];
+  step_.rejecting_v_per_n = -model.volts_per_newton / slope_;
+  step_.share = config.rejection.share;
+  step_.known_force_n = model.known_force_n + actuator_.actuate(0.0) / model.volts_per_newton;
+  if (const PlantEffect* zone = plant.find("voltage_dead_zone")) step_.dead_zone_v = zone->values[0];
   const Resolution steps = resolution_of(config.state_estimator);
-  rounding_voltage_v_ = elementary::hypot(config.gains.cart_position_v_per_m * steps.cart_m,
-                                          config.gains.pendulum_angle_v_per_rad * steps.angle_rad) /
-                        std::sqrt(12.0);
-  drives_.resize(input_periods_ + 2);
+  step_.rounding_voltage_v = elementary::hypot(config.gains.cart_position_v_per_m * steps.cart_m,
+                                               config.gains.pendulum_angle_v_per_rad * steps.angle_rad) /
+                             std::sqrt(12.0);
+  drives_.resize(step_.input_periods + 2);
   KalmanFilter::start(0.0, 0.0);
 }
 
@@ -50,7 +69,7 @@ void KalmanFilter::start(double cart_m, double theta_rad) noexcept {
   pendulum_.start(theta_rad);
   state_.setZero();
   if (lags()) state_(filter_motor) = resting_v();
-  const double theta = (theta_rad - offset_(1)) / scale_(1);
+  const double theta = step_.position_of(1, theta_rad);
   turn_rad_ = full_turn_rad * std::round(theta / full_turn_rad);
   state_(filter_cart) = position_of(cart_m);
   state_(filter_theta) = theta - turn_rad_;
@@ -62,11 +81,11 @@ void KalmanFilter::advance(double applied_v) noexcept {
   const auto ago = [this](std::size_t periods) {
     return drives_[newest_ >= periods ? newest_ - periods : newest_ + drives_.size() - periods];
   };
-  propagate(ago(input_periods_), ago(input_periods_ + 1));
+  propagate(ago(step_.input_periods), ago(step_.input_periods + 1));
 }
 
 void KalmanFilter::propagate(double late_v, double early_v) noexcept {
-  state_ = (step_.a * state_ + step_.b * late_v + early_ * early_v + step_.constant).eval();
+  step_.propagate(state_, late_v, early_v);
 }
 
 void KalmanFilter::update_velocities(double cart_m, double theta_rad) noexcept {
@@ -83,22 +102,22 @@ void KalmanFilter::update_velocities(double cart_m, double theta_rad) noexcept {
 ControlState KalmanFilter::update(double cart_m, double theta_rad, double applied_v) noexcept {
   advance(applied_v);
   update_velocities(cart_m, theta_rad);
-  const double position = position_of(cart_m), theta = (theta_rad - offset_(1)) / scale_(1);
+  const double position = position_of(cart_m), theta = step_.position_of(1, theta_rad);
   const double turn = full_turn_rad * std::round(theta / full_turn_rad);
   state_(filter_theta) += turn_rad_ - turn;
   turn_rad_ = turn;
   const double lean = theta - turn;
-  if (std::abs(lean) > linear_within_rad) {
+  if (std::abs(lean) > KalmanStep::linear_within_rad) {
     state_(filter_cart) = position;
     state_(filter_theta) = lean;
-    state_(filter_cart_velocity) = cart_.velocity() / scale_(0);
-    state_(filter_pendulum_rate) = pendulum_.velocity() / scale_(1);
+    state_(filter_cart_velocity) = cart_.velocity() / step_.scale[0];
+    state_(filter_pendulum_rate) = pendulum_.velocity() / step_.scale[1];
     state_(filter_cart_force) = 0.0;
     return shown();
   }
   const double cart_off = position - drive_deflection_m() - state_(filter_cart);
   const double angle_off = lean - state_(filter_theta) - state_(filter_angle_zero);
-  state_ += gain_.col(0) * cart_off + gain_.col(1) * angle_off;
+  step_.correct(state_, cart_off, angle_off);
   return shown();
 }
 
@@ -109,36 +128,42 @@ ControlState KalmanFilter::predict(double applied_v) noexcept {
 }
 
 ControlState KalmanFilter::shown() const noexcept {
-  return {scale_(0) * state_(filter_cart),
-          scale_(1) * (state_(filter_theta) + turn_rad_),
-          scale_(0) * state_(filter_cart_velocity),
-          scale_(1) * state_(filter_pendulum_rate),
+  return {step_.scale[0] * state_(filter_cart),
+          step_.scale[1] * (state_(filter_theta) + turn_rad_),
+          step_.scale[0] * state_(filter_cart_velocity),
+          step_.scale[1] * state_(filter_pendulum_rate),
           state_(filter_motor),
           rejected_force_n()};
 }
 
 double KalmanFilter::rejecting_v(const ControlState& estimate) const noexcept {
-  return rejecting_v_per_n_ * (estimate.cart_force_n + share_ * known_force_n_);
+  return step_.rejecting_v(estimate.cart_force_n);
 }
 
 double KalmanFilter::command_v(double wanted_v) const noexcept {
-  if (!(dead_zone_v_ > 0.0)) return wanted_v;
-  return wanted_v + dead_zone_v_ * std::clamp(wanted_v / rounding_voltage_v_, -1.0, 1.0);
+  return step_.command_v(wanted_v);
 }
 
 KalmanFilter::Linear KalmanFilter::linear() const {
+  const auto vector = [](const KalmanStep::Column& column) {
+    return FilterVector(Eigen::Map<const FilterVector>(column.data()));
+  };
+  Eigen::Matrix<double, filter_states, 2> gain;
+  gain << vector(step_.gain[0]), vector(step_.gain[1]);
+  const Eigen::Vector2d scale(step_.scale[0], step_.scale[1]);
   Linear linear;
-  linear.a = step_.a;
-  linear.keeps = FilterMatrix::Identity() - gain_ * shown_positions();
-  linear.late = step_.b * slope_;
-  linear.early = early_ * slope_;
-  linear.gain = gain_ * scale_.cwiseInverse().asDiagonal();
   for (Eigen::Index i = 0; i < filter_states; ++i)
-    if (i <= filter_pendulum_rate || gain_.row(i).any() || step_.b(i) != 0.0) linear.present.push_back(i);
-  linear.input_periods = input_periods_;
+    linear.a.col(i) = vector(step_.a[static_cast<std::size_t>(i)]);
+  linear.keeps = FilterMatrix::Identity() - gain * shown_positions();
+  linear.late = vector(step_.late) * slope_;
+  linear.early = vector(step_.early) * slope_;
+  linear.gain = gain * scale.cwiseInverse().asDiagonal();
+  for (Eigen::Index i = 0; i < filter_states; ++i)
+    if (i <= filter_pendulum_rate || gain.row(i).any() || linear.late(i) != 0.0) linear.present.push_back(i);
+  linear.input_periods = step_.input_periods;
   linear.fed_back.setZero();
-  for (Eigen::Index i = 0; i < 4; ++i) linear.fed_back(i, i) = scale_(i % 2);
-  linear.rejecting_v_per_n = rejecting_v_per_n_ * share_;
+  for (Eigen::Index i = 0; i < 4; ++i) linear.fed_back(i, i) = scale(i % 2);
+  linear.rejecting_v_per_n = step_.rejecting_v_per_n * step_.share;
   return linear;
 }
 

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "filter_model.hpp"
+#include "kalman_step.hpp"
 #include "upright/control/state_estimator.hpp"
 #include "upright/control/velocity_estimator.hpp"
 #include "upright/model/dynamics.hpp"
@@ -40,9 +41,9 @@ class KalmanFilter : public StateEstimator {
     double rejecting_v_per_n;
   };
   Linear linear() const;
-
-  /// Limit of the linear range about upright: sin(1.2) is four fifths of 1.2.
-  static constexpr double linear_within_rad = 1.2;
+  /// One step, to simulate many filters side by side, and the model of whose static actuator chain.
+  const KalmanStep& step() const { return step_; }
+  const PlantModel<double>& model() const { return model_; }
 
  protected:
   /// Moves `state_` on by a period under the voltages behind the static chain: `late_v` acts at its end,
@@ -51,14 +52,14 @@ class KalmanFilter : public StateEstimator {
   /// How far the sensor shows the cart from where `state_` has it, beyond scale and offset [m].
   virtual double drive_deflection_m() const noexcept { return 0.0; }
   /// The force on the cart that the voltage takes away, beyond what is known and constant [N].
-  virtual double rejected_force_n() const noexcept { return share_ * state_(filter_cart_force); }
+  virtual double rejected_force_n() const noexcept { return step_.share * state_(filter_cart_force); }
 
   /// Of a period, by which the input delay exceeds whole ones.
   double input_fraction() const { return input_fraction_; }
   double resting_v() const { return actuator_.actuate(0.0); }
   /// Of what the sensor shows: the position of the cart.
-  double position_of(double cart_m) const { return (cart_m - offset_(0)) / scale_(0); }
-  bool lags() const { return step_.b(filter_motor) != 0.0; }
+  double position_of(double cart_m) const { return step_.position_of(0, cart_m); }
+  bool lags() const { return step_.late[filter_motor] != 0.0; }
 
   FilterVector state_ = FilterVector::Zero();
 
@@ -67,19 +68,11 @@ class KalmanFilter : public StateEstimator {
   void update_velocities(double cart_m, double theta_rad) noexcept;
   ControlState shown() const noexcept;
 
+  PlantModel<double> model_;
   Dynamics<double> actuator_;
-  Eigen::Vector2d scale_, offset_;
-  ModelStep step_;                             ///< over a period, with the newer voltage
-  FilterVector early_ = FilterVector::Zero();  ///< per volt of the one before it
-  std::size_t input_periods_ = 0;
+  KalmanStep step_;
   double input_fraction_ = 0.0;
-  Eigen::Matrix<double, filter_states, 2> gain_;
   double slope_ = 1.0;
-  double rejecting_v_per_n_ = 0.0;  ///< of a force that is to be taken away whole
-  double share_ = 1.0;
-  double dead_zone_v_ = 0.0;
-  double rounding_voltage_v_ = 1.0;  ///< rms of the feedback due to rounding
-  double known_force_n_ = 0.0;
   VelocityEstimator cart_, pendulum_;
   std::uint32_t missed_ = 0;    ///< periods since the last reading
   std::vector<double> drives_;  ///< voltages behind the static chain, a ring; newest at `newest_`
