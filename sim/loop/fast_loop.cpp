@@ -7,9 +7,9 @@
 #include "event_lane.hpp"
 #include "lane_builds.hpp"
 #include "lane_model.hpp"
+#include "lane_observer.hpp"
 #include "lane_results.hpp"
 #include "upright/control/delay_line.hpp"
-#include "upright/control/velocity_estimator.hpp"
 #include "upright/model/dynamics.hpp"
 #include "upright/sim/runge_kutta.hpp"
 
@@ -61,34 +61,6 @@ class LaneDelay {
   Lanes fraction_;
   std::vector<double> ring_;
   bool same_ = true, exact_ = true;
-};
-
-/// Encoders and velocity estimate of one coordinate.
-class LaneSensor {
- public:
-  LaneSensor(const EstimatorStep& step, double resolution) : step_(step), resolution_(resolution) {}
-
-  void start(const Lanes& value) { position = previous_ = stepped(value); }
-
-  void take(const Lanes& value) {
-    position = stepped(value);
-    const Lanes dx = position - previous_;
-    const Lanes next = Lanes(step_.p21) * lag_ + Lanes(step_.p22) * velocity + Lanes(step_.g2) * dx;
-    lag_ = Lanes(step_.p11) * lag_ + Lanes(step_.p12) * velocity + Lanes(step_.g1) * dx;
-    velocity = next;
-    previous_ = position;
-  }
-
-  Lanes position, velocity;
-
- private:
-  Lanes stepped(const Lanes& value) const {
-    return resolution_ > 0.0 ? round(value * Lanes(1.0 / resolution_)) * Lanes(resolution_) : value;
-  }
-
-  EstimatorStep step_;
-  double resolution_;
-  Lanes previous_, lag_;
 };
 
 /// How the motion gets through one period with the voltage held: smooth friction.
@@ -200,37 +172,30 @@ class StickSlipPeriod {
 };
 
 template <class Period>
-void run_sampled(const LoopSetup& setup, const Dynamics<Lanes>& chain, Period& period,
+void run_sampled(const LoopSetup& setup, const Dynamics<Lanes>& chain, Period& period, LaneObserver& observer,
                  std::span<const LoopCase> cases, std::span<LoopResult> results) {
   const double period_s = setup.control.period_s();
-  const EstimatorStep step = make_estimator_step(setup.control.estimator, period_s);
-  LaneSensor cart(step, setup.cart_resolution_m), pendulum(step, setup.angle_resolution_rad);
   LaneDelay delay(cases, period_s);
   LaneResults seen(setup, cases.size());
   PlantState<Lanes> state{};
   std::array<double, lane_count> theta0;
   for (std::size_t i = 0; i < lane_count; ++i) theta0[i] = cases[std::min(i, cases.size() - 1)].theta0_rad;
   state.theta_rad = Lanes::load(theta0.data());
-  const Gains& gains = setup.control.gains;
   const Lanes limit(setup.amplifier_limit_v);
+  Lanes command(0.0);
   const auto ticks = static_cast<std::size_t>(std::llround(setup.duration_s * setup.control.sample_rate_hz));
   for (std::size_t tick = 0; tick < ticks; ++tick) {
     seen.take(static_cast<double>(tick) * period_s, state);
     if (seen.all_fell()) break;
     const Outputs<Lanes> shown = chain.measure(state);
     if (tick == 0) {
-      cart.start(shown.cart_m);
-      pendulum.start(shown.theta_rad);
+      observer.start(shown);
+      delay.start(observer.first_feedback());
     } else {
-      cart.take(shown.cart_m);
-      pendulum.take(shown.theta_rad);
+      observer.take(shown, command);
     }
-    const Lanes feedback = Lanes(gains.cart_position_v_per_m) * cart.position +
-                           Lanes(gains.pendulum_angle_v_per_rad) * pendulum.position +
-                           Lanes(gains.cart_velocity_v_per_mps) * cart.velocity +
-                           Lanes(gains.pendulum_rate_v_per_radps) * pendulum.velocity;
-    if (tick == 0) delay.start(feedback);
-    const Lanes command = smaller(larger(delay.pass(tick, feedback), -limit), limit);
+    const Lanes delayed = delay.pass(tick, tick == 0 ? observer.first_feedback() : observer.feedback());
+    command = smaller(larger(observer.command_v(delayed), -limit), limit);
     state.motor_v = chain.actuate(command);
     period.advance(state, command, state.motor_v, period_s);
   }
@@ -239,18 +204,19 @@ void run_sampled(const LoopSetup& setup, const Dynamics<Lanes>& chain, Period& p
 }
 
 template <class Present>
-void run_with(const LoopSetup& setup, const Present& present, std::span<const LoopCase> cases,
-              std::span<LoopResult> results) {
+void run_with(const LoopSetup& setup, const LaneEstimator* estimator, const Present& present,
+              std::span<const LoopCase> cases, std::span<LoopResult> results) {
+  LaneObserver observer(setup, estimator);
   const PlantModel<Lanes> model = on_lanes(setup.model);
   const Dynamics<Lanes> chain(model);
   if constexpr (may_stick<Present>) {
     if (chain.cart_can_stick()) {
       StickSlipPeriod<Present> period(setup, model, present);
-      return run_sampled(setup, chain, period, cases, results);
+      return run_sampled(setup, chain, period, observer, cases, results);
     }
   }
   SmoothPeriod<Present> period(setup, model, present);
-  run_sampled(setup, chain, period, cases, results);
+  run_sampled(setup, chain, period, observer, cases, results);
 }
 
 }  // namespace
@@ -261,12 +227,13 @@ std::size_t runs_side_by_side() {
   return lane_count;
 }
 
-void run(const LoopSetup& setup, std::span<const LoopCase> cases, std::span<LoopResult> results) {
+void run(const LoopSetup& setup, const LaneEstimator* estimator, std::span<const LoopCase> cases,
+         std::span<LoopResult> results) {
   if (!setup.sampled) return run_continuous_on_lanes(setup, cases, results);
   with_effects(setup.model.present, [&](const auto& present) {
     for (std::size_t first = 0; first < cases.size(); first += lane_count) {
       const std::size_t count = std::min(lane_count, cases.size() - first);
-      run_with(setup, present, cases.subspan(first, count), results.subspan(first, count));
+      run_with(setup, estimator, present, cases.subspan(first, count), results.subspan(first, count));
     }
   });
 }

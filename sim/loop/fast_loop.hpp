@@ -8,9 +8,9 @@
 
 namespace upright {
 
-/// Whether `run_on_lanes` supports these runs. It excludes delay compensation, motor lag, dry friction of
-/// the pivot, a cart alone, stiff bristles and other dynamics much faster than a millisecond, and the
-/// plant's own input delay in a sampled loop.
+/// Whether `run_on_lanes` supports these runs. It excludes delay compensation, the extended Kalman filter,
+/// motor lag, dry friction of the pivot, a cart alone, stiff bristles and other dynamics much faster than a
+/// millisecond, and the plant's own input delay in a sampled loop.
 bool lanes_can_run(const LoopSetup& setup);
 
 /// The target of the lanes: the registers of this processor, fastest, with last digits that differ

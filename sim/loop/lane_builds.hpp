@@ -5,12 +5,25 @@
 
 #include <span>
 
+#include "control/kalman_step.hpp"
+#include "upright/model/dynamics.hpp"
 #include "upright/sim/loop/loop_run.hpp"
+
+namespace upright {
+
+/// A stationary Kalman filter in the place of the velocity estimator.
+struct LaneEstimator {
+  KalmanStep step;
+  PlantModel<double> model;  ///< its plant, for the static actuator chain
+};
+
+}  // namespace upright
 
 #define UPRIGHT_DECLARE_LANES(name)                                                                 \
   namespace name {                                                                                  \
   std::size_t runs_side_by_side();                                                                  \
-  void run(const LoopSetup& setup, std::span<const LoopCase> cases, std::span<LoopResult> results); \
+  void run(const LoopSetup& setup, const LaneEstimator* estimator, std::span<const LoopCase> cases, \
+           std::span<LoopResult> results);                                                          \
   }
 
 namespace upright {

@@ -1,6 +1,8 @@
 #include <cstdlib>
+#include <optional>
 #include <string_view>
 
+#include "control/kalman_filter.hpp"
 #include "event_lane.hpp"
 #include "fast_loop.hpp"
 #include "lane_builds.hpp"
@@ -12,7 +14,8 @@ namespace {
 /// One compilation of the lanes.
 struct LaneBuild {
   std::size_t (*runs_side_by_side)();
-  void (*run)(const LoopSetup& setup, std::span<const LoopCase> cases, std::span<LoopResult> results);
+  void (*run)(const LoopSetup& setup, const LaneEstimator* estimator, std::span<const LoopCase> cases,
+              std::span<LoopResult> results);
 };
 
 constexpr LaneBuild baseline{baseline_lanes::runs_side_by_side, baseline_lanes::run};
@@ -53,7 +56,10 @@ const LaneBuild& lanes_for(LaneRegisters registers) {
 }  // namespace
 
 bool lanes_can_run(const LoopSetup& setup) {
-  if (setup.make_parts || setup.model.cart_locked || !setup.model.has_pendulum) return false;
+  const bool estimates = setup.sampled && setup.control.state_estimator.kind == StateEstimatorKind::kalman &&
+                         setup.control.compensation.kind == CompensationKind::none;
+  if (setup.make_parts && !estimates) return false;
+  if (setup.model.cart_locked || !setup.model.has_pendulum) return false;
   const Dynamics<double> physics(setup.model);
   if (physics.has_motor_lag() || physics.pivot_has_kink()) return false;
   if (setup.sampled && physics.input_delay_s() > 0.0) return false;
@@ -68,7 +74,13 @@ std::size_t runs_side_by_side(LaneRegisters registers) {
 
 void run_on_lanes(const LoopSetup& setup, std::span<const LoopCase> cases, std::span<LoopResult> results,
                   LaneRegisters registers) {
-  lanes_for(registers).run(setup, cases, results);
+  std::optional<LaneEstimator> estimator;
+  if (setup.make_parts) {
+    const ModelParts parts = setup.make_parts(setup.control);
+    const auto& filter = dynamic_cast<const KalmanFilter&>(*parts.estimator);
+    estimator = {filter.step(), filter.model()};
+  }
+  lanes_for(registers).run(setup, estimator ? &*estimator : nullptr, cases, results);
 }
 
 }  // namespace upright

@@ -16,6 +16,7 @@
 #include "sim/loop/closed_loop.hpp"
 #include "sim/loop/fast_loop.hpp"
 #include "sweep/sweep.hpp"
+#include "upright/control/model_parts.hpp"
 #include "upright/model/plant_file.hpp"
 
 namespace {
@@ -164,6 +165,30 @@ void stick_slip() {
   std::printf("bristles, the same runs\n  lanes          %8.3f ms per run\n", lanes_ms(bristles, cases));
 }
 
+/// The velocity filter, and a Kalman filter that knows the viscous plant, with the same gains.
+void estimating(const char* name, const std::string& plant, double smoothing, bool encoders) {
+  LoopSetup setup = setup_for(plant, smoothing);
+  setup.amplifier_limit_v = 15.0;
+  if (encoders) {
+    setup.cart_resolution_m = 2.27485e-5;
+    setup.angle_resolution_rad = 1.5339808e-3;
+  }
+  const std::vector<LoopCase> cases = cases_240();
+  const double filter = lanes_ms(setup, cases);
+  setup.control.state_estimator.kind = StateEstimatorKind::kalman;
+  setup.control.rejection.share = 1.0;
+  setup.control.gains = {47.4, 120.0, 41.0, 22.8};
+  const Plant believed = read_plant_file(std::string(UPRIGHT_SOURCE_DIR) + "/config/plants/viscous.yaml");
+  setup.make_parts = [believed](const ControlConfig& asked) {
+    return make_model_parts(asked, believed, believed);
+  };
+  const double estimated = lanes_ms(setup, cases), events = events_ms(setup, cases);
+  std::printf("Kalman filter, %s\n", name);
+  std::printf("  lanes          %8.3f ms per run (%.2f times the velocity filter's %.3f)\n", estimated,
+              estimated / filter, filter);
+  std::printf("  event engine   %8.3f ms per run (%.1f times the lanes)\n", events, events / estimated);
+}
+
 /// The continuous loop, V(t) = gains . state(t - delay). Its truth is the event engine with steps of 50 us.
 void continuous(const char* name, const std::string& plant, double smoothing) {
   LoopSetup setup = setup_for(plant, smoothing);
@@ -245,6 +270,9 @@ void cores() {
 int main() {
   smooth();
   stick_slip();
+  estimating("smooth exponential friction", "exponential", 100.0, false);
+  estimating("bristles", "dynamic", 0.0, false);
+  estimating("true stick-slip and encoders", "exponential", 0.0, true);
   continuous("smooth exponential friction", "exponential", 100.0);
   continuous("exponential friction, true stick-slip", "exponential", 0.0);
   continuous("bristles", "dynamic", 0.0);

@@ -9,6 +9,7 @@
 
 #include "sim/loop/closed_loop.hpp"
 #include "sim/loop/fast_loop.hpp"
+#include "upright/control/model_parts.hpp"
 #include "upright/model/plant_file.hpp"
 #include "upright/sim/event_engine.hpp"
 
@@ -49,6 +50,28 @@ class SweepAccuracy : public testing::TestWithParam<Friction> {
     return cases;
   }
 
+  static void expect_sampled_loops_agree(const LoopSetup& setup) {
+    const std::vector<LoopCase> cases = cases_240();
+    std::vector<LoopResult> lanes(cases.size());
+    run_on_lanes(setup, cases, lanes);
+    for (std::size_t i = 0; i < cases.size(); ++i) {
+      ControlConfig control = setup.control;
+      control.delay_s = cases[i].delay_s;
+      Controller controller(control, setup.amplifier_limit_v,
+                            setup.make_parts ? setup.make_parts(control) : ModelParts{});
+      SampledLoop<EventEngine<double>> loop(setup.model, control.sample_rate_hz, tight());
+      loop.start(released(cases[i]));
+      loop.advance_to(setup.duration_s, [&](std::uint64_t tick, const Measured& measured) {
+        ControlInput input;
+        input.tick = tick;
+        input.cart_m = measured[0];
+        input.theta_rad = measured[1];
+        return controller.step(input).voltage_v;
+      });
+      expect_near(lanes[i].end, loop.engine().state(), cases[i]);
+    }
+  }
+
   static EngineOptions tight() {
     EngineOptions options;
     options.max_step_s = 2e-5;
@@ -70,25 +93,24 @@ class SweepAccuracy : public testing::TestWithParam<Friction> {
 };
 
 TEST_P(SweepAccuracy, SampledLoops) {
-  const LoopSetup setup = SweepAccuracy::setup(true);
-  const std::vector<LoopCase> cases = cases_240();
-  std::vector<LoopResult> lanes(cases.size());
-  run_on_lanes(setup, cases, lanes);
-  for (std::size_t i = 0; i < cases.size(); ++i) {
-    ControlConfig control = setup.control;
-    control.delay_s = cases[i].delay_s;
-    Controller controller(control, setup.amplifier_limit_v);
-    SampledLoop<EventEngine<double>> loop(setup.model, control.sample_rate_hz, tight());
-    loop.start(released(cases[i]));
-    loop.advance_to(setup.duration_s, [&](std::uint64_t tick, const Measured& measured) {
-      ControlInput input;
-      input.tick = tick;
-      input.cart_m = measured[0];
-      input.theta_rad = measured[1];
-      return controller.step(input).voltage_v;
-    });
-    expect_near(lanes[i].end, loop.engine().state(), cases[i]);
-  }
+  expect_sampled_loops_agree(SweepAccuracy::setup(true));
+}
+
+TEST_P(SweepAccuracy, SampledLoopsWithAKalmanFilter) {
+  LoopSetup setup = SweepAccuracy::setup(true);
+  setup.control.gains = {47.4, 120.0, 41.0, 22.8};
+  setup.control.state_estimator.kind = StateEstimatorKind::kalman;
+  setup.control.rejection.share = 0.9;
+  // It believes another plant than runs, with every part of the filter's model.
+  Plant believed = read_plant_file(std::string(UPRIGHT_SOURCE_DIR) + "/config/plants/viscous.yaml");
+  believed.set("input_delay", {0.0023});
+  believed.set("constant_force", {0.1});
+  believed.set("voltage_dead_zone", {0.05});
+  setup.make_parts = [believed](const ControlConfig& asked) {
+    return make_model_parts(asked, believed, believed);
+  };
+  ASSERT_TRUE(lanes_can_run(setup));
+  expect_sampled_loops_agree(setup);
 }
 
 TEST_P(SweepAccuracy, ContinuousLoops) {

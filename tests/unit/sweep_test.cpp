@@ -14,6 +14,7 @@
 #include "sim/loop/closed_loop.hpp"
 #include "sim/loop/fast_loop.hpp"
 #include "upright/base/error.hpp"
+#include "upright/control/model_parts.hpp"
 #include "upright/model/plant_file.hpp"
 #include "upright/sim/event_engine.hpp"
 
@@ -81,7 +82,63 @@ TEST(FastLoop, AgreesWithTheEventEngineOnAnUncommonEffect) {
   expect_lanes_agree(setup, 1e-6);
 }
 
+/// A loop with an estimator that knows the viscous plant only.
+LoopSetup estimating(const std::string& plant, StateEstimatorKind kind, double smoothing = 0.0) {
+  LoopSetup setup = sampled(plant, smoothing);
+  setup.control.gains = {47.4, 120.0, 41.0, 22.8};
+  setup.control.state_estimator.kind = kind;
+  setup.control.rejection.share = 1.0;
+  const Plant believed = read_plant_file(source + "/config/plants/viscous.yaml");
+  setup.make_parts = [believed](const ControlConfig& asked) {
+    return make_model_parts(asked, believed, believed);
+  };
+  return setup;
+}
+
+TEST(FastLoop, AgreesWithTheEventEngineWithAKalmanFilter) {
+  expect_lanes_agree(estimating("exponential", StateEstimatorKind::kalman, 100.0), 1e-6);
+  expect_lanes_agree(estimating("dynamic", StateEstimatorKind::kalman), 5e-6);
+}
+
+TEST(FastLoop, FallsAndStaysUpWithAKalmanFilterAndEncoders) {
+  LoopSetup setup = estimating("exponential", StateEstimatorKind::kalman);
+  setup.cart_resolution_m = 2.27485e-5;
+  setup.angle_resolution_rad = 1.5339808e-3;
+  setup.fell_above_rad = 1.5;  // beyond the filter's linear range
+  std::vector<LoopCase> cases;
+  for (const double delay : {0.0, 0.012, 0.03, 0.07, 0.09, 0.12})
+    for (const double theta0 : {0.01, 0.05, -0.1}) cases.push_back({theta0, delay});
+  std::vector<LoopResult> lanes(cases.size());
+  run_on_lanes(setup, cases, lanes);
+  int fell = 0;
+  for (std::size_t i = 0; i < cases.size(); ++i) {
+    const LoopResult alone = run_with_events(setup, cases[i]);
+    EXPECT_EQ(lanes[i].fell(), alone.fell()) << cases[i].theta0_rad << " rad, " << cases[i].delay_s << " s";
+    if (alone.fell()) ++fell;
+  }
+  EXPECT_GT(fell, 2);
+  EXPECT_LT(fell, 16);
+}
+
+TEST(Loops, ReferenceEngineTakesEstimatorsAndPredictors) {
+  for (const StateEstimatorKind kind : {StateEstimatorKind::kalman, StateEstimatorKind::extended_kalman})
+    for (const bool predicts : {false, true}) {
+      LoopSetup setup = estimating("dynamic", kind);
+      setup.duration_s = 2.0;
+      if (predicts) setup.control.compensation.kind = CompensationKind::predictor;
+      const LoopCase start{0.04, predicts ? 0.05 : 0.004};
+      const LoopResult events = run_with_events(setup, start), reference = run_with_reference(setup, start);
+      EXPECT_FALSE(events.fell());
+      EXPECT_NEAR(events.end.theta_rad, reference.end.theta_rad, 1e-6);
+      EXPECT_NEAR(events.end.cart_m, reference.end.cart_m, 1e-6);
+    }
+}
+
 TEST(FastLoop, LeavesToTheEventEngineWhatItCannotDo) {
+  EXPECT_FALSE(lanes_can_run(estimating("viscous", StateEstimatorKind::extended_kalman)));
+  LoopSetup predicting = estimating("viscous", StateEstimatorKind::kalman);
+  predicting.control.compensation.kind = CompensationKind::predictor;
+  EXPECT_FALSE(lanes_can_run(predicting));
   Plant plant = read_plant_file(source + "/config/plants/viscous.yaml");
   LoopSetup setup = sampled("viscous");
   plant.set("motor_lag", {0.002});
