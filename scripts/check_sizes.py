@@ -3,8 +3,7 @@
 
   scripts/check_sizes.py [--root FOLDER]
 
-The exit code is 1, with a line for each finding. The length of functions is checked by clang-tidy
-(src/estimation/.clang-tidy).
+The exit code is 1, with a line for each finding.
 """
 import argparse
 import pathlib

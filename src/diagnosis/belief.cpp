@@ -1,7 +1,8 @@
 #include "belief.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <cmath>
+
+#include "model/dense_algebra.hpp"
 
 namespace upright {
 
@@ -18,10 +19,9 @@ GaussianPrior belief_of(const Eigen::VectorXd& mean, const Eigen::MatrixXd& cova
   const Eigen::MatrixXd unscale = scale.cwiseInverse().asDiagonal();
   const Eigen::MatrixXd correlation = unscale * covariance * unscale;
   constexpr double min_eigenvalue = 1e-9;
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(0.5 * (correlation + correlation.transpose()));
-  const Eigen::VectorXd inverse = solver.eigenvalues().cwiseMax(min_eigenvalue).cwiseInverse();
-  belief.information =
-      unscale * solver.eigenvectors() * inverse.asDiagonal() * solver.eigenvectors().transpose() * unscale;
+  const SymmetricEigen eigen = symmetric_eigen(0.5 * (correlation + correlation.transpose()));
+  const Eigen::VectorXd inverse = eigen.values.cwiseMax(min_eigenvalue).cwiseInverse();
+  belief.information = unscale * eigen.vectors * inverse.asDiagonal() * eigen.vectors.transpose() * unscale;
   return belief;
 }
 

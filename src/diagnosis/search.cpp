@@ -1,6 +1,5 @@
 #include "search.hpp"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <functional>
@@ -9,6 +8,7 @@
 
 #include "belief.hpp"
 #include "effect_starts.hpp"
+#include "model/dense_algebra.hpp"
 #include "phases.hpp"
 #include "plausibility.hpp"
 
@@ -41,11 +41,6 @@ GaussianPrior posterior_of(const Hypothesis& h) {
     min_sigma[j] = 1e-6 * p.scale;
   }
   return belief_of(mean, h.train.covariance, min_sigma);
-}
-
-double log_determinant(const Eigen::MatrixXd& information) {
-  if (information.size() == 0) return 0.0;
-  return information.ldlt().vectorD().array().abs().max(1e-300).log().sum();
 }
 
 /// Mean over its standard error.
@@ -253,7 +248,7 @@ double Search::certainty(const Hypothesis& h, std::size_t effect) const {
   const Eigen::VectorXd scale = covariance.diagonal().cwiseMax(1e-300).cwiseSqrt();
   const Eigen::MatrixXd correlation =
       scale.cwiseInverse().asDiagonal() * covariance * scale.cwiseInverse().asDiagonal();
-  const double held = correlation.completeOrthogonalDecomposition().pseudoInverse()(0, 0);
+  const double held = pseudo_inverse(correlation)(0, 0);
   return std::abs(h.train.point.plant.find(effect)->values[0] - nothing) / scale[0] *
          std::sqrt(std::max(held, 1.0));
 }

@@ -12,6 +12,11 @@ Eigen::VectorXcd eigenvalues(const MatrixXd& matrix) {
   return matrix.eigenvalues();
 }
 
+SymmetricEigen symmetric_eigen(const MatrixXd& matrix) {
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> solver(matrix);
+  return {solver.eigenvalues(), solver.eigenvectors()};
+}
+
 MatrixXd inverse(const MatrixXd& matrix) {
   return matrix.inverse();
 }
@@ -22,12 +27,21 @@ std::optional<MatrixXd> inverse_if_regular(const MatrixXd& matrix, double min_rc
   return factored.inverse();
 }
 
+MatrixXd pseudo_inverse(const MatrixXd& matrix) {
+  return matrix.completeOrthogonalDecomposition().pseudoInverse();
+}
+
 Eigen::VectorXcd solve(const MatrixXcd& a, const Eigen::VectorXcd& b) {
   return a.partialPivLu().solve(b);
 }
 
 MatrixXd solve_symmetric(const MatrixXd& a, const MatrixXd& b) {
   return a.ldlt().solve(b);
+}
+
+double log_determinant(const MatrixXd& matrix) {
+  if (matrix.size() == 0) return 0.0;
+  return matrix.ldlt().vectorD().array().abs().max(1e-300).log().sum();
 }
 
 MatrixXd completed_basis(const MatrixXd& columns) {

@@ -10,6 +10,13 @@ namespace upright {
 /// The n eigenvalues of an n x n matrix, in no particular order.
 Eigen::VectorXcd eigenvalues(const Eigen::MatrixXd& matrix);
 
+/// Eigenvalues of a symmetric n x n matrix in increasing order, and their orthonormal vectors as columns.
+struct SymmetricEigen {
+  Eigen::VectorXd values;
+  Eigen::MatrixXd vectors;
+};
+SymmetricEigen symmetric_eigen(const Eigen::MatrixXd& matrix);
+
 /// Inverse of a regular n x n matrix.
 Eigen::MatrixXd inverse(const Eigen::MatrixXd& matrix);
 
@@ -17,11 +24,18 @@ Eigen::MatrixXd inverse(const Eigen::MatrixXd& matrix);
 /// number below `min_rcond`.
 std::optional<Eigen::MatrixXd> inverse_if_regular(const Eigen::MatrixXd& matrix, double min_rcond);
 
+/// The inverse of Moore and Penrose of an n x n matrix, by complete orthogonal decomposition.
+Eigen::MatrixXd pseudo_inverse(const Eigen::MatrixXd& matrix);
+
 /// Solution x of a x = b for a regular n x n matrix.
 Eigen::VectorXcd solve(const Eigen::MatrixXcd& a, const Eigen::VectorXcd& b);
 
 /// Solution x of a x = b for a symmetric n x n matrix that is positive or negative semidefinite.
 Eigen::MatrixXd solve_symmetric(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b);
+
+/// Logarithm of the determinant of a symmetric positive semidefinite n x n matrix; each zero among its
+/// factors counts as 1e-300.
+double log_determinant(const Eigen::MatrixXd& matrix);
 
 /// An orthonormal basis of the whole space, n x n. Its first r columns span the range of `columns` (n x
 /// r, rank r).
