@@ -6,6 +6,8 @@ set(text "// The files of ${FOLDER}, written by the build.\n")
 foreach(file IN LISTS files)
   get_filename_component(name ${file} NAME)
   file(READ ${file} content)
+  # What is printed elsewhere is not beside the schema.
+  string(REGEX REPLACE "^# yaml-language-server:[^\n]*\n" "" content "${content}")
   string(APPEND text "{\"${FOLDER}/${name}\",\nR\"yaml(${content})yaml\"},\n")
 endforeach()
 file(WRITE ${OUTPUT}.new "${text}")

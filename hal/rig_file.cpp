@@ -25,7 +25,7 @@ constexpr Words<2> zeros = {"counts", "start"};
 
 void sign_key(YamlKeys& keys, int& sign) {
   keys.integer("sign", sign, -1, 1);
-  keys.check("sign", sign != 0, "is 0", "use 1 or -1");
+  keys.check_not_zero("sign", sign, "is 0", "use 1 or -1");
 }
 
 /// Counts per revolution that give the same radians per count, bit for bit.
@@ -86,7 +86,8 @@ void backend_key(YamlKeys& keys, const char* key, Backend& backend) {
 
 void backends_by_part(YamlKeys& keys, RigFile& rig) {
   const bool are_apart = rig.cart_encoder != rig.pendulum_encoder;
-  if (keys.given("cart_encoder", are_apart) || keys.given("pendulum_encoder", are_apart)) {
+  if (keys.decides_by_presence("cart_encoder", are_apart) ||
+      keys.decides_by_presence("pendulum_encoder", are_apart)) {
     backend_key(keys, "cart_encoder", rig.cart_encoder);
     backend_key(keys, "pendulum_encoder", rig.pendulum_encoder);
   } else {
@@ -103,35 +104,15 @@ void backend_keys(YamlKeys& document, RigFile& rig) {
     rig.cart_encoder = rig.pendulum_encoder = rig.output;
     return;
   }
-  document.map("backend", [&](YamlKeys& map) { backends_by_part(map, rig); });
+  document.deciding_map("backend", [&](YamlKeys& map) { backends_by_part(map, rig); });
   const RigRoles simulated = roles_of(rig, Backend::simulated);
-  document.check("backend", !simulated.any() || simulated.all(),
+  document.needs("backend", !simulated.any() || simulated.all(),
                  "combines simulated with hardware, but a simulated plant responds only to its own output",
                  "use simulated for all parts or for none");
 }
 
 bool uses(const RigFile& rig, Backend backend) {
   return roles_of(rig, backend).any();
-}
-
-/// The section `gpio` has the encoders that the rig takes from it, and no others.
-void check_gpio_roles(const YamlMap& document, const RigFile& rig) {
-  const RigRoles roles = roles_of(rig, Backend::gpio);
-  if (roles.output)
-    document.fail("backend", "uses gpio as output, but digital lines cannot carry the motor voltage",
-                  "use another backend as output");
-  if (!rig.gpio) return;
-  const YamlMap section = document.map("gpio");
-  const auto match = [&](const char* key, bool is_wanted, bool is_there) {
-    if (is_wanted && !is_there)
-      section.fail(key, "is missing, but backend reads its counts from gpio",
-                   std::string("add ") + key + " (its lines a and b)");
-    if (!is_wanted && is_there)
-      section.fail(key, "is not used, because backend reads its counts from another backend",
-                   std::string("remove ") + key + ", or use gpio as its backend");
-  };
-  match("cart_encoder", roles.cart, rig.gpio->cart_encoder.has_value());
-  match("pendulum_encoder", roles.pendulum, rig.gpio->pendulum_encoder.has_value());
 }
 
 }  // namespace
@@ -155,9 +136,8 @@ void rig_keys(YamlKeys& document, RigFile& rig) {
   for (std::size_t i = 0; i < all_backends.size(); ++i)
     if (const BackendKind kind = all_backends[i](); kind.keys && uses(rig, static_cast<Backend>(i)))
       kind.keys(document, rig);
-  if (uses(rig, Backend::gpio) || document.given("gpio", rig.gpio.has_value())) gpio_keys(document, rig.gpio);
+  if (uses(rig, Backend::gpio) || document.given("gpio", rig.gpio.has_value())) gpio_keys(document, rig);
   document.optional_map("encoder_watch", rig.encoder_watch, encoder_assumption_keys);
-  if (const YamlMap* map = document.source()) check_gpio_roles(*map, rig);
 }
 
 std::string backend_name(Backend backend) {

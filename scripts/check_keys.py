@@ -20,7 +20,7 @@ PAGES = ("docs/reference/files.md", "docs/reference/rig-files.md", "docs/referen
          "docs/reference/experiment-files.md", "docs/reference/effects.md", "docs/explanation/quiet-control.md",
          "docs/how-to/run-sweeps.md")
 ASKED = re.compile(r'(?:\.|->)(?:number|number_or|optional_number|numbers|choice|flag|flag_or|integer|text|text_or|path|map|'
-                   r'optional_map|maps|has|is_map|one_of|optional_integer|usual_map|section|section_of|items|given)'
+                   r'optional_map|deciding_map|decides_by_presence|maps|has|is_map|one_of|optional_integer|usual_map|section|section_of|items|given)'
                    r'\(\s*(?:is_cart \? )?"([a-z0-9_]+)"(?: : "([a-z0-9_]+)")?')
 HELPED = re.compile(r'\b\w+(?:<\w+>)?\((?:map|keys|grid|document), "([a-z0-9_]+)"|\bencoder\("([a-z0-9_]+)"'
                     r'|\bkeys\.\w+\("([a-z0-9_]+)"')

@@ -18,11 +18,20 @@ constexpr int last_line = 15;
 constexpr Words<3> kinds = {"counter", "plain_counter", "analog_input"};
 constexpr Words<4> references = {"ground", "common", "difference", "other"};
 
+/// A text that may be empty, which others must then replace.
+void device_key(YamlKeys& keys, std::string& device, const std::string& otherwise) {
+  keys.text("device", device, otherwise);
+  if (!keys.decides_by_pattern("device", "[\\s\\S]", !device.empty())) device.clear();
+}
+
 /// A channel of a device: the section's own, unless this part of the rig names another.
 template <class Channel>
 void channel_keys(YamlKeys& keys, const std::string& device, Channel& channel) {
-  keys.text("device", channel.device, device);
-  keys.check("device", !channel.device.empty(), "is missing here and in comedi", "add device: /dev/comedi0");
+  if (keys.decides_by_presence("device", true))
+    device_key(keys, channel.device, device);
+  else
+    channel.device = device;
+  keys.needs("device", !channel.device.empty(), "is missing here and in comedi", "add device: /dev/comedi0");
   keys.integer("subdevice", channel.subdevice, 0, last_subdevice);
   keys.integer("channel", channel.channel, 0, last_channel);
 }
@@ -31,8 +40,9 @@ void range_key(YamlKeys& keys, ComediRange& range) {
   constexpr double largest_v = 1000.0;
   std::vector<double> ends = {range.low_v, range.high_v};
   keys.numbers("range_v", ends, Range::within(-largest_v, largest_v));
-  keys.check("range_v", ends.size() == 2 && ends[0] < ends[1], "is not a range",
-             "write the lower and the upper end, such as [-10, 10]");
+  constexpr const char* remedy = "write the lower and the upper end, such as [-10, 10]";
+  keys.check_size("range_v", ends.size(), 2, 2, "is not a range", remedy);
+  keys.check("range_v", ends[0] < ends[1], "is not a range", remedy);
   range = {ends[0], ends[1]};
 }
 
@@ -77,7 +87,7 @@ bool same_channel(const ComediEncoder& a, const ComediEncoder& b) {
 
 void comedi_keys(YamlKeys& keys, const RigFile& rig, ComediRig& comedi) {
   std::string device;  // in a text each part names its own
-  keys.text("device", device, "", Usual::left_out);
+  if (keys.decides_by_presence("device", false)) device_key(keys, device, "");
   const RigRoles roles = roles_of(rig, Backend::comedi);
   const auto encoder = [&](const char* key, const EncoderCalibration& calibration,
                            std::optional<ComediEncoder>& channel) {

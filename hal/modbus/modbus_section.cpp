@@ -131,9 +131,6 @@ void check_registers(const YamlMap& map, const ModbusRig& rig, const RigRoles& r
     map.fail("counters",
              "span " + std::to_string(end - first) + " registers, including boot count and status",
              "place them within 125 registers, because one request reads them all");
-  if (rig.exchange == ModbusExchange::read_write && rig.input_registers)
-    map.fail("exchange", "is read_write, which reads holding registers only",
-             "use exchange: separate, or table: holding");
 }
 
 void link_keys(YamlKeys& keys, bool is_serial, ModbusRig& rig) {
@@ -152,7 +149,8 @@ void modbus_keys(YamlKeys& keys, Backend link, const RigFile& rig_file, ModbusRi
   link_keys(keys, link == Backend::modbus_rtu, rig);
   const RigRoles roles = roles_of(rig_file, link);
   if (roles.encoders())
-    keys.map("counters", [&](YamlKeys& map) { counter_keys(map, rig_file.calibration, roles, rig); });
+    keys.deciding_map("counters",
+                      [&](YamlKeys& map) { counter_keys(map, rig_file.calibration, roles, rig); });
   optional_address_key(keys, "boot_count_address", rig.boot_count_address);
   optional_address_key(keys, "status_address", rig.status_address);
   if (carries_voltage(rig, roles))
@@ -162,13 +160,16 @@ void modbus_keys(YamlKeys& keys, Backend link, const RigFile& rig_file, ModbusRi
     keys.optional_map("device_watchdog", rig.watchdog, watchdog_keys);
   }
   if (const YamlMap* map = keys.source()) check_registers(*map, rig, roles);
+  keys.needs("exchange", rig.exchange != ModbusExchange::read_write || !rig.input_registers,
+             "is read_write, which reads holding registers only",
+             "use exchange: separate, or table: holding");
   keys.check("response_timeout_s", rig.response_timeout_s < rig_file.watchdog_s, "is not below watchdog_s",
              "set it to less than watchdog_s");
 }
 
 template <Backend link>
 void keys_of_link(YamlKeys& document, RigFile& rig) {
-  document.check("backend",
+  document.needs("backend",
                  !roles_of(rig, Backend::modbus_tcp).any() || !roles_of(rig, Backend::modbus_rtu).any(),
                  "names both Modbus links", "use either modbus-tcp or modbus-rtu");
   document.section_of("modbus", rig.modbus,

@@ -24,9 +24,11 @@ constexpr Words<2> clocks = {"computer", "card"};
 /// A name of the loader's or the card's.
 void name_key(YamlKeys& keys, const char* key, std::string& name, std::size_t longest) {
   keys.text(key, name);
-  keys.check(key, name.size() <= longest && name.find('\0') == std::string::npos,
-             "is too long or contains a null character",
-             "use at most " + std::to_string(longest) + " characters");
+  Admitted form;
+  form.max_length = longest;
+  keys.check_form(key, name.size() <= longest && name.find('\0') == std::string::npos, form,
+                  "is too long or contains a null character",
+                  "use at most " + std::to_string(longest) + " characters");
 }
 
 /// Left out, it stays as it is. An empty one is not written.
@@ -87,8 +89,10 @@ void range_key(YamlKeys& keys, QuanserOutput& output) {
   if (!keys.given("output_range_v", output.sets_range)) return;
   std::vector<double> ends = {output.low_v, output.high_v};
   keys.numbers("output_range_v", ends, Range::within(-largest_v, largest_v));
-  keys.check("output_range_v", ends.size() == 2 && ends[0] < 0.0 && ends[1] > 0.0,
-             "does not contain zero volts", "write the lower and the upper end, such as [-10, 10]");
+  constexpr const char* problem = "does not contain zero volts";
+  constexpr const char* remedy = "write the lower and the upper end, such as [-10, 10]";
+  keys.check_size("output_range_v", ends.size(), 2, 2, problem, remedy);
+  keys.check("output_range_v", ends[0] < 0.0 && ends[1] > 0.0, problem, remedy);
   output.low_v = ends[0];
   output.high_v = ends[1];
   output.sets_range = true;

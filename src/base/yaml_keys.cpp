@@ -121,7 +121,7 @@ void YamlKeyWriter::maps(const char* key, std::size_t count, const VisitItem& vi
   std::string list;
   if (layout_ == Layout::lines) {
     for (const std::string& text : texts) list += indent_ + "  - " + text + "\n";
-    written_ += indent_ + key + ":\n" + list;
+    written_ += indent_ + key + (texts.empty() ? ": []\n" : ":\n") + list;
     return;
   }
   for (const std::string& text : texts) list += (list.empty() ? "" : ", ") + text;

@@ -1,5 +1,5 @@
 // The keys of a section of a YAML file as one list, in the order of the file. A visitor of the list reads
-// the section or writes it.
+// the section, writes it, or makes its JSON Schema (src/schema).
 #pragma once
 
 #include <array>
@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <limits>
 #include <optional>
 #include <string>
 #include <type_traits>
@@ -25,6 +26,18 @@ enum class Usual : std::uint8_t { written, left_out };
 /// The names of an enumeration's values, in order.
 template <std::size_t N>
 using Words = std::array<const char*, N>;
+
+constexpr std::size_t any_size = std::numeric_limits<std::size_t>::max();
+
+/// What a check admits beyond the type and the range of its key.
+struct Admitted {
+  std::optional<std::size_t> min_items, max_items;  ///< of a list or a map
+  std::optional<double> min;                        ///< of a number
+  bool zero_too = false;                            ///< besides numbers from `min` on
+  bool not_zero = false;                            ///< of a number
+  std::string pattern;                              ///< of a text, as a regular expression of ECMA-262
+  std::size_t max_length = 0;                       ///< of a text; 0: any
+};
 
 /// Visits the keys of a section. A visitor overrides the functions that it needs, and may change the
 /// values: pass a copy to one that only writes.
@@ -50,12 +63,24 @@ class YamlKeys {
   /// The same with one line per key when written.
   virtual void section(const char* key, const Visit& visit) { map(key, visit); }
 
-  /// Whether the key is present (reading), or `is_set` (writing).
+  /// Whether the key is present (reading), or `is_set` (writing): for keys that may be left out.
   virtual bool given(const char* /*key*/, bool is_set) { return is_set; }
+  /// The same where other keys depend on it.
+  virtual bool decides_by_presence(const char* key, bool is_set) { return given(key, is_set); }
+  /// Whether the text of a key matches a pattern, where other keys depend on it: `does` of the present value.
+  virtual bool decides_by_pattern(const char* /*key*/, const std::string& /*pattern*/, bool does) {
+    return does;
+  }
+  /// A map on which keys outside of it depend.
+  virtual void deciding_map(const char* key, const Visit& visit) { map(key, visit); }
   /// Whether the key holds a map (reading), or `is_set` (writing).
   virtual bool is_map(const char* /*key*/, bool is_set) { return is_set; }
   /// The map that is being read; null when writing: for steps that apply to reading only.
   virtual const YamlMap* source() const { return nullptr; }
+  /// Says that one of the keys must be there, which another check refuses otherwise.
+  virtual void require_any(const std::vector<std::string>& /*keys*/) {}
+  /// Says for people what a key means.
+  virtual void describe(const char* /*key*/, const std::string& /*meaning*/) {}
 
   template <std::signed_integral Int>
   void integer(const char* key, Int& value, std::int64_t low, std::int64_t high,
@@ -72,6 +97,19 @@ class YamlKeys {
     choice(key, at, {words.begin(), words.end()},
            otherwise ? std::optional(static_cast<std::size_t>(*otherwise)) : required);
     value = static_cast<Enum>(at);
+  }
+  /// The same with words of a registry: `word` is the place of one.
+  void one_of(const char* key, std::size_t& word, const std::vector<std::string>& words) {
+    choice(key, word, words, required);
+  }
+  /// An optional enumeration.
+  template <class Enum, std::size_t N>
+  void optional_one_of(const char* key, std::optional<Enum>& value, const Words<N>& words) {
+    if (given(key, value.has_value())) one_of(key, made(value), words);
+  }
+  /// An optional path.
+  void optional_path(const char* key, std::filesystem::path& value) {
+    if (given(key, !value.empty())) path(key, value);
   }
   /// An optional integer.
   void optional_integer(const char* key, std::optional<int>& value, std::int64_t low, std::int64_t high) {
@@ -93,7 +131,7 @@ class YamlKeys {
   /// A section that is required when read, and written where it is set.
   template <class T, class VisitValue>
   void section_of(const char* key, std::optional<T>& value, const VisitValue& visit) {
-    if (source() || value) section(key, [&](YamlKeys& keys) { visit(keys, made(value)); });
+    if (visits_unset() || value) section(key, [&](YamlKeys& keys) { visit(keys, made(value)); });
   }
   /// A list of maps.
   template <class T, class VisitValue>
@@ -106,6 +144,51 @@ class YamlKeys {
   /// Refuses the file where `holds` is false. `problem` continues a sentence that begins with the key.
   void check(const char* key, bool holds, const std::string& problem, const std::string& remedy) const {
     if (const YamlMap* map = source(); map && !holds) map->fail(key, problem, remedy);
+  }
+
+  // Checks that a schema can state. Each refuses the file, like `check`.
+
+  /// A condition on words, flags and the presence of keys. `holds` must follow from these alone.
+  void needs(const char* key, bool holds, const std::string& problem, const std::string& remedy) {
+    if (!holds) forbid(std::string(key) + " " + problem + ": " + remedy);
+    check(key, holds, problem, remedy);
+  }
+  /// A list has from `min` to `max` items; `any_size`: however many.
+  void check_size(const char* key, std::size_t size, std::size_t min, std::size_t max,
+                  const std::string& problem, const std::string& remedy) {
+    Admitted admitted;
+    admitted.min_items = min;
+    if (max != any_size) admitted.max_items = max;
+    admit(key, admitted);
+    check(key, size >= min && size <= max, problem, remedy);
+  }
+  /// At least one of the keys is there. `holds`: whether one is.
+  void needs_any(const char* key, const std::vector<std::string>& any_of, bool holds,
+                 const std::string& problem, const std::string& remedy) {
+    require_any(any_of);
+    check(key, holds, problem, remedy);
+  }
+  /// A number is at least `min`; with `zero_too` it may be zero.
+  void check_min(const char* key, double value, double min, bool zero_too, const std::string& problem,
+                 const std::string& remedy) {
+    Admitted admitted;
+    admitted.min = min;
+    admitted.zero_too = zero_too;
+    admit(key, admitted);
+    check(key, value >= min || (zero_too && value == 0.0), problem, remedy);
+  }
+  /// A number is not zero.
+  void check_not_zero(const char* key, double value, const std::string& problem, const std::string& remedy) {
+    Admitted admitted;
+    admitted.not_zero = true;
+    admit(key, admitted);
+    check(key, value != 0.0, problem, remedy);
+  }
+  /// The text has a form. `holds`: whether the present one has it.
+  void check_form(const char* key, bool holds, const Admitted& form, const std::string& problem,
+                  const std::string& remedy) {
+    admit(key, form);
+    check(key, holds, problem, remedy);
   }
 
   /// The value, constructed if absent.
@@ -121,6 +204,12 @@ class YamlKeys {
                       std::optional<std::size_t> /*otherwise*/) {}
   /// Visits items 0, 1, ... of a list of maps; when writing there are `count`.
   virtual void maps(const char* /*key*/, std::size_t /*count*/, const VisitItem& /*visit*/) {}
+  /// Whether required sections are visited that have no value yet.
+  virtual bool visits_unset() const { return source() != nullptr; }
+  /// What is known from a check of a key that was visited before.
+  virtual void admit(const char* /*key*/, const Admitted& /*admitted*/) {}
+  /// The words, flags and keys so far are refused.
+  virtual void forbid(const std::string& /*reason*/) {}
 };
 
 /// Reads the values from a map without finish(). Throws ConfigError with remedy, file, line, key.

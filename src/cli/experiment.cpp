@@ -24,6 +24,7 @@
 #include "commissioning/sign_check.hpp"
 #include "experiment/pieces/sign_check.hpp"
 #include "live.hpp"
+#include "live/row_watchers.hpp"
 #include "options.hpp"
 #include "progress.hpp"
 #include "record/sign_record.hpp"
@@ -31,6 +32,7 @@
 #include "runtime/overrun_limit.hpp"
 #include "signals.hpp"
 #include "stop_watcher.hpp"
+#include "stream.hpp"
 #include "upright/base/error.hpp"
 #include "upright/hal/rig_factory.hpp"
 
@@ -42,7 +44,7 @@ namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
 struct ExperimentArguments {
-  std::string file, rig, plant, out, live_port;
+  std::string file, rig, plant, out, live_port, stream;
   std::optional<double> rate_hz;
   std::optional<std::uint64_t> seed;
   RealtimeRequest realtime;
@@ -240,7 +242,7 @@ void print(const TrialResult& r) {
 /// Runs the pieces that were planned.
 ExperimentResult perform(const ExperimentArguments& arguments, const ExperimentSetup& setup,
                          const std::vector<Piece>& pieces, const fs::path& folder, const SignalFlag& signal,
-                         LiveView* view) {
+                         LiveView* view, UdpStream* stream) {
   const bool simulated = is_simulated(setup.rig);
   MonotonicClock real_clock;
   VirtualClock virtual_clock;
@@ -260,7 +262,10 @@ ExperimentResult perform(const ExperimentArguments& arguments, const ExperimentS
   options.command = command_line();
   options.seed = arguments.seed.value_or(1);
   options.realtime = arguments.realtime;
-  options.watcher = view;
+  RowWatchers watchers;
+  watchers.add(view);
+  watchers.add(stream);
+  options.watcher = &watchers;
   options.know_loop = [&](const ControlConfig& control, LoopLimits& limits) {
     const OverrunLimit overrun = overrun_limit(setup.plant, control);
     if (!overrun.warning.empty()) std::cerr << "upright: " << overrun.warning << "\n";
@@ -325,14 +330,19 @@ ExitCode run(const ExperimentArguments& arguments) {
   refuse_without_hands(setup, pieces, arguments.ready);
   const SignalFlag& signal = catch_signals();
   const fs::path folder = folder_of(arguments, setup, pieces);
+  const std::unique_ptr<UdpStream> stream = open_stream(arguments.stream, arguments.fast);
   const std::unique_ptr<LiveView> view = open_live(arguments, setup);
-  const ExperimentResult result =
-      shown_by(view.get(), [&] { return perform(arguments, setup, pieces, folder, signal, view.get()); });
-  if (arguments.as_json)
-    std::cout << json_of(result, setup, pieces, folder).dump(2, ' ', false, Json::error_handler_t::replace)
-              << "\n";
-  else
+  const ExperimentResult result = shown_by(view.get(), [&] {
+    return perform(arguments, setup, pieces, folder, signal, view.get(), stream.get());
+  });
+  if (arguments.as_json) {
+    Json document = json_of(result, setup, pieces, folder);
+    add_stream(document, stream.get());
+    std::cout << document.dump(2, ' ', false, Json::error_handler_t::replace) << "\n";
+  } else {
+    print_stream(stream.get());
     std::cout << folder.string() << std::endl;
+  }
   if (!result.stop.done()) {
     std::cerr << "upright: " << sentence_of(result.stop) << "\n";
     if (!result.sentence.empty()) std::cerr << "upright: " << result.sentence << "\n";
@@ -372,6 +382,7 @@ void add_experiment(CommandLine& line) {
       "Folder of this experiment (default: an unfinished one in runs, else runs/<UTC start>-<name>)");
   add_realtime(command, a->realtime);
   add_live(command, a->live_port);
+  add_stream(command, a->stream);
   command.flag("--json", a->as_json, "Print one JSON document");
   command.does([a] { return run(*a); });
 }

@@ -24,7 +24,7 @@ int fail(ExitCode code, const std::string& sentence) {
 ExitCode run(int argc, char** argv) {
   upright::cli::CommandLine line(
       "upright", UPRIGHT_VERSION, "Real-time controller for the Quanser IP02 cart with inverted pendulum",
-      "Start here:  scripts/demo.sh   (needs no hardware)\n"
+      "Start here:  upright run --help   (its example needs no hardware)\n"
       "Each command shows an example:  upright COMMAND --help\n"
       "Exit codes: 0 success, 2 usage or configuration error, 3 stopped or fallen, "
       "4 link or device error");

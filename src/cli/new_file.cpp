@@ -132,11 +132,21 @@ const FileTemplate& template_for(const std::string& kind) {
                     "': copy a rig file of config/rigs, or use another backend");
 }
 
+/// The line by which an editor finds the schema of the file; empty where upright is not installed.
+std::string schema_line(const std::string& kind) {
+  std::error_code problem;
+  const fs::path program = fs::read_symlink("/proc/self/exe", problem);
+  const fs::path prefix = program.parent_path().parent_path();
+  const fs::path schema = prefix / "share/upright/config/schema" / (kind + ".json");
+  if (problem || !fs::exists(schema, problem)) return "";
+  return "# yaml-language-server: $schema=" + schema.string() + "\n";
+}
+
 /// The text of the file, with the answers of whoever types.
-std::string text_from(const FileTemplate& chosen, const fs::path& out) {
+std::string text_from(const FileTemplate& chosen, const std::string& first_line, const fs::path& out) {
   std::istringstream lines(chosen.text);
   std::map<std::string, std::string> answers;
-  std::string text;
+  std::string text = first_line;
   for (std::string line; std::getline(lines, line);) {
     if (line.starts_with("#? ")) {
       const Question question = question_of(line);
@@ -155,7 +165,7 @@ std::string text_from(const FileTemplate& chosen, const fs::path& out) {
 void write_new(const std::string& kind, const fs::path& out, bool force) {
   if (!force && fs::exists(out))
     throw ConfigError(out.string() + " exists already: choose another name with --out, or add --force");
-  const std::string text = text_from(template_for(kind), out);
+  const std::string text = text_from(template_for(kind), schema_line(kind), out);
   // Beside it first, so that a refused file replaces none.
   const fs::path partial = out.string() + ".partial";
   std::ofstream file(partial, std::ios::binary);

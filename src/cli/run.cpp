@@ -16,7 +16,6 @@
 #include "json_number.hpp"
 #include "live.hpp"
 #include "live/row_watchers.hpp"
-#include "live/udp_stream.hpp"
 #include "options.hpp"
 #include "progress.hpp"
 #include "record/histogram_text.hpp"
@@ -26,6 +25,7 @@
 #include "runtime/wait_upright.hpp"
 #include "signals.hpp"
 #include "stop_watcher.hpp"
+#include "stream.hpp"
 #include "upright/base/error.hpp"
 #include "upright/control/model_parts.hpp"
 #include "upright/hal/rig_factory.hpp"
@@ -266,19 +266,6 @@ void print_summary(const SessionResult& result, const LoopLimits& limits, bool f
   std::fflush(stdout);
 }
 
-/// Where --stream sends the rows; null where it was not asked for.
-std::unique_ptr<UdpStream> open_stream(const RunArguments& arguments) {
-  if (arguments.stream.empty()) return nullptr;
-  if (arguments.fast)
-    throw ConfigError("--stream needs real time and --fast is virtual time: remove one of them");
-  return std::make_unique<UdpStream>(arguments.stream);
-}
-
-void print_stream(const UdpStream& stream) {
-  std::printf("Stream: %llu rows sent to %s, %llu dropped.\n", static_cast<unsigned long long>(stream.sent()),
-              stream.address().c_str(), static_cast<unsigned long long>(stream.dropped()));
-}
-
 /// The page that --live asks for.
 std::unique_ptr<LiveView> open_live(const RunArguments& arguments, const RunSetup& setup) {
   LiveSubject subject;
@@ -349,18 +336,16 @@ ExitCode run(const RunArguments& arguments) {
   if (!overrun.warning.empty()) std::cerr << "upright: " << overrun.warning << "\n";
   const LoopLimits limits = setup.limits;
   const SignalFlag& caught_signal = catch_signals();
-  const std::unique_ptr<UdpStream> stream = open_stream(arguments);
+  const std::unique_ptr<UdpStream> stream = open_stream(arguments.stream, arguments.fast);
   const std::unique_ptr<LiveView> view = open_live(arguments, setup);
   const SessionResult result = shown_by(view.get(), [&] {
     return balance(arguments, std::move(setup), caught_signal, view.get(), stream.get());
   });
 
-  if (!arguments.as_json && stream) print_stream(*stream);
+  if (!arguments.as_json) print_stream(stream.get());
   if (arguments.as_json) {
     Json document = json_of(result, limits, overrun);
-    if (stream)
-      document["stream"] = {
-          {"address", stream->address()}, {"rows_sent", stream->sent()}, {"rows_dropped", stream->dropped()}};
+    add_stream(document, stream.get());
     std::cout << document.dump(2, ' ', false, Json::error_handler_t::replace) << "\n";
   } else {
     print_summary(result, limits, arguments.fast);
@@ -411,9 +396,7 @@ void add_run(CommandLine& line) {
   command.option("--label", a->label, "Last part of the name of the run directory (default: run)");
   add_realtime(command, a->realtime);
   add_live(command, a->live_port);
-  command.option("--stream", a->stream,
-                 "Send each row as a UDP datagram with JSON, as PlotJuggler's UDP server reads it: "
-                 "udp://127.0.0.1:9870");
+  add_stream(command, a->stream);
   command.flag("--unchecked", a->unchecked, "Run a real rig without a sign check");
   command.flag("--force", a->force, "Run even if the gains do not stabilize the plant");
   command.flag("--json", a->as_json, "Print one JSON document");

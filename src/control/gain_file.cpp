@@ -2,6 +2,7 @@
 
 #include <fstream>
 
+#include "gain_keys.hpp"
 #include "upright/base/error.hpp"
 #include "upright/control/delay_line.hpp"
 
@@ -12,16 +13,13 @@ namespace {
 constexpr const char* second_order_name = "second_order_filter";
 constexpr const char* difference_name = "difference";
 
-EstimatorConfig read_estimator(const YamlMap& map) {
-  EstimatorConfig config;
-  if (map.choice("kind", {second_order_name, difference_name}) == difference_name) {
-    config.kind = EstimatorKind::difference;
-  } else {
-    config.cutoff_hz = map.number("cutoff_hz", {0.0, 1e5, true});
-    config.damping = map.number("damping", {0.0, 100.0, true});
-  }
-  map.finish();
-  return config;
+constexpr Words<2> velocity_estimators = {second_order_name, difference_name};
+
+void velocity_estimator_keys(YamlKeys& keys, EstimatorConfig& config) {
+  keys.one_of("kind", config.kind, velocity_estimators);
+  if (config.kind == EstimatorKind::difference) return;
+  keys.number("cutoff_hz", config.cutoff_hz, {0.0, 1e5, true});
+  keys.number("damping", config.damping, {0.0, 100.0, true});
 }
 
 constexpr const char* kalman_name = "kalman";
@@ -43,58 +41,63 @@ constexpr OptionalNumber estimator_numbers[] = {
     {"angle_noise_counts2", &StateEstimatorConfig::angle_noise_counts2, false},
 };
 
-StateEstimatorConfig read_state_estimator(const YamlMap& map) {
-  StateEstimatorConfig config;
-  config.kind = map.choice("kind", {kalman_name, extended_name}) == kalman_name
-                    ? StateEstimatorKind::kalman
-                    : StateEstimatorKind::extended_kalman;
-  config.plant = map.path("plant");
+constexpr Words<2> state_estimators = {kalman_name, extended_name};
+constexpr Words<2> compensations = {"none", "predictor"};
+
+void state_estimator_keys(YamlKeys& keys, StateEstimatorConfig& config) {
+  bool is_extended = config.kind == StateEstimatorKind::extended_kalman;
+  keys.one_of("kind", is_extended, state_estimators);
+  config.kind = is_extended ? StateEstimatorKind::extended_kalman : StateEstimatorKind::kalman;
+  keys.path("plant", config.plant);
   // Far beyond any rig, and far from where the Riccati equation loses its digits.
   constexpr double largest = 1e9, smallest = 1e-15;
   for (const OptionalNumber& number : estimator_numbers) {
-    config.*number.value = map.optional_number(number.key, Range::within(0.0, largest));
-    const std::optional<double>& value = config.*number.value;
-    if (value && *value < smallest && !(number.may_be_zero && *value == 0.0))
-      map.fail(number.key, "is too small", "set it to at least " + exact_text(smallest));
+    std::optional<double>& value = config.*number.value;
+    keys.optional_number(number.key, value, Range::within(0.0, largest));
+    if (value)
+      keys.check_min(number.key, *value, smallest, number.may_be_zero, "is too small",
+                     "set it to at least " + exact_text(smallest));
   }
-  map.finish();
-  return config;
 }
 
-DisturbanceRejection read_rejection(const YamlMap& map) {
-  DisturbanceRejection rejection;
-  rejection.share = map.number("share", Range::within(0.0, 1.0));
-  rejection.decay_s = map.number_or("decay_s", 0.0, Range::not_negative());
-  map.finish();
-  return rejection;
+void rejection_keys(YamlKeys& keys, DisturbanceRejection& rejection) {
+  keys.number("share", rejection.share, Range::within(0.0, 1.0));
+  keys.number("decay_s", rejection.decay_s, Range::not_negative(), 0.0);
 }
 
-FrictionCompensation read_friction(const YamlMap& map) {
-  FrictionCompensation friction;
-  friction.share = map.number("share", Range::within(0.0, 1.0));
-  friction.lag_s = map.number_or("lag_s", friction.lag_s, Range::not_negative());
-  map.finish();
-  return friction;
+void friction_keys(YamlKeys& keys, FrictionCompensation& friction) {
+  keys.number("share", friction.share, Range::within(0.0, 1.0));
+  keys.number("lag_s", friction.lag_s, Range::not_negative(), FrictionCompensation{}.lag_s);
 }
 
-DelayCompensation read_compensation(const YamlMap& map) {
-  DelayCompensation compensation;
-  if (map.choice("kind", {"none", "predictor"}) == "predictor") {
-    compensation.kind = CompensationKind::predictor;
-    compensation.plant = map.path("plant");
+void compensation_keys(YamlKeys& keys, DelayCompensation& compensation) {
+  keys.one_of("kind", compensation.kind, compensations);
+  if (compensation.kind == CompensationKind::predictor) keys.path("plant", compensation.plant);
+}
+
+void gain_number_keys(YamlKeys& keys, Gains& gains) {
+  keys.number("cart_position_v_per_m", gains.cart_position_v_per_m, Range::any());
+  keys.number("pendulum_angle_v_per_rad", gains.pendulum_angle_v_per_rad, Range::any());
+  keys.number("cart_velocity_v_per_mps", gains.cart_velocity_v_per_mps, Range::any());
+  keys.number("pendulum_rate_v_per_radps", gains.pendulum_rate_v_per_radps, Range::any());
+}
+
+/// The model-based estimator, and what needs one.
+void estimate_keys(YamlKeys& document, ControlConfig& config) {
+  if (document.decides_by_presence("state_estimator", config.has_state_estimator()))
+    document.deciding_map("state_estimator",
+                          [&](YamlKeys& keys) { state_estimator_keys(keys, config.state_estimator); });
+  if (document.decides_by_presence("disturbance_rejection", config.has_state_estimator())) {
+    document.map("disturbance_rejection", [&](YamlKeys& keys) { rejection_keys(keys, config.rejection); });
+    document.needs("disturbance_rejection", config.has_state_estimator(),
+                   "needs an estimate of the force on the cart", "add a state_estimator");
   }
-  map.finish();
-  return compensation;
-}
-
-Gains read_gain_numbers(const YamlMap& map) {
-  Gains gains;
-  gains.cart_position_v_per_m = map.number("cart_position_v_per_m");
-  gains.pendulum_angle_v_per_rad = map.number("pendulum_angle_v_per_rad");
-  gains.cart_velocity_v_per_mps = map.number("cart_velocity_v_per_mps");
-  gains.pendulum_rate_v_per_radps = map.number("pendulum_rate_v_per_radps");
-  map.finish();
-  return gains;
+  const bool is_extended = config.state_estimator.kind == StateEstimatorKind::extended_kalman;
+  if (document.decides_by_presence("friction_compensation", is_extended)) {
+    document.map("friction_compensation", [&](YamlKeys& keys) { friction_keys(keys, config.friction); });
+    document.needs("friction_compensation", is_extended, "needs a model of the friction",
+                   "use state_estimator: {kind: extended_kalman} and a plant file with friction");
+  }
 }
 
 std::string estimator_text(const EstimatorConfig& config) {
@@ -132,32 +135,23 @@ std::string state_estimator_text(const ControlConfig& config) {
 
 }  // namespace
 
+void gain_keys(YamlKeys& document, ControlConfig& config) {
+  document.map("gains", [&](YamlKeys& keys) { gain_number_keys(keys, config.gains); });
+  document.number("delay_s", config.delay_s, Range::within(0.0, DelayLine::longest_delay_s));
+  document.number("sample_rate_hz", config.sample_rate_hz,
+                  Range::within(lowest_sample_rate_hz, highest_sample_rate_hz));
+  estimate_keys(document, config);
+  if (!config.has_state_estimator() || document.decides_by_presence("velocity_estimator", true))
+    document.map("velocity_estimator",
+                 [&](YamlKeys& keys) { velocity_estimator_keys(keys, config.estimator); });
+  document.usual_map("delay_compensation",
+                     [&](YamlKeys& keys) { compensation_keys(keys, config.compensation); });
+}
+
 ControlConfig read_gains(const YamlMap& document) {
   ControlConfig config;
-  config.gains = read_gain_numbers(document.map("gains"));
-  config.delay_s = document.number("delay_s", Range::within(0.0, DelayLine::longest_delay_s));
-  config.sample_rate_hz =
-      document.number("sample_rate_hz", Range::within(lowest_sample_rate_hz, highest_sample_rate_hz));
-  if (const auto estimator = document.optional_map("state_estimator"))
-    config.state_estimator = read_state_estimator(*estimator);
-  if (const auto rejection = document.optional_map("disturbance_rejection")) {
-    config.rejection = read_rejection(*rejection);
-    if (!config.has_state_estimator())
-      document.fail("disturbance_rejection", "needs an estimate of the force on the cart",
-                    "add a state_estimator");
-  }
-  if (const auto friction = document.optional_map("friction_compensation")) {
-    config.friction = read_friction(*friction);
-    if (config.state_estimator.kind != StateEstimatorKind::extended_kalman)
-      document.fail("friction_compensation", "needs a model of the friction",
-                    "use state_estimator: {kind: extended_kalman} and a plant file with friction");
-  }
-  if (config.has_state_estimator() && !document.has("velocity_estimator"))
-    config.estimator = {};
-  else
-    config.estimator = read_estimator(document.map("velocity_estimator"));
-  if (const auto compensation = document.optional_map("delay_compensation"))
-    config.compensation = read_compensation(*compensation);
+  YamlKeyReader reader(document);
+  gain_keys(reader, config);
   document.finish();
   return config;
 }

@@ -25,6 +25,9 @@ struct Experiment {
   std::optional<YamlMap> source;  ///< where it was read: for what only the plan can refuse
 };
 
+/// Visits the keys of the whole file, for the reader and the schema.
+void experiment_keys(PieceKeys& document, Experiment& experiment);
+
 /// Reads an experiment file. Throws ConfigError with remedy, file, line and key.
 Experiment read_experiment_file(const std::filesystem::path& file);
 /// The same from text; `file` is the name that errors show and that paths start from.

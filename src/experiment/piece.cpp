@@ -8,7 +8,7 @@ namespace upright {
 
 namespace {
 
-constexpr std::size_t longest_label = 60;
+constexpr const char* any_character = "[\\s\\S]";
 
 template <class... Kinds>
 std::vector<std::unique_ptr<PieceKind>> one_of_each(const std::tuple<Kinds...>*) {
@@ -55,24 +55,32 @@ bool compares(const Piece& piece) noexcept {
   return !piece.kind->controllers().empty();
 }
 
+void piece_keys(PieceKeys& keys, Piece& piece) {
+  std::size_t at = 0;
+  keys.one_of("kind", at, piece_kinds());
+  piece = {*unread_kinds()[at]};
+  piece.label = piece.kind->name();
+  if (keys.given("label", true)) keys.name("label", piece.label, "");
+  if (keys.decides_by_presence("operator", true)) {
+    keys.text("operator", piece.operator_does, "");
+    if (!keys.decides_by_pattern("operator", any_character, !piece.operator_does.empty()))
+      piece.operator_does.clear();
+  }
+  piece.kind->keys(keys);
+  if (piece.kind->may_fit()) keys.flag("fit_to_travel", piece.fit_to_travel);
+  keys.flag("turned", piece.turned);
+  if (const char* for_hands = piece.turned ? "turned" : piece.kind->key_for_hands())
+    keys.needs(for_hands, !piece.operator_does.empty(), "needs an operator",
+               "describe under 'operator' what to do");
+  if (const YamlMap* map = keys.source()) {
+    map->finish();
+    piece.source = *map;
+  }
+}
+
 Piece read_piece(const YamlMap& map) {
-  const std::string word = map.choice("kind", piece_kinds());
-  const auto at = std::find_if(unread_kinds().begin(), unread_kinds().end(),
-                               [&](const auto& kind) { return kind->name() == word; });
-  Piece piece{**at};
-  piece.label = map.text_or("label", word);
-  if (!is_plain_name(piece.label, longest_label))
-    map.fail("label", "is '" + piece.label.substr(0, 60) + "'",
-             "the name is used for folders, so use at most 60 lower-case letters, digits, '-' and '_'");
-  piece.operator_does = map.text_or("operator", "");
-  read_keys(*piece.kind, map);
-  if (piece.kind->may_fit()) piece.fit_to_travel = map.flag_or("fit_to_travel", false);
-  piece.turned = map.flag_or("turned", false);
-  const char* for_hands = piece.turned ? "turned" : piece.kind->key_for_hands();
-  if (for_hands && piece.operator_does.empty())
-    map.fail(for_hands, "needs an operator", "describe under 'operator' what to do");
-  map.finish();
-  piece.source = map;
+  Piece piece;
+  read_piece_keys(map, [&piece](PieceKeys& keys) { piece_keys(keys, piece); });
   return piece;
 }
 

@@ -190,6 +190,8 @@ bool balances(const Piece& piece) noexcept;
 /// True where controllers take turns.
 bool compares(const Piece& piece) noexcept;
 
+/// Visits the keys of a piece, for the reader and the schema.
+void piece_keys(PieceKeys& keys, Piece& piece);
 Piece read_piece(const YamlMap& map);
 /// The piece as a YAML flow map that `read_piece` reads back exactly.
 std::string piece_text(const Piece& piece);

@@ -10,27 +10,44 @@ namespace upright {
 
 namespace {
 
-constexpr std::size_t max_list_length = 1000;
-constexpr std::size_t max_controllers = 8, longest_controller_name = 20;  // a table that can be read
+constexpr std::string_view name_characters = "abcdefghijklmnopqrstuvwxyz0123456789-_";
 
 class KeyReader final : public PieceKeys, public YamlKeyReader {
  public:
   using YamlKeyReader::YamlKeyReader;
 
-  void numbers(const char* key, std::vector<double>& values, const Range& range) override {
-    values = list(key, range);
+  void piece_map(const char* key, const VisitPiece& visit) override {
+    KeyReader reader(map_.map(key));
+    visit(reader);
+    reader.map_.finish();
+  }
+  void piece_maps(const char* key, const VisitPieceItem& visit) override {
+    std::size_t at = 0;
+    for (const YamlMap& item : map_.maps(key)) {
+      KeyReader reader(item);
+      visit(reader, at++);
+      item.finish();
+    }
+  }
+  void name(const char* key, std::string& value, const std::optional<std::string>& otherwise) override {
+    text(key, value, otherwise, Usual::written);
+    check(key, is_plain_name(value, longest_name), "is '" + value.substr(0, 60) + "'",
+          "the name is used for folders, so use at most 60 lower-case letters, digits, '-' and '_'");
+  }
+  void list(const char* key, std::vector<double>& values, const Range& range) override {
+    values = listed(key, range);
   }
   void growing(const char* key, std::vector<double>& values, const Range& range) override {
     if (map_.is_map(key))
       values = grid(map_.map(key), range);
     else
-      values = list(key, range);
+      values = listed(key, range);
     for (std::size_t i = 1; i < values.size(); ++i)
       if (!(values[i] > values[i - 1]))
         map_.fail(key, "is not increasing", "sort the delays and list each once");
   }
   void voltage(const char* key, double& value) override { value = map_.number(key, any_voltage); }
-  void voltages(const char* key, std::vector<double>& values) override { values = list(key, any_voltage); }
+  void voltages(const char* key, std::vector<double>& values) override { values = listed(key, any_voltage); }
   void largest_voltage(const char* key, double& value, double otherwise) override {
     value = map_.number_or(key, otherwise, any_voltage);
   }
@@ -42,7 +59,7 @@ class KeyReader final : public PieceKeys, public YamlKeyReader {
   void angle_or_list(const char* key, double& value_rad, std::vector<double>& values_rad,
                      const Range& degrees, double otherwise_deg) override {
     if (!map_.has(key) || !map_.is_list(key)) return angle(key, value_rad, degrees, otherwise_deg);
-    for (const double angle_deg : list(key, degrees)) values_rad.push_back(angle_deg * radians_per_degree);
+    for (const double angle_deg : listed(key, degrees)) values_rad.push_back(angle_deg * radians_per_degree);
   }
   void controllers(const char* key, std::vector<NamedGains>& controllers) override {
     if (!map_.has(key)) return;
@@ -61,7 +78,7 @@ class KeyReader final : public PieceKeys, public YamlKeyReader {
   }
 
  private:
-  std::vector<double> list(const char* key, const Range& range) const {
+  std::vector<double> listed(const char* key, const Range& range) const {
     std::vector<double> values = map_.numbers(key, range);
     if (values.empty() || values.size() > max_list_length)
       map_.fail(key, "has " + std::to_string(values.size()) + " numbers", "list 1 to 1000 numbers");
@@ -95,6 +112,9 @@ class KeyWriter final : public PieceKeys, public YamlKeyWriter {
  public:
   KeyWriter() : YamlKeyWriter(Layout::one_line) {}
 
+  void list(const char* key, std::vector<double>& values, const Range& range) override {
+    numbers(key, values, range);
+  }
   void growing(const char* key, std::vector<double>& values, const Range& range) override {
     numbers(key, values, range);
   }
@@ -180,9 +200,9 @@ void look(const PieceKind& kind, PieceKeys& visitor) {
 
 }  // namespace
 
-void read_keys(PieceKind& kind, const YamlMap& map) {
+void read_piece_keys(const YamlMap& map, const PieceKeys::VisitPiece& visit) {
   KeyReader reader(map);
-  kind.keys(reader);
+  visit(reader);
 }
 
 std::string keys_text(const PieceKind& kind) {
@@ -215,7 +235,12 @@ void refuse_voltages_above(double limit_v, const PieceKind& kind, const YamlMap&
 
 bool is_plain_name(const std::string& name, std::size_t longest) {
   return !name.empty() && name.size() <= longest &&
-         name.find_first_not_of("abcdefghijklmnopqrstuvwxyz0123456789-_") == std::string::npos;
+         name.find_first_not_of(name_characters) == std::string::npos;
+}
+
+std::string plain_name_pattern(std::size_t longest) {
+  return "^[" + std::string(name_characters.substr(0, name_characters.size() - 2)) + "_-]{1," +
+         std::to_string(longest) + "}$";
 }
 
 }  // namespace upright

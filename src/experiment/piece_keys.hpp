@@ -27,10 +27,26 @@ constexpr Range any_voltage{0.0, highest_voltage_v, true};
 constexpr Range any_duration{0.0, longest_piece_s, true};
 constexpr Range any_period = Range::within(0.01, longest_piece_s);
 
+// Sizes that can be read by people.
+constexpr std::size_t longest_name = 60;
+constexpr std::size_t max_list_length = 1000;
+constexpr std::size_t max_controllers = 8, longest_controller_name = 20;
+
 /// Visits the keys of a piece: besides those that any section may have, some that mean voltages, angles or
 /// gain files.
 class PieceKeys : public virtual YamlKeys {
  public:
+  using VisitPiece = std::function<void(PieceKeys&)>;
+  using VisitPieceItem = std::function<void(PieceKeys&, std::size_t)>;
+
+  /// A map of such keys, and a list of them.
+  virtual void piece_map(const char* /*key*/, const VisitPiece& /*visit*/) {}
+  virtual void piece_maps(const char* /*key*/, const VisitPieceItem& /*visit*/) {}
+  /// A name for folders. Without a default it is required.
+  virtual void name(const char* /*key*/, std::string& /*value*/,
+                    const std::optional<std::string>& /*otherwise*/) {}
+  /// 1 to 1000 numbers.
+  virtual void list(const char* /*key*/, std::vector<double>& /*values*/, const Range& /*range*/) {}
   /// A list that grows, or {from, to, count}.
   virtual void growing(const char* /*key*/, std::vector<double>& /*values*/, const Range& /*range*/) {}
   /// A voltage that the piece puts out: the plan may lower it.
@@ -50,9 +66,10 @@ class PieceKeys : public virtual YamlKeys {
 
 class PieceKind;
 
-/// Sets the values of a piece from its map. Throws ConfigError with remedy, file, line and key.
-void read_keys(PieceKind& kind, const YamlMap& map);
-/// ", key: value" for each key, as `read_keys` reads it back exactly.
+/// Reads the keys that `visit` visits from a map without finish(). Throws ConfigError with remedy, file, line
+/// and key.
+void read_piece_keys(const YamlMap& map, const PieceKeys::VisitPiece& visit);
+/// ", key: value" for each key, as it is read back exactly.
 std::string keys_text(const PieceKind& kind);
 
 /// A voltage among the keys of a piece.
@@ -71,5 +88,7 @@ void refuse_voltages_above(double limit_v, const PieceKind& kind, const YamlMap&
 
 /// Names folders: lower-case letters, digits, '-' and '_'.
 bool is_plain_name(const std::string& name, std::size_t longest);
+/// The same as a regular expression.
+std::string plain_name_pattern(std::size_t longest);
 
 }  // namespace upright

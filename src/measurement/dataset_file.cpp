@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "base/angle_units.hpp"
+#include "base/yaml_keys.hpp"
 #include "upright/base/yaml_reader.hpp"
 
 namespace upright {
@@ -60,63 +61,127 @@ std::string unit_names(std::string_view quantity) {
   return names;
 }
 
+/// What a unit may be written with besides its letters.
+constexpr std::string_view unit_decoration = "[]() \t\"";
+
+/// A regular expression for the spellings of these names that `plain_unit` takes for one of them.
+std::string unit_pattern(const std::vector<std::string_view>& names) {
+  const std::string any_decoration = "[\\[\\]() \\t\"]*";
+  std::string pattern;
+  for (const std::string_view name : names) {
+    pattern += (pattern.empty() ? "^" : "|^") + any_decoration;
+    for (const char c : name) {
+      const char upper = static_cast<char>(std::toupper(static_cast<unsigned char>(c)));
+      pattern += upper == c ? std::string(1, c) : std::string{'[', c, upper, ']'};
+      if ((static_cast<unsigned char>(c) & 0x80) == 0) pattern += any_decoration;
+    }
+    pattern += any_decoration + "$";
+  }
+  return pattern;
+}
+
+std::vector<std::string_view> unit_names_of(std::string_view quantity) {
+  std::vector<std::string_view> names;
+  for (const Unit& known : units)
+    if (known.quantity == quantity) names.push_back(known.name);
+  return names;
+}
+
+bool has_counts(std::string_view quantity) {
+  return quantity == "cart_m" || quantity == "theta_rad";
+}
+
 /// SI units per encoder step, by the keys that rig files have for it.
-double factor_of_counts(const YamlMap& source, const std::string& name) {
-  if (name == "cart_m") return source.number("m_per_count", Range::positive());
-  if (name == "theta_rad")
-    return 2.0 * std::numbers::pi / source.number("counts_per_revolution", Range::positive());
-  source.fail("unit", "is counts, but " + name + " is not measured by an encoder",
-              "use one of " + unit_names(name));
+double factor_of_counts(YamlKeys& keys, const std::string& name) {
+  double value = 0.0;
+  if (name == "cart_m") {
+    keys.number("m_per_count", value, Range::positive());
+    return value;
+  }
+  keys.number("counts_per_revolution", value, Range::positive());
+  return 2.0 * std::numbers::pi / value;
 }
 
 /// The factor that `unit` stands for. Empty where there is no such key.
-std::optional<double> read_unit(const YamlMap& source, const std::string& name) {
-  if (!source.has("unit")) return std::nullopt;
-  if (source.has("scale"))
-    source.fail("unit", "stands beside scale, which says the same", "remove one of them");
-  const std::string unit = source.text("unit");
-  if (is_counts(unit)) return factor_of_counts(source, name);
-  const auto factor = factor_of_unit(name, unit);
-  if (!factor)
-    source.fail("unit", "'" + unit + "' is not known", "use one of " + unit_names(name) + ", or scale");
+std::optional<double> unit_key(YamlKeys& keys, const std::string& name) {
+  if (!keys.decides_by_presence("unit", false)) return std::nullopt;
+  keys.needs("unit", !keys.decides_by_presence("scale", false), "stands beside scale, which says the same",
+             "remove one of them");
+  std::string unit;
+  keys.text("unit", unit);
+  const std::vector<std::string_view> counts(count_words.begin(), count_words.end());
+  std::vector<std::string_view> names = unit_names_of(name);
+  if (has_counts(name)) names.insert(names.end(), counts.begin(), counts.end());
+  Admitted form;
+  form.pattern = unit_pattern(names);
+  const std::optional<double> factor = factor_of_unit(name, unit);
+  const bool counted = is_counts(unit);
+  keys.check_form("unit", !counted || has_counts(name), form,
+                  "is counts, but " + name + " is not measured by an encoder",
+                  "use one of " + unit_names(name));
+  if (has_counts(name) && keys.decides_by_pattern("unit", unit_pattern(counts), counted))
+    return factor_of_counts(keys, name);
+  keys.check("unit", factor.has_value(), "'" + unit + "' is not known",
+             "use one of " + unit_names(name) + ", or scale");
   return factor;
 }
 
-DatasetColumn read_column(const YamlMap& columns, const std::string& name) {
-  if (!columns.is_map(name)) return {columns.text(name), 1.0, 0.0, false};
-  const YamlMap source = columns.map(name);
-  const std::optional<double> unit = read_unit(source, name);
-  DatasetColumn column{source.text("column"), unit.value_or(source.number_or("scale", 1.0)),
-                       source.number_or("offset", 0.0), unit || source.has("scale")};
-  if (name != "time_s") column.delay_s = source.number_or("delay_s", 0.0, Range::not_negative());
-  if (name == "time_s") column.period_s = source.optional_number("period_s", Range::positive()).value_or(0.0);
-  if (name == "theta_rad") column.mirrored = source.flag_or("mirrored", false);
-  if (name == "theta_rad")
-    column.folded_every_rad =
-        source.optional_number("folded_every_rad", Range::positive()).value_or(column.folded_every_rad);
-  if (column.scale == 0.0)
-    source.fail("scale", "is 0, which makes the column zero", "give the factor from the column's unit to SI");
-  source.finish();
-  return column;
+void column_map_keys(YamlKeys& keys, const std::string& name, DatasetColumn& column) {
+  const std::optional<double> unit = unit_key(keys, name);
+  keys.text("column", column.column);
+  column.scaled = unit || keys.decides_by_presence("scale", false);
+  keys.number("scale", column.scale, Range::any(), 1.0);
+  column.scale = unit.value_or(column.scale);
+  keys.number("offset", column.offset, Range::any(), 0.0);
+  if (name == "time_s") {
+    std::optional<double> period_s;
+    keys.optional_number("period_s", period_s, Range::positive());
+    column.period_s = period_s.value_or(0.0);
+  } else {
+    keys.number("delay_s", column.delay_s, Range::not_negative(), 0.0);
+  }
+  if (name == "theta_rad") {
+    keys.flag("mirrored", column.mirrored);
+    keys.number("folded_every_rad", column.folded_every_rad, Range::positive(),
+                DatasetColumn{}.folded_every_rad);
+  }
+  keys.check_not_zero("scale", column.scale, "is 0, which makes the column zero",
+                      "give the factor from the column's unit to SI");
 }
 
-std::optional<char> read_delimiter(const YamlMap& map) {
-  if (!map.has("delimiter")) return std::nullopt;
-  const std::vector<std::string> names = {"comma", "semicolon", "tab", "space"};
-  constexpr std::string_view signs = ",;\t ";
-  const std::string name = map.choice("delimiter", names);
-  return signs[static_cast<std::size_t>(std::find(names.begin(), names.end(), name) - names.begin())];
+void column_keys(YamlKeys& columns, const std::string& name, DatasetColumn& column) {
+  if (columns.is_map(name.c_str(), false))
+    columns.map(name.c_str(), [&](YamlKeys& keys) { column_map_keys(keys, name, column); });
+  else
+    columns.text(name.c_str(), column.column);
 }
 
-std::optional<char> read_decimal(const YamlMap& map) {
-  if (!map.has("decimal")) return std::nullopt;
-  return map.choice("decimal", {"point", "comma"}) == "comma" ? ',' : '.';
+void columns_keys(YamlKeys& columns, Dataset& dataset) {
+  for (const std::string_view quantity : measured_quantities) {
+    const std::string name(quantity);
+    if (columns.given(name.c_str(), false)) column_keys(columns, name, dataset.columns[name]);
+  }
+  columns.require_any({"time_s"});
 }
 
-MissingCells read_missing(const YamlMap& map) {
-  if (!map.has("missing")) return MissingCells::gap;
-  const std::string name = map.choice("missing", {"gap", "skip", "stop"});
-  return name == "gap" ? MissingCells::gap : name == "skip" ? MissingCells::skip : MissingCells::stop;
+void format_keys(YamlKeys& keys, CsvFormat& format) {
+  constexpr Words<4> delimiters = {"comma", "semicolon", "tab", "space"};
+  constexpr Words<2> decimals = {"point", "comma"};
+  keys.flag("header", format.header, true);
+  if (keys.decides_by_presence("delimiter", false)) {
+    std::size_t sign = 0;
+    keys.one_of("delimiter", sign, delimiters);
+    format.delimiter = std::string_view(",;\t ")[sign];
+  } else {
+    format.delimiter.reset();
+  }
+  if (keys.decides_by_presence("decimal", false)) {
+    bool is_comma = false;
+    keys.one_of("decimal", is_comma, decimals);
+    format.decimal = is_comma ? ',' : '.';
+    keys.needs("decimal", !is_comma || format.delimiter != ',', "is a comma, as is the delimiter",
+               "export the file with semicolons");
+  }
 }
 
 /// A column's name as YAML reads it back.
@@ -147,33 +212,30 @@ Dataset read_dataset_file(const fs::path& file) {
   return dataset;
 }
 
+void dataset_keys(YamlKeys& document, Dataset& dataset) {
+  constexpr Words<3> missing = {"gap", "skip", "stop"};
+  document.map("dataset", [&](YamlKeys& keys) {
+    keys.path("file", dataset.file);
+    format_keys(keys, dataset.format);
+    keys.one_of("missing", dataset.missing, missing, MissingCells::gap);
+    keys.flag("cart_locked", dataset.cart_locked);
+    keys.optional_number("from_s", dataset.from_s, Range::any());
+    keys.optional_number("to_s", dataset.to_s, Range::any());
+    keys.map("columns", [&](YamlKeys& columns) { columns_keys(columns, dataset); });
+    keys.usual_map("resolution", [&](YamlKeys& resolution) {
+      resolution.optional_number("cart_m", dataset.cart_resolution_m, Range::positive());
+      resolution.optional_number("theta_rad", dataset.theta_resolution_rad, Range::positive());
+    });
+    if (const YamlMap* map = keys.source()) map->finish();
+    keys.check("columns", dataset.columns.contains("time_s"), "does not contain time_s",
+               "map time_s to the column with the time");
+  });
+}
+
 Dataset read_dataset(const YamlMap& document) {
-  const YamlMap map = document.map("dataset");
   Dataset dataset;
-  dataset.file = map.path("file");
-  dataset.format.header = map.flag_or("header", true);
-  dataset.format.delimiter = read_delimiter(map);
-  dataset.format.decimal = read_decimal(map);
-  if (dataset.format.delimiter == ',' && dataset.format.decimal == ',')
-    map.fail("decimal", "is a comma, as is the delimiter", "export the file with semicolons");
-  dataset.missing = read_missing(map);
-  dataset.cart_locked = map.flag_or("cart_locked", false);
-  dataset.from_s = map.optional_number("from_s");
-  dataset.to_s = map.optional_number("to_s");
-  const YamlMap columns = map.map("columns");
-  for (const std::string_view quantity : measured_quantities) {
-    const std::string name(quantity);
-    if (columns.has(name)) dataset.columns[name] = read_column(columns, name);
-  }
-  columns.finish();
-  if (const auto resolution = map.optional_map("resolution")) {
-    dataset.cart_resolution_m = resolution->optional_number("cart_m", Range::positive());
-    dataset.theta_resolution_rad = resolution->optional_number("theta_rad", Range::positive());
-    resolution->finish();
-  }
-  map.finish();
-  if (!dataset.columns.contains("time_s"))
-    map.fail("columns", "does not contain time_s", "map time_s to the column with the time");
+  YamlKeyReader reader(document);
+  dataset_keys(reader, dataset);
   return dataset;
 }
 
@@ -195,7 +257,7 @@ namespace {
 std::string plain_unit(std::string_view unit) {
   std::string name;
   for (const char c : unit)
-    if (std::string_view("[]() \t\"").find(c) == std::string_view::npos)
+    if (unit_decoration.find(c) == std::string_view::npos)
       name += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
   return name;
 }

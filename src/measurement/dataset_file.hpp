@@ -14,6 +14,7 @@
 
 namespace upright {
 
+class YamlKeys;
 class YamlMap;
 
 /// The quantities of a measurement, with their column names in a CSV file without a dataset file.
@@ -52,6 +53,8 @@ struct Dataset {
 /// Throws ConfigError with file, line and key.
 Dataset read_dataset_file(const std::filesystem::path& file);
 Dataset read_dataset(const YamlMap& document);
+/// Visits the keys of the whole file, for the reader and the schema.
+void dataset_keys(YamlKeys& document, Dataset& dataset);
 
 /// A CSV whose columns have the names of the quantities.
 Dataset plain_dataset(const std::filesystem::path& csv);

@@ -18,6 +18,8 @@ namespace upright {
 /// identical bits on all machines.
 enum class SweepEngine : std::uint8_t { fast, reproducible, reference };
 
+class YamlKeys;
+
 /// A sweep file (docs/reference/files.md), including the files that it names.
 struct SweepConfig {
   LoopSetup setup;
@@ -30,6 +32,9 @@ struct SweepConfig {
   /// The sweep with the contents of all files that it names: exactly the inputs on which results depend.
   std::string resolved_text;
 };
+
+/// Visits the keys of the whole file without the files that it names, for the schema.
+void sweep_keys(YamlKeys& document, SweepConfig& config);
 
 /// Reads a sweep file. Throws ConfigError with remedy, file, line and key.
 SweepConfig read_sweep_file(const std::filesystem::path& file);

@@ -1,4 +1,4 @@
-// `upright new`: what it writes is what `check` accepts.
+// `upright new`: what it writes is what `check` accepts. `upright schema`, of which it names the file.
 #include <gtest/gtest.h>
 
 #include "command.hpp"
@@ -52,6 +52,35 @@ TEST(New, WritesARigOfEveryBackendThatItOffers) {
   const CommandResult unknown = write_new(folder, "rig --out other.yaml", "abacus\\n");
   EXPECT_EQ(unknown.exit_code, 2);
   EXPECT_NE(unknown.err.find("no template for 'rig abacus'"), std::string::npos) << unknown.err;
+}
+
+TEST(New, NamesTheSchemaWhereItIsInstalled) {
+  const TemporaryFolder folder;
+  const std::filesystem::path program = folder.path() / "bin/upright",
+                              schema = folder.path() / "share/upright/config/schema/gains.json";
+  std::filesystem::create_directories(program.parent_path());
+  std::filesystem::create_directories(schema.parent_path());
+  std::filesystem::copy_file(UPRIGHT_BINARY, program);
+  ASSERT_EQ(run_upright("schema gains --out " + schema.string()).exit_code, 0);
+  const CommandResult result =
+      run_shell("cd " + shell_quoted(folder.path().string()) + " && bin/upright new gains < /dev/null");
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  const std::string line = "# yaml-language-server: $schema=" + schema.string() + "\n";
+  EXPECT_EQ(text_of(folder, "gains.yaml").substr(0, line.size()), line);
+  // No schema is installed for plants here.
+  run_shell("cd " + shell_quoted(folder.path().string()) + " && bin/upright new plant < /dev/null");
+  EXPECT_EQ(text_of(folder, "plant.yaml").find("$schema"), std::string::npos);
+}
+
+TEST(Schema, WritesWhatItPrints) {
+  const TemporaryFolder folder;
+  const CommandResult printed = run_upright("schema gains");
+  EXPECT_EQ(printed.exit_code, 0) << printed.err;
+  const std::filesystem::path file = folder.path() / "gains.json";
+  EXPECT_EQ(run_upright("schema gains --out " + file.string()).exit_code, 0);
+  EXPECT_EQ(read_text(file), printed.out);
+  EXPECT_EQ(run_upright("schema gains --out /nowhere/gains.json").exit_code, 2);
+  EXPECT_EQ(run_upright("schema colours").exit_code, 2);
 }
 
 TEST(New, TakesAnswersAndAsksAgainForWhatIsNone) {

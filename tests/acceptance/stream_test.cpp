@@ -1,4 +1,5 @@
-// `upright run --stream` with a receiver that knows nothing of upright (udp_receiver.py).
+// `upright run --stream` and `upright experiment --stream` with a receiver that knows nothing of upright
+// (udp_receiver.py).
 #include <gtest/gtest.h>
 
 #include <chrono>
@@ -47,14 +48,20 @@ std::string wait_for_text(const fs::path& file) {
   return read_text(file);
 }
 
-TEST(Stream, SendsEveryRowAsTheLogHasIt) {
-  const TemporaryFolder folder;
-  const fs::path port = folder.path() / "port", received = folder.path() / "received";
-  std::thread receiver([&] {
+/// A receiver that writes what it gets to a file, and its port.
+std::pair<std::thread, std::string> start_receiver(const TemporaryFolder& folder, const fs::path& received) {
+  const fs::path port = folder.path() / "port";
+  std::thread receiver([port, received] {
     run_shell("python3 " + shell_quoted(UPRIGHT_SOURCE_DIR "/tests/acceptance/udp_receiver.py") + " " +
               shell_quoted(port.string()) + " " + shell_quoted(received.string()));
   });
-  const std::string number = wait_for_text(port);
+  return {std::move(receiver), wait_for_text(port)};
+}
+
+TEST(Stream, SendsEveryRowAsTheLogHasIt) {
+  const TemporaryFolder folder;
+  const fs::path received = folder.path() / "received";
+  auto [receiver, number] = start_receiver(folder, received);
   const CommandResult result = run_upright(begin_of_run + "--duration 2 --json --out " +
                                            folder.path().string() + " --stream udp://127.0.0.1:" + number);
   receiver.join();
@@ -75,6 +82,30 @@ TEST(Stream, SendsEveryRowAsTheLogHasIt) {
     for (const auto& [name, cell] : row)
       EXPECT_EQ(one.at(name).get<double>(), std::strtod(cell.c_str(), nullptr)) << name << " " << cell;
   }
+  EXPECT_EQ(count, rows.size());
+}
+
+TEST(Stream, SendsTheRowsOfAnExperiment) {
+  const TemporaryFolder folder;
+  const fs::path received = folder.path() / "received";
+  auto [receiver, number] = start_receiver(folder, received);
+  std::ofstream(folder.path() / "look.yaml")
+      << "experiment:\n  name: look\n  why: A test of the stream.\n  sample_rate_hz: 100\n"
+         "  travel_m: 0.3\n  voltage_limit_v: 5\n  pieces:\n    - {kind: observe, duration_s: 1}\n";
+  const CommandResult result =
+      run_upright("experiment " + (folder.path() / "look.yaml").string() +
+                  " --rig " UPRIGHT_SOURCE_DIR "/config/rigs/simulated.yaml --ready --json --out " +
+                  (folder.path() / "out").string() + " --stream udp://127.0.0.1:" + number);
+  receiver.join();
+  const Json document = Json::parse(result.out);
+  const fs::path run = document.at("trials").at(0).at("run_directory").get<std::string>();
+  const auto rows = rows_of(run / "samples.csv");
+  ASSERT_GT(rows.size(), 0u) << result.err;
+  EXPECT_EQ(document.at("stream").at("rows_sent"), rows.size());
+  std::ifstream in(received);
+  std::size_t count = 0;
+  for (std::string line; std::getline(in, line); ++count)
+    EXPECT_EQ(rows.count(Json::parse(line).at("tick").get<std::uint64_t>()), 1u);
   EXPECT_EQ(count, rows.size());
 }
 

@@ -15,7 +15,7 @@ class ClosedLoop final : public PieceOf<ClosedLoop, Balancing> {
   static constexpr const char* kind = "closed_loop";
 
   void keys(PieceKeys& keys) override {
-    keys.numbers("set_points_m", set_points_m_, Range::within(-longest_travel_m, longest_travel_m));
+    keys.list("set_points_m", set_points_m_, Range::within(-longest_travel_m, longest_travel_m));
     keys.number("hold_s", hold_s_, any_duration, required);
     keys.number("delay_s", delay_s_, any_delay, 0.0);
     keys.controllers("gains", controllers_);

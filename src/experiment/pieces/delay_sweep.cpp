@@ -59,9 +59,9 @@ void DelaySweep::keys(PieceKeys& keys) {
   keys.number("duration_s", duration_s, any_duration, required);
   keys.integer("repeats", repeats, 1, 100, 1);
   keys.number("bisect_to_s", bisect_to_s, Range::within(0.0, 1.0), 0.0);
-  keys.check("bisect_to_s", bisect_to_s <= 0.0 || bisect_to_s >= finest_bisection_s,
-             "is " + exact_text(bisect_to_s) + ", which is too fine",
-             "set it to 0 or to at least " + exact_text(finest_bisection_s));
+  keys.check_min("bisect_to_s", bisect_to_s, finest_bisection_s, true,
+                 "is " + exact_text(bisect_to_s) + ", which is too fine",
+                 "set it to 0 or to at least " + exact_text(finest_bisection_s));
   keys.number("stable_below_rad", stable_below_rad, Range{0.0, 1.0, true}, 0.0061);
   start_key(keys);
   keys.angle("theta0_deg", theta0_rad, release_deg, usual_release_deg);
