@@ -120,7 +120,7 @@ ELSEWHERE = (
     (r"scripts/test\.sh( ci)?", ".ci/run, step 'tests'", ".ci/run", "scripts/test.sh ci"),
     (r"ctest (--preset ci )?-L \w+", ".ci/run, step 'tests': all labels", "scripts/test.sh", 'ctest --preset "$preset"'),
     (r"scripts/install-deps\.sh( --dev)?", ".ci/run, step 'packages'", ".ci/run", "scripts/install-deps.sh --dev"),
-    (r"scripts/check_(includes|docs|keys|prose)\.py", ".ci/run", ".ci/run", r"scripts/check_\1.py"),
+    (r"scripts/check_(includes|sizes|docs|keys|prose)\.py", ".ci/run", ".ci/run", r"scripts/check_\1.py"),
     (r"scripts/check_includes\.py --write", "check_includes_test", "tests/unit/check_includes_test.py", "--write"),
     (r"scripts/check_commands\.py --upright PROGRAM PAGE\.\.\.", "tutorial_test", "tests/CMakeLists.txt",
      "scripts/check_commands.py"),

@@ -248,7 +248,7 @@ TEST(RealtimeSafety, TheQuanserRigNeitherAllocatesNorLocks) {
   expect_safe_on_card(test::fake_card_rig());
 }
 
-TEST(RealtimeSafety, TheQuanserRigNeitherAllocatesNorLocks) {
+TEST(RealtimeSafety, TheCardsClockNeitherAllocatesNorLocks) {
   expect_safe_on_card(test::on_the_cards_clock(test::fake_card_rig()));
 }
 
