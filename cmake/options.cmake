@@ -104,6 +104,7 @@ endfunction()
 function(upright_own_object name)
   cmake_parse_arguments(arg "" "INTO;ARCH" "SOURCES;OPTIONS;LINK;UNSANITIZED" ${ARGN})
   add_library(${name} OBJECT ${arg_SOURCES})
+  upright_optimise(${name} 3)
   target_include_directories(${name} PRIVATE ${extra_folder} ${PROJECT_SOURCE_DIR}/include ${PROJECT_SOURCE_DIR}/src ${PROJECT_SOURCE_DIR})
   # A target of its own, and the last one: then these options win over those before.
   add_library(${name}_options INTERFACE)

@@ -13,8 +13,7 @@ import sys
 import xml.etree.ElementTree
 
 # The budgets for one run of all tests, with .ci/run or scripts/test.sh.
-# Of about 250 test cases in real time, whole runs had 2 retries on an idle machine and 6 on one that also compiled, and
-# no skip because of a stall.
+# Of about 250 test cases in real time, two whole runs had 2 and 6 retries, and no skip because of a stall.
 MAX_RETRIES = 12        # with more, the machine is too busy for valid results
 MAX_STALLED_SKIPS = 1   # a skipped test has tested nothing
 # Tests whose requirements may be missing; the output of each says what to install. Measured data (1), a second variant

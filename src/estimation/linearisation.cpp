@@ -361,6 +361,7 @@ void linearise_segment(const FitData& data, std::size_t s, const FitPoint& point
   const std::size_t slots = free.size() + state_count;
   if (slots <= 8) return with.template operator()<8>();
   if (slots <= 16) return with.template operator()<16>();
+  if (slots <= 24) return with.template operator()<24>();
   return with.template operator()<32>();
 }
 
