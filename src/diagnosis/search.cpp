@@ -43,6 +43,12 @@ GaussianPrior posterior_of(const Hypothesis& h) {
   return belief_of(mean, h.train.covariance, min_sigma);
 }
 
+/// Of a symmetric positive semidefinite matrix; each zero among its pivots counts as 1e-300.
+double log_determinant(const Eigen::MatrixXd& information) {
+  if (information.size() == 0) return 0.0;
+  return symmetric_pivots(information).array().abs().max(1e-300).log().sum();
+}
+
 /// Mean over its standard error.
 double t_of(const std::vector<double>& values) {
   if (values.size() < 2) return 0.0;

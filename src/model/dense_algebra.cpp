@@ -7,6 +7,7 @@ namespace upright {
 
 using Eigen::MatrixXcd;
 using Eigen::MatrixXd;
+using Eigen::VectorXd;
 
 Eigen::VectorXcd eigenvalues(const MatrixXd& matrix) {
   return matrix.eigenvalues();
@@ -39,9 +40,8 @@ MatrixXd solve_symmetric(const MatrixXd& a, const MatrixXd& b) {
   return a.ldlt().solve(b);
 }
 
-double log_determinant(const MatrixXd& matrix) {
-  if (matrix.size() == 0) return 0.0;
-  return matrix.ldlt().vectorD().array().abs().max(1e-300).log().sum();
+VectorXd symmetric_pivots(const MatrixXd& matrix) {
+  return matrix.ldlt().vectorD();
 }
 
 MatrixXd completed_basis(const MatrixXd& columns) {

@@ -33,9 +33,8 @@ Eigen::VectorXcd solve(const Eigen::MatrixXcd& a, const Eigen::VectorXcd& b);
 /// Solution x of a x = b for a symmetric n x n matrix that is positive or negative semidefinite.
 Eigen::MatrixXd solve_symmetric(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b);
 
-/// Logarithm of the determinant of a symmetric positive semidefinite n x n matrix; each zero among its
-/// factors counts as 1e-300.
-double log_determinant(const Eigen::MatrixXd& matrix);
+/// The n diagonal entries of D in P'LDL'P = a symmetric n x n matrix; their product is its determinant.
+Eigen::VectorXd symmetric_pivots(const Eigen::MatrixXd& matrix);
 
 /// An orthonormal basis of the whole space, n x n. Its first r columns span the range of `columns` (n x
 /// r, rank r).
