@@ -74,8 +74,6 @@ echo "schemas of files"
 for kind in rig gains plant sweep experiment dataset; do
   as_user "upright schema $kind | cmp - $share/schema/$kind.json" || fail "the package has another schema of $kind files than its program"
 done
-as_user "upright new plant --out my-plant.yaml </dev/null && grep -q 'schema=$share/schema/plant.json' my-plant.yaml" ||
-  fail "'upright new' names no schema of the package"
 
 echo "limits, manual, completion"
 if (ulimit -r 90) 2>/dev/null; then
