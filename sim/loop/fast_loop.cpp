@@ -182,20 +182,19 @@ void run_sampled(const LoopSetup& setup, const Dynamics<Lanes>& chain, Period& p
   for (std::size_t i = 0; i < lane_count; ++i) theta0[i] = cases[std::min(i, cases.size() - 1)].theta0_rad;
   state.theta_rad = Lanes::load(theta0.data());
   const Lanes limit(setup.amplifier_limit_v);
-  Lanes command(0.0);
+  Lanes feedback(0.0), command(0.0);
   const auto ticks = static_cast<std::size_t>(std::llround(setup.duration_s * setup.control.sample_rate_hz));
   for (std::size_t tick = 0; tick < ticks; ++tick) {
     seen.take(static_cast<double>(tick) * period_s, state);
     if (seen.all_fell()) break;
     const Outputs<Lanes> shown = chain.measure(state);
     if (tick == 0) {
-      observer.start(shown);
-      delay.start(observer.first_feedback());
+      feedback = observer.start(shown);
+      delay.start(feedback);
     } else {
-      observer.take(shown, command);
+      feedback = observer.take(shown, command);
     }
-    const Lanes delayed = delay.pass(tick, tick == 0 ? observer.first_feedback() : observer.feedback());
-    command = smaller(larger(observer.command_v(delayed), -limit), limit);
+    command = smaller(larger(observer.command_v(delay.pass(tick, feedback)), -limit), limit);
     state.motor_v = chain.actuate(command);
     period.advance(state, command, state.motor_v, period_s);
   }

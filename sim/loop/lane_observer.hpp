@@ -119,22 +119,22 @@ class LaneObserver {
     if (estimator) filter_.emplace(*estimator);
   }
 
-  void start(const Outputs<Lanes>& shown) {
+  /// The feedback at the start, before the first period.
+  Lanes start(const Outputs<Lanes>& shown) {
     cart_.start(shown.cart_m);
     pendulum_.start(shown.theta_rad);
     if (filter_) filter_->start(cart_, pendulum_);
-  }
-  /// At the start, before the first period.
-  Lanes first_feedback() const {
     return filter_ ? sensed_feedback() + filter_->resting_v() : sensed_feedback();
   }
-  /// `applied_v`: the voltage commanded over the period that just ended, after the amplifier's limit.
-  void take(const Outputs<Lanes>& shown, const Lanes& applied_v) {
+  /// The feedback after a period. `applied_v`: the voltage commanded over the period that just ended, after
+  /// the amplifier's limit.
+  Lanes take(const Outputs<Lanes>& shown, const Lanes& applied_v) {
     cart_.take(shown.cart_m);
     pendulum_.take(shown.theta_rad);
-    if (filter_) filter_->take(cart_, pendulum_, applied_v);
+    if (!filter_) return sensed_feedback();
+    filter_->take(cart_, pendulum_, applied_v);
+    return filter_->feedback(gains_);
   }
-  Lanes feedback() const { return filter_ ? filter_->feedback(gains_) : sensed_feedback(); }
   /// The command for a feedback, delayed or not.
   Lanes command_v(const Lanes& feedback_v) const {
     return filter_ ? filter_->command_v(feedback_v) : feedback_v;

@@ -54,6 +54,29 @@ class MarginSearch {
     return repeated_search(with_reserve(first));
   }
 
+  ControlConfig config_of(const Factors& factors) const {
+    ControlConfig config = start_;
+    Gains& k = config.gains;
+    k.cart_position_v_per_m *= std::exp(factors[0]);
+    k.pendulum_angle_v_per_rad *= std::exp(factors[1]);
+    k.cart_velocity_v_per_mps *= std::exp(factors[2]);
+    k.pendulum_rate_v_per_radps *= std::exp(factors[3]);
+    if (estimates()) *config.state_estimator.cart_force_noise_n2_per_s *= std::exp(factors[4]);
+    return config;
+  }
+  const GainCost& cost() const { return cost_; }
+  double critical_of(const ControlConfig& config) const {
+    const LoopMargin margin = sampled_margin(plant_, config, request_.smoothing, false);
+    return margin.stable_without_delay ? margin.critical_delay_s : 0.0;
+  }
+
+ private:
+  struct Evaluation {
+    double critical_s = 0.0;
+    double reserve_s = 0.0;    ///< of unmodelled delay; negative where the loop is unstable
+    double excess_loss = 0.0;  ///< of the cost, beyond the allowed one
+  };
+
   /// `factors` with as much less force noise as the reserve of unmodelled delay needs.
   Factors with_reserve(Factors factors) {
     constexpr int max_halvings = 12;
@@ -84,7 +107,7 @@ class MarginSearch {
         this);
     search.add_inequality_constraint(
         [](const Factors& factors, Factors&, void* self) {
-          return static_cast<MarginSearch*>(self)->excess_loss(factors);
+          return static_cast<MarginSearch*>(self)->evaluate(factors).excess_loss;
         },
         this);
     if (estimates())
@@ -100,35 +123,9 @@ class MarginSearch {
     }
   }
 
-  ControlConfig config_of(const Factors& factors) const {
-    ControlConfig config = start_;
-    Gains& k = config.gains;
-    k.cart_position_v_per_m *= std::exp(factors[0]);
-    k.pendulum_angle_v_per_rad *= std::exp(factors[1]);
-    k.cart_velocity_v_per_mps *= std::exp(factors[2]);
-    k.pendulum_rate_v_per_radps *= std::exp(factors[3]);
-    if (estimates()) *config.state_estimator.cart_force_noise_n2_per_s *= std::exp(factors[4]);
-    return config;
-  }
-  const GainCost& cost() const { return cost_; }
-  double critical_of(const ControlConfig& config) const {
-    const LoopMargin margin = sampled_margin(plant_, config, request_.smoothing, false);
-    return margin.stable_without_delay ? margin.critical_delay_s : 0.0;
-  }
-
- private:
-  struct Evaluation {
-    double critical_s = 0.0;
-    double reserve_s = 0.0;  ///< of unmodelled delay; negative where the loop is unstable
-  };
-
   bool estimates() const { return start_.has_state_estimator(); }
   std::size_t variables() const { return estimates() ? 5 : 4; }
 
-  double excess_loss(const Factors& factors) const {
-    constexpr double far = 1e3;  // in the place of infinite, which the linear models of COBYLA cannot take
-    return std::min(cost_.loss(gain_values(config_of(factors))), far) - request_.cost_loss;
-  }
   double missing_reserve_s(const Factors& factors) {
     return request_.unmodelled_s - evaluate(factors).reserve_s;
   }
@@ -144,7 +141,9 @@ class MarginSearch {
           sampled_margin(plant_, config, request_.smoothing, false, ExtraDelay::unmodelled);
       found_.reserve_s = margin.stable_without_delay ? margin.critical_delay_s - config.delay_s : 0.0;
     }
-    const bool allowed = excess_loss(factors) <= 0.0 && found_.reserve_s >= request_.unmodelled_s;
+    constexpr double far = 1e3;  // in the place of infinite, which the linear models of COBYLA cannot take
+    found_.excess_loss = std::min(cost_.loss(gain_values(config)), far) - request_.cost_loss;
+    const bool allowed = found_.excess_loss <= 0.0 && found_.reserve_s >= request_.unmodelled_s;
     if (allowed && found_.critical_s > largest_s_) {
       largest_s_ = found_.critical_s;
       best_ = factors;

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <map>
+#include <set>
 
 #include "control/gain_keys.hpp"
 #include "experiment/experiment_file.hpp"
@@ -48,24 +49,20 @@ class SharedParts {
     auto [known, is_new] = names_.try_emplace(text, "");
     if (is_new) {
       known->second = free_name(name_);
-      const std::string name = known->second;
       replace_inside(part);
-      definitions_[name] = part;
-      part = {{"$ref", "#/definitions/" + name}};
-      return;
+      definitions_[known->second] = part;
     }
     part = {{"$ref", "#/definitions/" + known->second}};
   }
   std::string free_name(const std::string& wanted) {
     std::string name = wanted;
-    for (int i = 2; taken_.count(name) > 0; ++i) name = wanted + "-" + std::to_string(i);
-    taken_[name] = true;
+    for (int i = 2; !taken_.insert(name).second; ++i) name = wanted + "-" + std::to_string(i);
     return name;
   }
 
   std::map<std::string, int> counts_;
   std::map<std::string, std::string> names_;
-  std::map<std::string, bool> taken_;
+  std::set<std::string> taken_;
   std::string name_ = "part";  ///< the key above
   Json definitions_;
 };
