@@ -4,8 +4,9 @@
 #include "clock.h"
 #include "encoders.h"
 #include "motor.h"
+#include "sampling.h"
 
-#define VERSION 0x0100
+#define VERSION 0x0101
 #define DEFAULT_WATCHDOG_MS 100
 #define LONGEST_WATCHDOG_MS 10000
 #define STOP_INPUTS (STATUS_EMERGENCY_STOP | STATUS_PLUS_SWITCH | STATUS_MINUS_SWITCH)
@@ -46,8 +47,14 @@ static bool within(uint16_t first, uint16_t count, uint16_t begin, uint16_t end)
 
 exception_t registers_readable(uint16_t first, uint16_t count) {
   if (within(first, count, REGISTER_VOLTAGE, WRITABLE_END)) return NO_EXCEPTION;
-  if (!within(first, count, REGISTER_CART, READABLE_END)) return ILLEGAL_ADDRESS;
+  const uint16_t end = sampling_period_us() != 0 ? READABLE_END : REGISTER_SAMPLE;
+  if (!within(first, count, REGISTER_CART, end)) return ILLEGAL_ADDRESS;
   return first < REGISTER_BOOT_COUNT && encoders_lost_edges() ? DEVICE_FAILURE : NO_EXCEPTION;
+}
+
+bool registers_wait(uint16_t first, uint16_t count) {
+  return registers_readable(first, count) == NO_EXCEPTION && first <= REGISTER_SAMPLE &&
+         first + count > REGISTER_SAMPLE;
 }
 
 static uint16_t word_at(const uint8_t *bytes) {
@@ -60,6 +67,7 @@ exception_t registers_writable(uint16_t first, uint16_t count, const uint8_t *by
     const uint16_t word = word_at(bytes + 2 * i);
     if (first + i == REGISTER_ENABLE && word > 1) return ILLEGAL_VALUE;
     if (first + i == REGISTER_WATCHDOG && (word == 0 || word > LONGEST_WATCHDOG_MS)) return ILLEGAL_VALUE;
+    if (first + i == REGISTER_SAMPLE_PERIOD && word != 0 && word < SHORTEST_SAMPLE_PERIOD_US) return ILLEGAL_VALUE;
   }
   return NO_EXCEPTION;
 }
@@ -84,12 +92,16 @@ uint16_t registers_read(uint16_t address) {
       return SUPPLY_MV;
     case REGISTER_VERSION:
       return VERSION;
+    case REGISTER_SAMPLE:
+      return sampling_number();
     case REGISTER_VOLTAGE:
       return (uint16_t)voltage_mv;
     case REGISTER_ENABLE:
       return enabled;
     case REGISTER_WATCHDOG:
       return watchdog_ms;
+    case REGISTER_SAMPLE_PERIOD:
+      return sampling_period_us();
   }
   return 0;
 }
@@ -118,6 +130,7 @@ void registers_write(uint16_t first, uint16_t count, const uint8_t *bytes) {
     if (first + i == REGISTER_VOLTAGE) voltage_mv = (int16_t)word;
     if (first + i == REGISTER_ENABLE) set_enabled(word);
     if (first + i == REGISTER_WATCHDOG) watchdog_ms = word;
+    if (first + i == REGISTER_SAMPLE_PERIOD) sampling_set_period(word);
   }
   drive();
 }

@@ -45,7 +45,7 @@ void QuanserTransport::open_card() {
 
 DeviceSample QuanserTransport::wait_next(std::int64_t until_ns) noexcept {
   if (!sampler_) return {};
-  const DeviceSample next = sampler_->wait_for_another(sample_waited_for_, until_ns).when;
+  const DeviceSample next = sampler_->samples().wait_for_another(sample_waited_for_, until_ns).when;
   sample_waited_for_ = next.number;
   return next;
 }
@@ -78,10 +78,10 @@ RigReading QuanserTransport::read_now() noexcept {
 
 RigReading QuanserTransport::read_sample() noexcept {
   RigReading reading;
-  const CardSample sample = sampler_->latest();
+  const RingSample sample = sampler_->samples().latest();
   reading.time_ns = sample.when.time_ns;
-  if (sample.error < 0) {
-    reading.fault = has_expired() ? RigFault::watchdog_expired : fault_of(sample.error);
+  if (sample.trouble != 0) {
+    reading.fault = has_expired() ? RigFault::watchdog_expired : fault_of(sample.trouble);
     return reading;
   }
   if (sample.when.number == sample_read_) {
@@ -89,7 +89,7 @@ RigReading QuanserTransport::read_sample() noexcept {
     return reading;
   }
   sample_read_ = sample.when.number;
-  return fresh(reading, sample.counts);
+  return fresh(reading, {static_cast<std::int32_t>(sample.cart), static_cast<std::int32_t>(sample.pendulum)});
 }
 
 RigReading QuanserTransport::fresh(RigReading reading, const RawCounts& counts) noexcept {
