@@ -5,6 +5,7 @@ export USER=${USER:-$(id -un)}
 
 # serve COMMAND...: starts a server and waits until it listens.
 serve() {
+  : >"$bench/server.out"  # what the previous server said
   "$@" >"$bench/server.out" 2>"$bench/server.err" </dev/null &
   local server=$!
   echo "$server" >>"$bench/servers"
