@@ -63,12 +63,14 @@ tcp_device() {
 }
 
 # board_device ANGLE HANG_S: the same map as a board on a serial line; ANGLE and HANG_S as for tcp_device.
-# my-rig.yaml is config/rigs/board.yaml with the response timeout that the page asks for.
+# my-rig.yaml is config/rigs/board.yaml with the response timeout that the page asks for; its watchdog leaves time to a busy
+# machine.
 board_device() {
   end_servers
   copy_rig board
   echo 'simulated: {plant: config/plants/exponential.yaml, initial: {cart_m: 0.0, theta_rad: 3.14159}}' >>my-rig.yaml
-  sed -i "s#/dev/ttyACM0#$bench/line#; s/response_timeout_s: .*/response_timeout_s: 0.008/" my-rig.yaml
+  sed -i "s#/dev/ttyACM0#$bench/line#; s/response_timeout_s: .*/response_timeout_s: 0.008/;
+    s/^watchdog_s: .*/watchdog_s: 0.5/" my-rig.yaml
   serve upright virtual-rig --rig my-rig.yaml --rtu "$bench/line" --theta0-deg "$1" --hang "$2" --no-pace
 }
 
