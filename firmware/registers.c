@@ -17,9 +17,9 @@ static int16_t voltage_mv;
 static bool enabled;
 static uint16_t watchdog_ms;  // 0 after a reset: not set yet, so the default applies
 static uint32_t ticks_left;
-static uint8_t status;
-// Inputs that were active in every sample of this tick, and of the whole previous tick.
-static uint8_t steady, steady_before;
+static uint8_t status;  // causes that remain until the motor is disabled, or until a reset
+// Inputs that were active in every sample of this tick, and of the whole previous tick; in both ticks.
+static uint8_t steady, steady_before, pressed;
 
 /// The active stop inputs, as status bits. A switch opens when pressed, and a pull-up then makes the line high.
 static uint8_t active_inputs(void) {
@@ -85,7 +85,7 @@ uint16_t registers_read(uint16_t address) {
     case REGISTER_BOOT_COUNT:
       return boot_count;
     case REGISTER_STATUS:
-      return status;
+      return status | pressed;
     case REGISTER_SEQUENCE:
       return sequence;
     case REGISTER_SUPPLY:
@@ -115,13 +115,13 @@ static void drive(void) {
   motor_enable(true);
 }
 
-/// Disabling clears the causes of a stop that are no longer present. Only a reset clears lost edges.
+/// Disabling clears the causes of a stop. Only a reset clears lost edges.
 static void set_enabled(uint16_t word) {
   if (word == 0) {
-    status &= (uint8_t)(active_inputs() | STATUS_EDGES_LOST);
+    status &= STATUS_EDGES_LOST;
     voltage_mv = 0;
   }
-  enabled = word != 0 && (status & (STOP_INPUTS | STATUS_EDGES_LOST)) == 0;
+  enabled = word != 0 && ((status | active_inputs()) & (STOP_INPUTS | STATUS_EDGES_LOST)) == 0;
 }
 
 void registers_write(uint16_t first, uint16_t count, const uint8_t *bytes) {
@@ -150,10 +150,11 @@ static void watch_inputs(uint8_t elapsed_ticks) {
   const uint8_t active = active_inputs();
   steady &= active;
   if (elapsed_ticks == 0) return;
-  const uint8_t pressed = steady & steady_before;
+  pressed = steady & steady_before;
   steady_before = steady;
   steady = active;
-  if (pressed) stop(pressed);
+  // While the motor is disabled the status shows what is pressed now, so that the switches can be tested.
+  if (pressed && enabled) stop(pressed);
 }
 
 static void watch_requests(uint8_t elapsed_ticks) {

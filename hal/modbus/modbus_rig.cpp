@@ -3,9 +3,12 @@
 #include <pthread.h>
 #include <sched.h>
 #include <time.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <cmath>
+#include <system_error>
 
 #include "hal/modbus_exception.hpp"
 #include "hal/reading_patience.hpp"
@@ -160,8 +163,23 @@ void ModbusTransport::require_register(int address, int counts, const std::strin
   if (back != counts) fail(RigFault::none, doing);
 }
 
+/// Throws DeviceError where the user cannot open the serial line at all, which no waiting helps.
+void ModbusTransport::require_line() const {
+  const std::string& line = rig_.modbus->device;
+  if (line.empty() || ::access(line.c_str(), R_OK | W_OK) == 0) return;
+  const int problem = errno;
+  throw DeviceError(
+      "the serial line " + line + " of " + rig_.file.string() + " cannot be opened (" +
+      std::error_code(problem, std::generic_category()).message() + "): " +
+      (problem == EACCES
+           ? "add yourself to the group that owns it (on Debian: sudo adduser $USER dialout), and "
+             "log in again"
+           : "connect the device, or set modbus.device to its line (ls /dev/ttyACM* /dev/ttyUSB*)"));
+}
+
 void ModbusTransport::open() {
   lock_.take(link_.name());
+  require_line();
   end_thread();
   stop_sequence_.reset(false, 0.0);
   if (const RigFault fault = link_.connect(open_patience_s); fault != RigFault::none)

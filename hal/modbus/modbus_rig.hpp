@@ -74,6 +74,7 @@ class ModbusTransport final : public Rig {
   [[noreturn]] void fail(RigFault fault, const std::string& doing);
   template <class Exchange>
   void retried(Exchange exchange, const std::string& doing);
+  void require_line() const;
   void prepare_device();
   void require_register(int address, int counts, const std::string& doing);
   void begin_serving();

@@ -92,7 +92,20 @@ RigReading QuanserTransport::read_sample() noexcept {
   return fresh(reading, {static_cast<std::int32_t>(sample.cart), static_cast<std::int32_t>(sample.pendulum)});
 }
 
+/// Those of now, where the file asks for them.
+RigFault QuanserTransport::add_velocities(RigReading& reading) noexcept {
+  if (!rig_.quanser->reads_velocities) return RigFault::none;
+  RawVelocities velocities;
+  const hil::Error error = card_->read_velocities(velocities);
+  if (error < 0) return fault_of(error);
+  if (rig_.quanser->cart_channel) reading.cart_counts_per_s = velocities.cart;
+  if (rig_.quanser->pendulum_channel) reading.pendulum_counts_per_s = velocities.pendulum;
+  return RigFault::none;
+}
+
 RigReading QuanserTransport::fresh(RigReading reading, const RawCounts& counts) noexcept {
+  reading.fault = add_velocities(reading);
+  if (reading.fault != RigFault::none) return reading;
   reading.cart_counts = signed_counts(counts.cart, rig_.calibration.cart.width_bits);
   reading.pendulum_counts = signed_counts(counts.pendulum, rig_.calibration.pendulum.width_bits);
   reading.sequence = ++sequence_;

@@ -255,6 +255,17 @@ TEST_P(Firmware, StopInputsTakeTheVoltageAwayAtOnceAndForGood) {
   EXPECT_NEAR(voltage_now(), 6.0, 2 * pwm_step_v);
 }
 
+TEST_P(Firmware, ShowsWhatIsPressedWhileTheMotorIsDisabled) {
+  board.press(StopInput::plus, true);
+  board.run_for(0.001);
+  EXPECT_EQ(read(status), plus_bit);
+  board.press(StopInput::plus, false);
+  board.run_for(0.001);
+  EXPECT_EQ(read(status), 0) << "a switch that is tested by hand need not be acknowledged";
+  drive(6.0);
+  EXPECT_NEAR(voltage_now(), 6.0, 2 * pwm_step_v);
+}
+
 TEST_P(Firmware, AnInputThatIsNotWiredIsPressed) {
   board.press(StopInput::minus, true);  // its pull-up makes it so
   board.brown_out();
@@ -276,7 +287,7 @@ TEST_P(Firmware, ASpikeOnAStopInputIsNoStop) {
 TEST_P(Firmware, SaysThatItLostEdgesAndGivesNoCountsAnyMore) {
   drive(6.0);
   const double begun_s = board.now_s();
-  board.turn_to(Encoder::cart, 4000, Board::hz / 400'000);
+  board.turn_to(Encoder::cart, 4000, Board::hz / 200'000);  // one or two edges between two samples
   board.run_for(0.02);
   EXPECT_LT(static_cast<double>(board.last_on()) / Board::hz, begun_s + 0.001);
   EXPECT_EQ(read(status), lost_bit);
