@@ -17,7 +17,7 @@ namespace {
 /// Above the loop's, so that the time of a sample is the time at which it came.
 constexpr int sampler_priority = 85;
 /// Of a task that was stopped while somebody waited for its sample.
-constexpr hil::Error stopped = -hil::interrupted;
+constexpr hil::Error task_stopped = -hil::interrupted;
 
 constexpr double measured_for_s = 0.5, min_periods = 5.0;
 constexpr int attempts_at_period = 3;  // a thread that is held up measures another period
@@ -64,7 +64,7 @@ void QuanserSampler::take_samples() noexcept {
     if (came > 0)
       publish(number, time_ns, counts);
     else
-      error_.store(came < 0 ? came : stopped, std::memory_order_release);
+      error_.store(came < 0 ? came : task_stopped, std::memory_order_release);
     arrived_.fetch_add(1, std::memory_order_release);
     wake_one(arrived_);
     if (came <= 0) return;
