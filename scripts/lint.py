@@ -23,8 +23,8 @@ def flags_of(command):
     words = shlex.split(command)[1:]
     flags, skip = [], False
     for word in words:
-        if skip or word in ("-o", "-c", "-MD"):
-            skip = not skip and word in ("-o", "-c")
+        if skip or word in ("-o", "-c", "-MD", "--param"):
+            skip = not skip and word in ("-o", "-c", "--param")
             continue
         if not FOREIGN.fullmatch(word):
             flags.append(word)

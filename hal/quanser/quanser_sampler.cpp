@@ -19,7 +19,7 @@ constexpr int sampler_priority = 85;
 /// Of a task that was stopped while somebody waited for its sample.
 constexpr hil::Error task_stopped = -hil::interrupted;
 
-constexpr double measured_for_s = 0.5, min_periods = 5.0;
+constexpr double measured_for_s = 0.5, min_measured_periods = 5.0;
 constexpr int attempts_at_period = 3;  // a thread that is held up measures another period
 constexpr double first_within_s = 1.0;
 /// Cards divide their clock: a rate that they cannot make becomes the next one that they can. The controller
@@ -122,7 +122,7 @@ double QuanserSampler::measured_period_s(double period_s, const std::string& rig
   const CardSample first = wait_for_another(
       latest().when.number, monotonic_ns() + nanoseconds(std::max(first_within_s, 2.0 * period_s)));
   const std::int64_t until_ns =
-      monotonic_ns() + nanoseconds(std::max(measured_for_s, min_periods * period_s));
+      monotonic_ns() + nanoseconds(std::max(measured_for_s, min_measured_periods * period_s));
   CardSample last = first;
   while (last.error >= 0 && monotonic_ns() < until_ns) last = wait_for_another(last.when.number, until_ns);
   if (last.error < 0) card_.fail(last.error, "sampling on the card's own clock");
