@@ -37,18 +37,10 @@ if(UPRIGHT_EXTRA_EFFECTS)
   configure_file(${PROJECT_SOURCE_DIR}/cmake/extra_effects.hpp.in ${extra_folder}/upright/model/effects/all.hpp @ONLY)
 endif()
 
-# upright_compile_together(NAME): the sources of a folder are one translation unit. Most of their compile time is the reading of
-# headers, which is done once then. The names in the unnamed namespaces of a folder must therefore differ.
+# upright_compile_together(NAME): the sources of a target are one translation unit. Most of their compile time is the reading of
+# headers, which is done once then. The names in the unnamed namespaces of a target must therefore differ.
 function(upright_compile_together name)
-  get_target_property(sources ${name} SOURCES)
-  foreach(source IN LISTS sources)
-    cmake_path(ABSOLUTE_PATH source)
-    cmake_path(RELATIVE_PATH source BASE_DIRECTORY ${CMAKE_CURRENT_SOURCE_DIR})
-    cmake_path(GET source PARENT_PATH folder)
-    string(MAKE_C_IDENTIFIER "${name}_${folder}" group)
-    set_source_files_properties(${CMAKE_CURRENT_SOURCE_DIR}/${source} PROPERTIES UNITY_GROUP ${group})
-  endforeach()
-  set_target_properties(${name} PROPERTIES UNITY_BUILD ${UPRIGHT_UNITY} UNITY_BUILD_MODE GROUP)
+  set_target_properties(${name} PROPERTIES UNITY_BUILD ${UPRIGHT_UNITY} UNITY_BUILD_BATCH_SIZE 0)
   # g++ takes what such a unit includes for headers, and warns of their unnamed namespaces.
   if(UPRIGHT_UNITY AND CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
     target_compile_options(${name} PRIVATE -Wno-subobject-linkage)

@@ -18,7 +18,7 @@ namespace {
 constexpr int attempts_to_stop = 3;
 constexpr std::array driver_references = {AREF_GROUND, AREF_COMMON, AREF_DIFF, AREF_OTHER};
 
-RigFault fault_of_errno(int error) noexcept {
+RigFault fault_of_comedi_errno(int error) noexcept {
   if (error == ETIMEDOUT || error == ETIME || error == EINTR) return RigFault::link_timeout;
   if (error == EACCES || error == EPERM || error == EBUSY || error == EINVAL) return RigFault::device_refused;
   return RigFault::link_lost;
@@ -171,7 +171,7 @@ RigReading ComediTransport::read() noexcept {
   for (Batch& batch : batches_) {
     const int done = comedi_do_insnlist(batch.device, &batch.list);
     if (done == static_cast<int>(batch.list.n_insns)) continue;
-    reading.fault = done < 0 ? fault_of_errno(comedi_errno()) : RigFault::corrupt_reply;
+    reading.fault = done < 0 ? fault_of_comedi_errno(comedi_errno()) : RigFault::corrupt_reply;
     return reading;
   }
   const std::int64_t answered_ns = monotonic_ns();
@@ -219,7 +219,7 @@ RigFault ComediTransport::put_out(double voltage_v) noexcept {
   const lsampl_t datum = comedi_from_phys(channel_v, &output_.range, output_.maxdata);
   const int written = comedi_data_write(output_.device, output_.subdevice, output_.channel,
                                         output_.range_number, AREF_GROUND, datum);
-  return written == 1 ? RigFault::none : fault_of_errno(comedi_errno());
+  return written == 1 ? RigFault::none : fault_of_comedi_errno(comedi_errno());
 }
 
 /// What a card's driver took is on its output: reading it back would show the driver's own copy only.

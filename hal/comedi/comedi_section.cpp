@@ -13,7 +13,7 @@ namespace upright {
 namespace {
 
 constexpr int last_subdevice = 255;
-constexpr int last_channel = 65535;
+constexpr int last_comedi_channel = 65535;
 constexpr int last_line = 15;
 constexpr Words<3> kinds = {"counter", "plain_counter", "analog_input"};
 constexpr Words<4> references = {"ground", "common", "difference", "other"};
@@ -33,7 +33,7 @@ void channel_keys(YamlKeys& keys, const std::string& device, Channel& channel) {
     channel.device = device;
   keys.needs("device", !channel.device.empty(), "is missing here and in comedi", "add device: /dev/comedi0");
   keys.integer("subdevice", channel.subdevice, 0, last_subdevice);
-  keys.integer("channel", channel.channel, 0, last_channel);
+  keys.integer("channel", channel.channel, 0, last_comedi_channel);
 }
 
 void range_key(YamlKeys& keys, ComediRange& range) {

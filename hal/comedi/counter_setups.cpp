@@ -18,7 +18,7 @@ constexpr std::array<CounterStep, 1> s626_steps = {{{INSN_CONFIG, 0, {0}, 1, Lin
 constexpr lsampl_t count_mode =
     NI_GPCT_COUNTING_MODE_QUADRATURE_X4_BITS | NI_GPCT_COUNTING_DIRECTION_HW_UP_DOWN_BITS;
 constexpr CounterStep reset = {INSN_CONFIG, 0, {INSN_CONFIG_RESET}, 1, Line::none, false};
-constexpr CounterStep load = {INSN_WRITE, 0, {0}, 1, Line::none, false};
+constexpr CounterStep load_count = {INSN_WRITE, 0, {0}, 1, Line::none, false};
 constexpr CounterStep load_a = {INSN_WRITE, 1, {0}, 1, Line::none, false};
 constexpr CounterStep load_b = {INSN_WRITE, 2, {0}, 1, Line::none, false};
 constexpr CounterStep no_gate = {
@@ -43,10 +43,11 @@ constexpr CounterStep no_index = {
     Line::none,
     false};
 
-constexpr std::array ni_pcimio_steps = {reset,  load,   load_a,   load_b,     no_gate, no_second_gate,
-                                        line_a, line_b, no_index, quadrature, arm};
+constexpr std::array ni_pcimio_steps = {reset,  load_count, load_a,   load_b,     no_gate, no_second_gate,
+                                        line_a, line_b,     no_index, quadrature, arm};
 // The 660x counters have fixed inputs: A is the source, B the up/down line.
-constexpr std::array ni_660x_steps = {reset, load, load_a, load_b, no_gate, no_second_gate, quadrature, arm};
+constexpr std::array ni_660x_steps = {reset,   load_count,     load_a,     load_b,
+                                      no_gate, no_second_gate, quadrature, arm};
 
 // multiq3 sets its counters up when it is attached, and shows the reset value in the middle of the range;
 // they are left alone here, so that they go on counting from run to run.

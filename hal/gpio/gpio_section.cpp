@@ -15,7 +15,7 @@ namespace {
 constexpr int highest_line = 1023;
 constexpr std::size_t max_limit_switches = 8;
 constexpr Words<3> biases = {"as_is", "pull_up", "pull_down"};
-constexpr Words<2> ends = {"plus_x", "minus_x"};
+constexpr Words<2> track_ends = {"plus_x", "minus_x"};
 
 /// Line numbers with the keys that took them: no two may share one.
 class TakenLines {
@@ -68,7 +68,7 @@ void line_keys(YamlKeys& keys, GpioRig& rig, TakenLines& taken) {
   keys.optional_map("emergency_stop", rig.emergency_stop, input);
   if (keys.given("limit_switches", !rig.limit_switches.empty())) {
     keys.items("limit_switches", rig.limit_switches, [&](YamlKeys& map, LimitSwitch& limit) {
-      map.one_of("end", limit.end, ends);
+      map.one_of("end", limit.end, track_ends);
       input_keys(map, limit.line, taken);
     });
     const std::size_t count = rig.limit_switches.size();

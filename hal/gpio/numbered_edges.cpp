@@ -18,14 +18,14 @@ constexpr std::uint32_t request_queue_size = 1024;  // the most that the kernel 
 constexpr std::size_t events_per_read = 64;
 constexpr std::uint64_t both_lines = 3;
 
-class Descriptor {
+class LineDescriptor {
  public:
-  explicit Descriptor(int descriptor = -1) noexcept : descriptor_(descriptor) {}
-  ~Descriptor() {
+  explicit LineDescriptor(int descriptor = -1) noexcept : descriptor_(descriptor) {}
+  ~LineDescriptor() {
     if (descriptor_ >= 0) ::close(descriptor_);
   }
-  Descriptor(const Descriptor&) = delete;
-  Descriptor& operator=(const Descriptor&) = delete;
+  LineDescriptor(const LineDescriptor&) = delete;
+  LineDescriptor& operator=(const LineDescriptor&) = delete;
   int get() const noexcept { return descriptor_; }
 
  private:
@@ -45,7 +45,7 @@ std::uint64_t flag_of(LineBias bias) noexcept {
 }
 
 int request(const GpioChip& chip, const LineEncoder& encoder, const std::string& use) {
-  const Descriptor device(::open(chip.path().c_str(), O_RDWR | O_CLOEXEC));
+  const LineDescriptor device(::open(chip.path().c_str(), O_RDWR | O_CLOEXEC));
   gpio_v2_line_request lines{};
   lines.offsets[0] = static_cast<std::uint32_t>(encoder.a);
   lines.offsets[1] = static_cast<std::uint32_t>(encoder.b);
@@ -113,7 +113,7 @@ class NumberedEdges final : public EdgeSource {
     return decoder.fault();
   }
 
-  Descriptor lines_;
+  LineDescriptor lines_;
   std::uint32_t b_;
   EdgeSequence sequence_;
   bool waits_ = false;
@@ -124,7 +124,7 @@ class NumberedEdges final : public EdgeSource {
 }  // namespace
 
 bool numbers_edges(const GpioChip& chip) {
-  const Descriptor device(::open(chip.path().c_str(), O_RDWR | O_CLOEXEC));
+  const LineDescriptor device(::open(chip.path().c_str(), O_RDWR | O_CLOEXEC));
   gpio_v2_line_info info{};
   return device.get() >= 0 && ::ioctl(device.get(), GPIO_V2_GET_LINEINFO_IOCTL, &info) == 0;
 }

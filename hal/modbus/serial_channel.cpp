@@ -18,7 +18,7 @@ namespace {
 
 constexpr std::size_t unit_size = 1, check_sum_size = 2;
 
-RigFault fault_of_errno(int error) noexcept {
+RigFault fault_of_serial_errno(int error) noexcept {
   if (error == ETIMEDOUT) return RigFault::link_timeout;
   return error == EMBBADCRC || error == EMBBADDATA ? RigFault::corrupt_reply : RigFault::link_lost;
 }
@@ -84,10 +84,11 @@ class SerialChannel final : public ModbusChannel {
     std::copy_n(request.bytes.begin(), request.size, addressed.begin() + unit_size);
     set_timeout(context_.get(), patience_s);
     const int size = static_cast<int>(unit_size + request.size);
-    if (modbus_send_raw_request(context_.get(), addressed.data(), size) < 0) return fault_of_errno(errno);
+    if (modbus_send_raw_request(context_.get(), addressed.data(), size) < 0)
+      return fault_of_serial_errno(errno);
     std::array<std::uint8_t, MODBUS_RTU_MAX_ADU_LENGTH> frame;
     const int got = modbus_receive_confirmation(context_.get(), frame.data());
-    if (got < 0) return fault_of_errno(errno);
+    if (got < 0) return fault_of_serial_errno(errno);
     // Of another unit libmodbus says nothing but that it has no length.
     const auto length = static_cast<std::size_t>(got);
     if (length < unit_size + 2 + check_sum_size || frame[0] != unit_) return RigFault::corrupt_reply;

@@ -21,7 +21,7 @@ std::string place_of(const std::string& folder, const std::string& name) {
 }
 
 /// A library stays loaded until the program ends, because it may run its own threads.
-void* load(const std::string& folder, const std::string& name) {
+void* load_library(const std::string& folder, const std::string& name) {
   for (const char* ending : endings)
     if (void* handle = dlopen((place_of(folder, name) + ending).c_str(), RTLD_NOW | RTLD_GLOBAL);
         handle != nullptr)
@@ -116,9 +116,9 @@ const char* error_name(int number) {
 }  // namespace
 
 HilLibrary::HilLibrary(const QuanserRig& rig, const std::string& rig_file) {
-  load(rig.folder, rig.common_library);
-  load(rig.folder, rig.runtime_library);
-  void* const library = load(rig.folder, rig.library);
+  load_library(rig.folder, rig.common_library);
+  load_library(rig.folder, rig.runtime_library);
+  void* const library = load_library(rig.folder, rig.library);
   if (library == nullptr)
     throw DeviceError(
         "Quanser's HIL library " + rig.library + " of " + rig_file + " cannot be loaded (" +

@@ -16,9 +16,9 @@ namespace {
 /// Above the loop's, so that the time of a sample is the time at which it came.
 constexpr int sampler_priority = 85;
 /// Of a task that was stopped while somebody waited for its sample.
-constexpr hil::Error stopped = -hil::interrupted;
+constexpr hil::Error task_stopped = -hil::interrupted;
 
-constexpr double measured_for_s = 0.5, min_periods = 5.0;
+constexpr double measured_for_s = 0.5, min_measured_periods = 5.0;
 constexpr int attempts_at_period = 3;  // a thread that is held up measures another period
 constexpr double first_within_s = 1.0;
 /// Cards divide their clock: a rate that they cannot make becomes the next one that they can. The controller
@@ -62,7 +62,7 @@ void QuanserSampler::take_samples() noexcept {
     if (came > 0) {
       sample = {{sample.when.number + 1, monotonic_ns()}, counts.cart, counts.pendulum};
     } else {
-      sample.trouble = came < 0 ? came : stopped;
+      sample.trouble = came < 0 ? came : task_stopped;
     }
     samples_.publish(sample);
     if (came <= 0) return;
@@ -85,7 +85,7 @@ double QuanserSampler::measured_period_s(double period_s, const std::string& rig
   const RingSample first = samples_.wait_for_another(
       samples_.latest().when.number, monotonic_ns() + nanoseconds(std::max(first_within_s, 2.0 * period_s)));
   const std::int64_t until_ns =
-      monotonic_ns() + nanoseconds(std::max(measured_for_s, min_periods * period_s));
+      monotonic_ns() + nanoseconds(std::max(measured_for_s, min_measured_periods * period_s));
   RingSample last = first;
   while (last.trouble == 0 && monotonic_ns() < until_ns)
     last = samples_.wait_for_another(last.when.number, until_ns);

@@ -16,7 +16,7 @@ namespace upright {
 
 namespace {
 
-constexpr int last_channel = 255;
+constexpr int last_hil_channel = 255;
 constexpr std::size_t longest_board_type = 64;
 constexpr std::size_t longest_text = 1000;
 constexpr Words<2> clocks = {"computer", "card"};
@@ -56,7 +56,7 @@ void folder_key(YamlKeys& keys, std::string& folder) {
 }
 
 void channel_key(YamlKeys& keys, const char* key, int& channel, int there, const std::string& board_type) {
-  keys.integer(key, channel, 0, last_channel);
+  keys.integer(key, channel, 0, last_hil_channel);
   keys.check(key, there == 0 || channel < there,
              "is " + std::to_string(channel) + ", which a " + board_type + " does not have",
              "use 0 to " + std::to_string(there - 1));
@@ -119,7 +119,7 @@ void output_keys(YamlKeys& keys, const QuanserCardKind* kind, const std::string&
 }
 
 void enable_keys(YamlKeys& keys, QuanserEnable& enable) {
-  keys.integer("line", enable.line, 0, last_channel);
+  keys.integer("line", enable.line, 0, last_hil_channel);
   keys.one_of("active", enable.active_high, level_words, true);
 }
 

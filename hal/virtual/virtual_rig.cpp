@@ -207,8 +207,8 @@ class Server {
     if (size <= 0) return;
     reply.bytes.resize(static_cast<std::size_t>(size));
     const auto header = static_cast<std::size_t>(modbus_get_header_length(context));
-    constexpr std::uint8_t exception_bit = 0x80;
-    if ((reply.bytes[header] & exception_bit) == 0) obey();
+    constexpr std::uint8_t exception_flag = 0x80;
+    if ((reply.bytes[header] & exception_flag) == 0) obey();
     queue(peer, std::move(reply));
   }
 
