@@ -11,7 +11,7 @@ namespace upright {
 
 namespace {
 
-constexpr std::int64_t max_samples = 100'000;
+constexpr std::int64_t max_samples = 10'000;
 constexpr double max_percent = 50.0;  // beyond it a mass or a length may nearly vanish
 
 /// Refuses `key` for the reason "CAUSE: REMEDY".
