@@ -27,7 +27,7 @@ class YamlKeys;
 /// A sweep file (docs/reference/files.md), including the files that it names.
 struct SweepConfig {
   LoopSetup setup;
-  std::filesystem::path plant_file;
+  std::filesystem::path plant_file, gain_file;
   Plant plant;  ///< the plant of `setup.model`, for the linear margins
   SweepEngine engine = SweepEngine::fast;
   std::vector<double> theta0_rad;

@@ -151,12 +151,12 @@ void take_plant(const YamlMap& map, SweepConfig& config) {
 /// The files that a sweep names are read as soon as their keys are.
 void file_keys(YamlKeys& keys, SweepConfig& config, NamedFiles& files) {
   const YamlMap* map = keys.source();
-  std::filesystem::path gains, rig;
+  std::filesystem::path rig;
   LoopSetup& setup = config.setup;
   keys.path("plant", config.plant_file);
   if (map) take_plant(*map, config);
-  keys.path("gains", gains);
-  if (map) setup.control = read_gain_file(gains);
+  keys.path("gains", config.gain_file);
+  if (map) setup.control = read_gain_file(config.gain_file);
   keys.one_of("loop", setup.sampled, loops);
   if (setup.sampled) {
     keys.path("rig", rig);

@@ -67,11 +67,8 @@ SweepNumbers count_plants(const SweepConfig& config, const SweepNumbers& task) {
   const std::vector<LoopCase> cases = cases_of(task);
   const auto first = static_cast<std::uint32_t>(task[0]), plants = static_cast<std::uint32_t>(task[1]);
   SweepNumbers result(1 + cases.size() * count_numbers, 0.0);
-  LoopSetup setup = config.setup;
   for (std::uint32_t i = 0; i < plants; ++i) {
-    setup.model = make_model<double>(config.uncertainty->plants->draw(config.uncertainty->seed, first + i));
-    setup.model.smoothing = config.setup.model.smoothing;
-    const std::vector<SweepRun> runs = run_group(config, setup, cases);
+    const std::vector<SweepRun> runs = run_plant_group(config, first + i, cases);
     for (std::size_t k = 0; k < runs.size(); ++k) {
       const Outcome outcome = runs[k].outcome(config.stable_below_rad);
       if (outcome == Outcome::fell) result[1 + k * count_numbers] += 1.0;
@@ -117,6 +114,14 @@ std::vector<PlantCounts> counts_of(const SweepNumbers& task, const SweepNumbers&
   for (auto at = result.begin() + 1; at != result.end(); at += count_numbers)
     counts.push_back({static_cast<std::uint32_t>(at[0]), static_cast<std::uint32_t>(at[1])});
   return counts;
+}
+
+std::vector<SweepRun> run_plant_group(const SweepConfig& config, std::uint32_t plant,
+                                      const std::vector<LoopCase>& group) {
+  LoopSetup setup = config.setup;
+  setup.model = make_model<double>(config.uncertainty->plants->draw(config.uncertainty->seed, plant));
+  setup.model.smoothing = config.setup.model.smoothing;
+  return run_group(config, setup, group);
 }
 
 std::uint32_t plants_per_task(const SweepConfig& config) {
