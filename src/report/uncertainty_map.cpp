@@ -44,7 +44,8 @@ UncertaintyMap read_uncertainty_map(const std::filesystem::path& file) {
     const bool first_row = points.empty();
     const bool next = first_row || angle_rad > points.back().start.theta0_rad ||
                       (angle_rad == points.back().start.theta0_rad && delay_s > points.back().start.delay_s);
-    if (!next || !(samples >= 1.0 && samples <= 1e9) || !(share >= 0.0 && share <= 1.0)) refuse(file, points.size());
+    if (!next || !(samples >= 1.0 && samples <= 1e9) || !(share >= 0.0 && share <= 1.0))
+      refuse(file, points.size());
     if (!first_row && samples != map.samples) refuse(file, points.size());
     map.samples = samples;
     map.share_falls.push_back(share);
