@@ -14,7 +14,8 @@ UncertainParameter alone(std::string name, double value, const Range& range, Pla
 }
 
 /// A parameter of the pendulum, above zero, which may carry the inertia along.
-UncertainParameter of_pendulum(std::string name, double value, std::function<void(Plant&, double)> scale) {
+UncertainParameter of_pendulum(std::string name, double value,
+                               const std::function<void(Plant&, double)>& scale) {
   const auto set = [scale, value](Plant& p, double to) { scale(p, to / value); };
   return {"pendulum " + std::move(name), value, Range::positive(), scale, set};
 }
