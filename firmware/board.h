@@ -58,7 +58,7 @@
 #error "F_CPU must be 16000000, the clock of the boards"
 #endif
 #if F_CPU % (8L * BAUD) != 0
-#error "BAUD does not divide 16 MHz exactly: use 250000, 500000, 1000000 or 2000000, not 115200 or 921600"
+#error "BAUD does not divide 16 MHz exactly: use 500000, 1000000 or 2000000, not 115200 or 921600"
 #endif
 
 // One interrupt samples the encoders at a fixed rate. No edge is missed if the edges of one encoder are further apart

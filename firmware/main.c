@@ -9,6 +9,7 @@
 #include "modbus.h"
 #include "motor.h"
 #include "registers.h"
+#include "sampling.h"
 
 static uint16_t EEMEM boots_kept;
 
@@ -34,12 +35,16 @@ int main(void) {
   sei();
   // One pass of the loop takes less than a millisecond. If a pass does not complete, the watchdog resets the processor.
   wdt_enable(WDTO_15MS);
-  uint8_t before = clock_now();
+  uint8_t before = clock_now(), steps_of_tick = 0;
   for (;;) {
     wdt_reset();
     const uint8_t now = clock_now();
-    const uint8_t elapsed_ticks = (uint8_t)(now - before);
+    const uint8_t elapsed_steps = (uint8_t)(now - before);
     before = now;
+    steps_of_tick = (uint8_t)(steps_of_tick + elapsed_steps % STEPS_PER_TICK);
+    const uint8_t elapsed_ticks = (uint8_t)(elapsed_steps / STEPS_PER_TICK + steps_of_tick / STEPS_PER_TICK);
+    steps_of_tick %= STEPS_PER_TICK;
+    if (sampling_is_due(elapsed_steps)) modbus_sample();
     registers_watch(elapsed_ticks);
     modbus_serve(elapsed_ticks);
   }

@@ -32,6 +32,11 @@ static uint16_t quiet_ticks;
 static uint8_t reply[ADDRESS_SIZE + 2 + 2 * READABLE_END + CHECK_SIZE];
 static uint8_t reply_size, reply_sent;
 
+// A read that is answered with the next sample. A further byte on the line means that the master no longer waits.
+static bool is_waiting;
+static uint8_t waiting_function;
+static uint16_t waiting_first, waiting_count;
+
 static void begin_frame(void) {
   frame_size = 0;
   check = 0xffff;
@@ -76,14 +81,23 @@ static void add_registers(uint16_t first, uint16_t count) {
   }
 }
 
-static exception_t read(uint8_t function) {
-  const uint16_t first = word_at(2), count = word_at(4);
-  if (count == 0) return ILLEGAL_VALUE;
+static exception_t read_now(uint8_t function, uint16_t first, uint16_t count) {
   registers_latch();  // first, so that edges lost before the request are detected
   const exception_t problem = registers_readable(first, count);
   if (problem != NO_EXCEPTION) return problem;
   begin_reply(function);
   add_registers(first, count);
+  return NO_EXCEPTION;
+}
+
+static exception_t read(uint8_t function) {
+  const uint16_t first = word_at(2), count = word_at(4);
+  if (count == 0) return ILLEGAL_VALUE;
+  if (!registers_wait(first, count)) return read_now(function, first, count);
+  is_waiting = true;
+  waiting_function = function;
+  waiting_first = first;
+  waiting_count = count;
   return NO_EXCEPTION;
 }
 
@@ -117,6 +131,9 @@ static exception_t read_write(void) {
   if (word_at(4) == 0 || count == 0 || count > LONGEST_FRAME / 2 || frame[10] != 2 * count) return ILLEGAL_VALUE;
   exception_t problem = registers_readable(word_at(2), word_at(4));
   if (problem == NO_EXCEPTION) problem = registers_writable(first, count, frame + 11);
+  // A request that waits for a sample must not change when samples are taken.
+  if (problem == NO_EXCEPTION && registers_wait(word_at(2), word_at(4)) && first + count > REGISTER_SAMPLE_PERIOD)
+    problem = ILLEGAL_VALUE;
   if (problem != NO_EXCEPTION) return problem;
   registers_write(first, count, frame + 11);
   return read(READ_WRITE);
@@ -137,15 +154,25 @@ static exception_t obey(void) {
   return ILLEGAL_FUNCTION;
 }
 
-static void answer(void) {
-  const exception_t problem = obey();
-  if (problem == NO_EXCEPTION) {
-    registers_feed();
-  } else {
-    begin_reply(frame[1] | EXCEPTION_BIT);
+/// Sends the reply that was prepared, or why there is none.
+static void finish(uint8_t function, exception_t problem) {
+  if (problem != NO_EXCEPTION) {
+    begin_reply(function | EXCEPTION_BIT);
     add(problem);
   }
   send_reply();
+}
+
+static void answer(void) {
+  const exception_t problem = obey();
+  if (problem == NO_EXCEPTION) registers_feed();
+  if (!is_waiting) finish(frame[1], problem);
+}
+
+void modbus_sample(void) {
+  if (!is_waiting) return;
+  is_waiting = false;
+  finish(waiting_function, read_now(waiting_function, waiting_first, waiting_count));
 }
 
 /// The size of the frame, from its first bytes. NOT_KNOWN_YET: more bytes are needed. UNTIL_SILENCE: the function is
@@ -176,6 +203,7 @@ static void end_frame(void) {
 
 static void take(uint8_t byte) {
   quiet_ticks = 0;
+  is_waiting = false;
   if (line_errors) {
     line_errors = 0;
     deaf = true;

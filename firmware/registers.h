@@ -12,11 +12,13 @@ enum {
   REGISTER_SEQUENCE = 6,
   REGISTER_SUPPLY = 7,
   REGISTER_VERSION = 8,
-  READABLE_END = 9,
+  REGISTER_SAMPLE = 9,  // a read that includes it is answered with the next sample
+  READABLE_END = 10,
   REGISTER_VOLTAGE = 16,
   REGISTER_ENABLE = 17,
   REGISTER_WATCHDOG = 18,
-  WRITABLE_END = 19
+  REGISTER_SAMPLE_PERIOD = 19,
+  WRITABLE_END = 20
 };
 
 // Bits of REGISTER_STATUS.
@@ -42,6 +44,8 @@ void registers_begin(uint16_t boot_count);
 void registers_latch(void);
 /// Whether all these registers can be read now, or written. Changes nothing.
 exception_t registers_readable(uint16_t first, uint16_t count);
+/// Whether a read of these registers waits for the next sample.
+bool registers_wait(uint16_t first, uint16_t count);
 exception_t registers_writable(uint16_t first, uint16_t count, const uint8_t *bytes);
 uint16_t registers_read(uint16_t address);
 /// `bytes` are in the order of the line, high byte first. All registers take effect together.

@@ -27,6 +27,7 @@ class GuardedRig final : public Rig {
   int last_exception() const noexcept override { return rig_->last_exception(); }
   SafetyInputs safety_inputs() const noexcept override { return rig_->safety_inputs(); }
   DeviceFacts device_facts() const override { return rig_->device_facts(); }
+  bool measures_velocities() const noexcept override { return rig_->measures_velocities(); }
   bool is_clock() const noexcept override { return rig_->is_clock(); }
   DeviceSample wait_next(std::int64_t until_ns) noexcept override { return rig_->wait_next(until_ns); }
 

@@ -52,10 +52,12 @@ class JoinedRig final : public Rig {
       reading.recoveries += of_part.recoveries;
       if (part.roles.cart) {
         reading.cart_counts = of_part.cart_counts;
+        reading.cart_counts_per_s = of_part.cart_counts_per_s;
         cart_ns = of_part.time_ns;
       }
       if (part.roles.pendulum) {
         reading.pendulum_counts = of_part.pendulum_counts;
+        reading.pendulum_counts_per_s = of_part.pendulum_counts_per_s;
         pendulum_ns = of_part.time_ns;
       }
     }
@@ -82,6 +84,11 @@ class JoinedRig final : public Rig {
     return all;
   }
 
+  bool measures_velocities() const noexcept override {
+    return std::all_of(parts_.begin(), parts_.end(), [](const Part& part) {
+      return !(part.roles.cart || part.roles.pendulum) || part.rig->measures_velocities();
+    });
+  }
   bool is_clock() const noexcept override { return clock_part() != nullptr; }
   DeviceSample wait_next(std::int64_t until_ns) noexcept override {
     Rig* const clock = clock_part();

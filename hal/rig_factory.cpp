@@ -22,7 +22,8 @@ int min_bytes(const RigFile& rig) {
   const int voltage = 2 * modbus.voltage.registers();
   const int asked = modbus.exchange == ModbusExchange::read_write ? 13 + voltage : 8;
   const int answered = 5 + 2 * counters * modbus.counter.registers;
-  const int written = roles.output ? 9 + voltage + 8 : 0;
+  // The exchange that waits for a sample of the device carries the voltage too.
+  const int written = roles.output && !modbus.sampling ? 9 + voltage + 8 : 0;
   return asked + answered + written;
 }
 
@@ -51,6 +52,12 @@ void require_link_fits(const RigFile& rig, double period_s) {
         file + "modbus.response_timeout_s is " + exact_text(rig.modbus->response_timeout_s) +
         ", which is not less than " + period +
         ": lower sample_rate_hz in the gain file, or reduce modbus.response_timeout_s below it");
+  if (rig.modbus->sampling && !rig.modbus->sampling->counts(period_s))
+    throw ConfigError(
+        file + "modbus.device_clock.seconds_per_count is " +
+        exact_text(rig.modbus->sampling->seconds_per_count) + ", of which " + period +
+        " is not a whole number up to 65535: give sample_rate_hz in the gain file another value, or remove "
+        "modbus.device_clock");
   if (!rig.modbus->device.empty() && line_time_s(rig) >= period_s)
     throw ConfigError(file + "modbus.baud is " + std::to_string(rig.modbus->baud) +
                       ", at which one period's bytes take " + exact_text(line_time_s(rig)) +

@@ -163,6 +163,7 @@ class GpioLinesRig final : public Rig {
   void moved_by_hand() noexcept override { rig_->moved_by_hand(); }
   int last_exception() const noexcept override { return rig_->last_exception(); }
   DeviceFacts device_facts() const override { return rig_->device_facts(); }
+  bool measures_velocities() const noexcept override { return rig_->measures_velocities(); }
   bool is_clock() const noexcept override { return rig_->is_clock(); }
   DeviceSample wait_next(std::int64_t until_ns) noexcept override { return rig_->wait_next(until_ns); }
 

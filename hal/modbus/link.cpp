@@ -70,6 +70,7 @@ void ModbusLink::find_block() noexcept {
   if (end == 0 && config_.exchange == ModbusExchange::read_write)
     include(config_.voltage_address, config_.voltage.registers());
   block_ = end - first_;
+  if (config_.sampling) sample_block_ = std::max(block_, config_.sampling->sample_address + 1 - first_);
   const int counter = config_.counter.registers;
   other_block_ = block_ > counter ? counter : block_ > 1 ? 1 : 2;
 }
@@ -99,15 +100,16 @@ void ModbusLink::await_silence(double quiet_s) noexcept {
   in_step_ = true;
 }
 
-/// One exchange, with its reply in `reply_`. After a request without an answer the peer may still answer:
-/// TCP closes, so that the answer goes nowhere; a serial line resynchronises.
-RigFault ModbusLink::ask(const Pdu& request) noexcept {
+/// One exchange, with its reply in `reply_`, for which the device waits so long. After a request without an
+/// answer the peer may still answer: TCP closes, so that the answer goes nowhere; a serial line
+/// resynchronises.
+RigFault ModbusLink::ask(const Pdu& request, double waits_s) noexcept {
   if (!connected_) return RigFault::link_lost;
   const std::int64_t asked_ns = monotonic_ns();
   channel_->flush();
   // A process that stood still in here does not send what it carries: a voltage that has become old.
   if (static_cast<double>(monotonic_ns() - asked_ns) > 1e9 * patience_s_) return RigFault::link_timeout;
-  RigFault fault = channel_->exchange(request, reply_, patience_s_);
+  RigFault fault = channel_->exchange(request, reply_, patience_s_ + waits_s);
   if (fault == RigFault::none) fault = check_reply(request, reply_, exception_);
   if (is_answer(fault)) return fault;
   unanswered_ns_ = monotonic_ns();
@@ -120,14 +122,14 @@ RigFault ModbusLink::ask(const Pdu& request) noexcept {
 }
 
 /// The first `count` of `registers_`.
-RigFault ModbusLink::read_registers(const Pdu& request, int count) noexcept {
-  const RigFault fault = ask(request);
+RigFault ModbusLink::read_registers(const Pdu& request, int count, double waits_s) noexcept {
+  const RigFault fault = ask(request, waits_s);
   if (fault == RigFault::none)
     take_registers(reply_, std::span(registers_).first(static_cast<std::size_t>(count)));
   return fault;
 }
 
-RigFault ModbusLink::read_block(int registers, double held_v) noexcept {
+RigFault ModbusLink::read_block(int registers, double held_v, double waits_s) noexcept {
   const RegisterRange range{first_, registers};
   if (config_.exchange == ModbusExchange::separate)
     return read_registers(
@@ -136,7 +138,7 @@ RigFault ModbusLink::read_block(int registers, double held_v) noexcept {
         registers);
   const auto words = voltage_words(held_v);
   const auto used = std::span(words).first(static_cast<std::size_t>(config_.voltage.registers()));
-  return read_registers(read_write_request(range, config_.voltage_address, used), registers);
+  return read_registers(read_write_request(range, config_.voltage_address, used), registers, waits_s);
 }
 
 /// A device that has no counts to give says why in its status, where it has one.
@@ -152,16 +154,28 @@ RigFault ModbusLink::named(RigFault fault) noexcept {
 RigFault ModbusLink::read(double held_v, DeviceReading& reading) noexcept {
   if (block_ == 0) return write_voltage(held_v);
   if (const RigFault fault = read_block(block_, held_v); fault != RigFault::none) return named(fault);
+  reading = reading_in_block();
+  return RigFault::none;
+}
+
+RigFault ModbusLink::read_next(double held_v, double period_s, DeviceReading& reading) noexcept {
+  const RigFault fault = read_block(sample_block_, held_v, period_s);
+  if (fault != RigFault::none) return named(fault);
+  reading = reading_in_block();
+  return RigFault::none;
+}
+
+DeviceReading ModbusLink::reading_in_block() const noexcept {
   const auto at = [&](int address) {
     return std::span<const std::uint16_t>(registers_).subspan(static_cast<std::size_t>(address - first_), 2);
   };
+  DeviceReading reading;
   if (roles_.cart) reading.cart_counts = decode_counter(at(config_.cart_address), config_.counter);
   if (roles_.pendulum)
     reading.pendulum_counts = decode_counter(at(config_.pendulum_address), config_.counter);
-  reading.boot_count = config_.boot_count_address ? at(*config_.boot_count_address)[0] : 0;
-  reading.stopped_by =
-      config_.status_address ? fault_in_status(at(*config_.status_address)[0]) : RigFault::none;
-  return RigFault::none;
+  if (config_.boot_count_address) reading.boot_count = at(*config_.boot_count_address)[0];
+  if (config_.status_address) reading.stopped_by = fault_in_status(at(*config_.status_address)[0]);
+  return reading;
 }
 
 RigFault ModbusLink::write_voltage(double voltage_v) noexcept {

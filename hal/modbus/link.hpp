@@ -42,6 +42,9 @@ class ModbusLink {
   /// Reads the counters. With function 0x17 `held_v` goes out in the same exchange. Where only the output is
   /// Modbus there are no counters: the exchange then shows that the device answers, and repeats the voltage.
   RigFault read(double held_v, DeviceReading& reading) noexcept;
+  /// The next sample of a device that samples every `period_s`, and `held_v` goes out at once in the same
+  /// exchange.
+  RigFault read_next(double held_v, double period_s, DeviceReading& reading) noexcept;
   /// Where another backend has the output, zero goes out, whatever is asked for.
   RigFault write_voltage(double voltage_v) noexcept;
   /// Zero volts by one function, 0x17, 0x10 or 0x06.
@@ -66,9 +69,10 @@ class ModbusLink {
 
   void find_block() noexcept;
   std::array<std::uint16_t, 2> voltage_words(double voltage_v) const noexcept;
-  RigFault ask(const Pdu& request) noexcept;
-  RigFault read_registers(const Pdu& request, int count) noexcept;
-  RigFault read_block(int registers, double held_v) noexcept;
+  RigFault ask(const Pdu& request, double waits_s = 0.0) noexcept;
+  RigFault read_registers(const Pdu& request, int count, double waits_s = 0.0) noexcept;
+  RigFault read_block(int registers, double held_v, double waits_s = 0.0) noexcept;
+  DeviceReading reading_in_block() const noexcept;
   RigFault named(RigFault fault) noexcept;
 
   ModbusRig config_;
@@ -84,8 +88,9 @@ class ModbusLink {
   int exception_ = 0;
   std::int64_t unanswered_ns_ = 0;
   int first_ = 0;
-  int block_ = 0;        // registers that read() asks for; 0: there is nothing to read
-  int other_block_ = 0;  // asked for to tell an answer from those to earlier requests
+  int block_ = 0;         // registers that read() asks for; 0: there is nothing to read
+  int sample_block_ = 0;  // the same with the number of a sample
+  int other_block_ = 0;   // asked for to tell an answer from those to earlier requests
   std::unique_ptr<ModbusChannel> channel_;
   Pdu reply_;
   std::array<std::uint16_t, max_registers> registers_{};

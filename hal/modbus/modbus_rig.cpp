@@ -3,9 +3,12 @@
 #include <pthread.h>
 #include <sched.h>
 #include <time.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <cmath>
+#include <system_error>
 
 #include "hal/modbus_exception.hpp"
 #include "hal/reading_patience.hpp"
@@ -24,6 +27,9 @@ constexpr double connect_patience_s = 0.02;
 constexpr double open_patience_s = 1.0;
 constexpr int replies_until_certain = 3;  // a single one may have a wrong bit that nothing betrays
 constexpr int io_priority = 70;
+/// A loop that has computed no voltage by then is late. The request for the next sample must not be: its
+/// bytes take the rest of the period.
+constexpr double computing_share_of_period = 0.5;
 
 const char* words_for(RigFault fault) {
   switch (fault) {
@@ -44,6 +50,7 @@ ModbusTransport::ModbusTransport(const RigFile& rig, double period_s)
     : rig_(rig),
       roles_(roles_of(rig, rig.modbus->device.empty() ? Backend::modbus_tcp : Backend::modbus_rtu)),
       writes_(roles_.output || rig.modbus->exchange == ModbusExchange::read_write),
+      period_s_(period_s),
       patience_ns_(static_cast<std::int64_t>(
           1e9 * std::max(rig.modbus->response_timeout_s, reading_share_of_period * period_s))),
       freshness_ns_(static_cast<std::int64_t>(1e9 * freshness_periods * period_s)),
@@ -138,17 +145,41 @@ void ModbusTransport::prepare_device() {
   if (modbus.enable_address)
     retried([&] { return link_.write_register(*modbus.enable_address, 0); }, "disabling the amplifier");
   reads_back_ = offers_read_back();
+  if (modbus.sampling) {
+    const int address = modbus.sampling->period_address, counts = modbus.sampling->counts(period_s_).value();
+    retried([&] { return link_.write_register(address, counts); }, "programming the device's sample period");
+    require_register(address, counts, "reading back the device's sample period");
+  }
   if (!modbus.watchdog) return;
   retried([&] { return link_.write_register(modbus.watchdog->address, modbus.watchdog->counts()); },
           "programming the device's watchdog");
+  require_register(modbus.watchdog->address, modbus.watchdog->counts(), "reading back the device's watchdog");
+}
+
+/// Throws DeviceError if the device holds another number there.
+void ModbusTransport::require_register(int address, int counts, const std::string& doing) {
   int back = 0;
-  retried([&] { return link_.read_register(modbus.watchdog->address, back); },
-          "reading back the device's watchdog");
-  if (back != modbus.watchdog->counts()) fail(RigFault::none, "reading back the device's watchdog");
+  retried([&] { return link_.read_register(address, back); }, doing);
+  if (back != counts) fail(RigFault::none, doing);
+}
+
+/// Throws DeviceError where the user cannot open the serial line at all, which no waiting helps.
+void ModbusTransport::require_line() const {
+  const std::string& line = rig_.modbus->device;
+  if (line.empty() || ::access(line.c_str(), R_OK | W_OK) == 0) return;
+  const int problem = errno;
+  throw DeviceError(
+      "the serial line " + line + " of " + rig_.file.string() + " cannot be opened (" +
+      std::error_code(problem, std::generic_category()).message() + "): " +
+      (problem == EACCES
+           ? "add yourself to the group that owns it (on Debian: sudo adduser $USER dialout), and "
+             "log in again"
+           : "connect the device, or set modbus.device to its line (ls /dev/ttyACM* /dev/ttyUSB*)"));
 }
 
 void ModbusTransport::open() {
   lock_.take(link_.name());
+  require_line();
   end_thread();
   stop_sequence_.reset(false, 0.0);
   if (const RigFault fault = link_.connect(open_patience_s); fault != RigFault::none)
@@ -159,6 +190,8 @@ void ModbusTransport::open() {
   prepare_device();
   DeviceReading reading;
   retried([&] { return link_.read(0.0, reading); }, reading_it);
+  if (is_clock())
+    retried([&] { return link_.read_next(0.0, period_s_, reading); }, "waiting for its next sample");
   boot_count_ = reading.boot_count;
   begin_serving();
 }
@@ -179,6 +212,9 @@ void ModbusTransport::begin_serving() {
   other_boots_in_a_row_ = other_watchdogs_in_a_row_ = 0;
   checks_refused_in_a_row_ = reads_refused_in_a_row_ = writes_refused_in_a_row_ = 0;
   recoveries_ = 0;
+  samples_.publish({});
+  sample_read_ = sample_waited_for_ = 0;
+  next_sample_ns_ = monotonic_ns();
   pause_ns_ = first_connect_pause_ns;
   next_attempt_ns_ = stop_begun_ns_ = 0;
   thread_ = std::thread([this] { serve(); });
@@ -191,7 +227,30 @@ void ModbusTransport::ring() noexcept {
   wake_one(doorbell_);
 }
 
+DeviceSample ModbusTransport::wait_next(std::int64_t until_ns) noexcept {
+  const DeviceSample next = samples_.wait_for_another(sample_waited_for_, until_ns).when;
+  sample_waited_for_ = next.number;
+  return next;
+}
+
+RigReading ModbusTransport::newest_sample() noexcept {
+  const RingSample sample = samples_.latest();
+  RigReading reading;
+  reading.time_ns = sample.when.time_ns;
+  reading.recoveries = recoveries_.load(std::memory_order_relaxed);
+  if (sample.when.number == sample_read_) {
+    reading.fault = sample.trouble != 0 ? static_cast<RigFault>(sample.trouble) : RigFault::link_timeout;
+    return reading;
+  }
+  sample_read_ = reading.sequence = sample.when.number;
+  reading.cart_counts = sample.cart;
+  reading.pendulum_counts = sample.pendulum;
+  reading.status = RigStatus::fresh;
+  return reading;
+}
+
 RigReading ModbusTransport::read() noexcept {
+  if (is_clock()) return newest_sample();
   const std::int64_t until_ns = monotonic_ns() + patience_ns_;
   const std::uint32_t number = read_wanted_.load(std::memory_order_relaxed) + 1;
   read_wanted_.store(number, std::memory_order_release);
@@ -242,7 +301,11 @@ void ModbusTransport::serve() noexcept {
   for (;;) {
     const std::uint32_t rung = doorbell_.load(std::memory_order_acquire);
     if (stop_is_due() && monotonic_ns() >= stop_sequence_.next_ns()) serve_stop();
-    if (write_wanted_.load(std::memory_order_acquire) != write_served_) serve_write();
+    if (is_clock()) {
+      if (sample_is_due()) serve_sample();
+    } else if (write_wanted_.load(std::memory_order_acquire) != write_served_) {
+      serve_write();
+    }
     const std::uint32_t wanted = read_wanted_.load(std::memory_order_acquire);
     if (wanted != read_served_) serve_read(wanted);
     if (ending_.load()) {
@@ -250,10 +313,15 @@ void ModbusTransport::serve() noexcept {
       const auto patience_ns = static_cast<std::int64_t>(1e9 * rig_.watchdog_s);
       if (!stop_is_due() || monotonic_ns() > stop_begun_ns_ + patience_ns) break;
     }
-    wait_while(doorbell_, rung,
-               stop_is_due() ? stop_sequence_.next_ns() : monotonic_ns() + nanoseconds_per_second);
+    wait_while(doorbell_, rung, next_ns());
   }
   link_.close();
+}
+
+/// When the thread has something to do, if nothing is asked of it before.
+std::int64_t ModbusTransport::next_ns() const noexcept {
+  if (stop_is_due()) return stop_sequence_.next_ns();
+  return is_clock() && !stopping_.load() ? next_sample_ns_ : monotonic_ns() + nanoseconds_per_second;
 }
 
 bool ModbusTransport::voltage_is_fresh() const noexcept {
@@ -352,6 +420,46 @@ void ModbusTransport::serve_read(std::uint32_t number) noexcept {
   reading_ = answer;
   answered_.store(number, std::memory_order_release);
   wake_one(answered_);
+}
+
+/// The voltage of the sample before goes out with the request for the next one, so that is asked for as soon
+/// as the voltage is there, or must be without it.
+bool ModbusTransport::sample_is_due() const noexcept {
+  if (stopping_.load()) return false;
+  return write_wanted_.load(std::memory_order_acquire) != write_served_ || monotonic_ns() >= next_sample_ns_;
+}
+
+void ModbusTransport::serve_sample() noexcept {
+  RingSample sample = samples_.latest();
+  const RigFault fault = take_sample(sample);
+  sample.trouble = static_cast<std::int32_t>(fault);
+  write_fault_.store(fault, std::memory_order_relaxed);
+  next_sample_ns_ = monotonic_ns() + static_cast<std::int64_t>(1e9 * computing_share_of_period * period_s_);
+  samples_.publish(sample);
+}
+
+RigFault ModbusTransport::take_sample(RingSample& sample) noexcept {
+  const std::uint32_t wanted = write_wanted_.load(std::memory_order_acquire);
+  const bool is_first_voltage = wanted != write_served_ && !enabled_ && rig_.modbus->enable_address;
+  write_served_ = wanted;
+  if (const RigFault fault = ready(); fault != RigFault::none) return fault;
+  if (is_first_voltage)
+    if (const RigFault fault = send_voltage(); fault != RigFault::none) return fault;
+  DeviceReading reading;
+  const RigFault fault =
+      certain(noted(link_.read_next(fresh_voltage_v(), period_s_, reading)), reads_refused_in_a_row_);
+  const std::int64_t arrived_ns = monotonic_ns();
+  if (fault != RigFault::none) {
+    // A device that restarted has forgotten its sample period, and refuses.
+    verified_ = false;
+    return fault;
+  }
+  if (const RigFault other = same_device(reading); other != RigFault::none) return other;
+  if (reading.stopped_by != RigFault::none) return reading.stopped_by;
+  sample.when = {sample.when.number + 1, arrived_ns};
+  sample.cart = signed_counts(reading.cart_counts, rig_.calibration.cart.width_bits);
+  sample.pendulum = signed_counts(reading.pendulum_counts, rig_.calibration.pendulum.width_bits);
+  return RigFault::none;
 }
 
 void ModbusTransport::serve_write() noexcept {

@@ -9,6 +9,10 @@
 // `freshness_periods` is not sent any more, the exchange of read() then carries zero volts until a fresh one
 // is there.
 //
+// With `device_clock` the device samples on its own time. The thread then asks for the next sample by itself:
+// the request carries the voltage of the sample before, and the device answers it when it samples. So a
+// period is one exchange, and a voltage is out as soon as it was computed.
+//
 // In a joined rig the device has a part of this only. As encoders it is never sent a voltage but zero, and
 // with separate exchanges none at all; as output its readings have no counts and show that it answers.
 #pragma once
@@ -17,6 +21,7 @@
 #include <thread>
 
 #include "../rig_lock.hpp"
+#include "../sample_ring.hpp"
 #include "link.hpp"
 #include "stop_sequence.hpp"
 #include "upright/hal/rig.hpp"
@@ -35,6 +40,8 @@ class ModbusTransport final : public Rig {
   RigFault write(double voltage_v) noexcept override;
   /// The thread tries from now on (stop_sequence.hpp) until it is done, or until the rig is destroyed.
   StopReport stop() noexcept override;
+  bool is_clock() const noexcept override { return rig_.modbus->sampling.has_value(); }
+  DeviceSample wait_next(std::int64_t until_ns) noexcept override;
   int last_exception() const noexcept override { return exception_.load(std::memory_order_relaxed); }
   /// A status register shows an emergency stop and a limit switch at either end.
   SafetyInputs safety_inputs() const noexcept override {
@@ -46,6 +53,11 @@ class ModbusTransport final : public Rig {
   void serve() noexcept;
   void serve_read(std::uint32_t number) noexcept;
   void serve_write() noexcept;
+  void serve_sample() noexcept;
+  RigFault take_sample(RingSample& sample) noexcept;
+  bool sample_is_due() const noexcept;
+  std::int64_t next_ns() const noexcept;
+  RigReading newest_sample() noexcept;
   RigFault send_voltage() noexcept;
   void serve_stop() noexcept;
   bool stop_is_due() const noexcept;
@@ -62,13 +74,16 @@ class ModbusTransport final : public Rig {
   [[noreturn]] void fail(RigFault fault, const std::string& doing);
   template <class Exchange>
   void retried(Exchange exchange, const std::string& doing);
+  void require_line() const;
   void prepare_device();
+  void require_register(int address, int counts, const std::string& doing);
   void begin_serving();
 
   RigFile rig_;
   RigRoles roles_;
   bool writes_;  // a voltage, be it always zero
   RigLock lock_;
+  const double period_s_;
   std::int64_t patience_ns_;  // how long read() waits at most
   std::int64_t freshness_ns_;
   ModbusLink link_;
@@ -89,10 +104,15 @@ class ModbusTransport final : public Rig {
   RigReading reading_;
   std::atomic<RigFault> write_fault_{RigFault::none};
   std::atomic<int> exception_{0};
+  std::atomic<std::uint32_t> recoveries_{0};
+  SampleRing samples_;  // trouble: the fault
   // What is known of the stop; `zero_confirmed_` is set last.
   std::atomic<bool> zero_confirmed_{false}, read_back_{false}, disabled_{false};
   std::atomic<RigFault> stop_fault_{RigFault::none};
   std::atomic<int> stop_exception_{0};
+
+  // The loop's own.
+  std::uint64_t sample_read_ = 0, sample_waited_for_ = 0;
 
   // The thread's own.
   std::uint32_t read_served_ = 0, write_served_ = 0;
@@ -105,7 +125,7 @@ class ModbusTransport final : public Rig {
   int other_boots_in_a_row_ = 0, other_watchdogs_in_a_row_ = 0;
   int checks_refused_in_a_row_ = 0, reads_refused_in_a_row_ = 0, writes_refused_in_a_row_ = 0;
   std::uint64_t sequence_ = 0;
-  std::uint32_t recoveries_ = 0;
+  std::int64_t next_sample_ns_ = 0;  // when it is asked for at the latest
   std::int64_t pause_ns_ = 0;
   std::int64_t next_attempt_ns_ = 0;
 };

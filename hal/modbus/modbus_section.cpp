@@ -40,6 +40,12 @@ void watchdog_keys(YamlKeys& keys, DeviceWatchdog& watchdog) {
              "set time_s to 1 to 65535 times seconds_per_count");
 }
 
+void sampling_keys(YamlKeys& keys, DeviceSampling& sampling) {
+  address_key(keys, "sample_address", sampling.sample_address);
+  address_key(keys, "period_address", sampling.period_address);
+  keys.number("seconds_per_count", sampling.seconds_per_count, Range{1e-9, 1});
+}
+
 void serial_line_keys(YamlKeys& keys, ModbusRig& rig) {
   keys.text("device", rig.device);
   keys.integer("baud", rig.baud, 110, 4'000'000);
@@ -109,11 +115,13 @@ void check_registers(const YamlMap& map, const ModbusRig& rig, const RigRoles& r
   if (roles.pendulum) read.push_back({"counters", rig.pendulum_address, rig.counter.registers});
   if (rig.boot_count_address) read.push_back({"boot_count_address", *rig.boot_count_address, 1});
   if (rig.status_address) read.push_back({"status_address", *rig.status_address, 1});
+  if (rig.sampling) read.push_back({"device_clock", rig.sampling->sample_address, 1});
   std::vector<Block> written;
   if (carries_voltage(rig, roles))
     written.push_back({"voltage", rig.voltage_address, rig.voltage.registers()});
   if (rig.enable_address) written.push_back({"enable_address", *rig.enable_address, 1});
   if (rig.watchdog) written.push_back({"device_watchdog", rig.watchdog->address, 1});
+  if (rig.sampling) written.push_back({"device_clock", rig.sampling->period_address, 1});
   refuse_overlap(map, read);
   if (rig.input_registers) {
     refuse_overlap(map, written);
@@ -124,6 +132,9 @@ void check_registers(const YamlMap& map, const ModbusRig& rig, const RigRoles& r
   }
   int first = last_address, end = 0;
   for (const Block& block : read) {
+    if (rig.sampling && block.first > rig.sampling->sample_address)
+      map.fail("device_clock", "has a sample_address before the other registers that are read",
+               "use a device whose sample_address follows them, or remove device_clock");
     first = std::min(first, block.first);
     end = std::max(end, block.first + block.count);
   }
@@ -159,10 +170,13 @@ void modbus_keys(YamlKeys& keys, Backend link, const RigFile& rig_file, ModbusRi
     optional_address_key(keys, "enable_address", rig.enable_address);
     keys.optional_map("device_watchdog", rig.watchdog, watchdog_keys);
   }
+  if (roles.output && roles.encoders()) keys.optional_map("device_clock", rig.sampling, sampling_keys);
   if (const YamlMap* map = keys.source()) check_registers(*map, rig, roles);
   keys.needs("exchange", rig.exchange != ModbusExchange::read_write || !rig.input_registers,
              "is read_write, which reads holding registers only",
              "use exchange: separate, or table: holding");
+  keys.needs("device_clock", !rig.sampling || rig.exchange == ModbusExchange::read_write,
+             "needs one exchange that carries counts and voltage", "use exchange: read_write");
   keys.check("response_timeout_s", rig.response_timeout_s < rig_file.watchdog_s, "is not below watchdog_s",
              "set it to less than watchdog_s");
 }
@@ -184,6 +198,14 @@ std::unique_ptr<Rig> make_modbus(const RigFile& rig, double period_s) {
 
 int DeviceWatchdog::counts() const {
   return std::max(1, static_cast<int>(std::nearbyint(time_s / seconds_per_count)));
+}
+
+std::optional<int> DeviceSampling::counts(double period_s) const {
+  constexpr double max_counts = 65535.0, as_good_as_whole = 1e-6;
+  const double exact = period_s / seconds_per_count, whole = std::nearbyint(exact);
+  if (whole < 1.0 || whole > max_counts || std::abs(exact / whole - 1.0) > as_good_as_whole)
+    return std::nullopt;
+  return static_cast<int>(whole);
 }
 
 bool baud_is_known(int baud) {

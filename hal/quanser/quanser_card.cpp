@@ -128,6 +128,7 @@ void QuanserCard::prepare() {
   put_out_zero();
   set_up_output();
   set_up_encoders();
+  require_velocities();
   set_up_watchdog();
   std::this_thread::sleep_for(settling_time);
 }
@@ -175,6 +176,14 @@ void QuanserCard::set_up_encoders() const {
   require_where_supported(
       hil_.set_encoder_quadrature_mode(card_, encoders_.data(), encoder_count_, modes.data()),
       "setting the encoders to count all four edges");
+}
+
+void QuanserCard::require_velocities() const {
+  if (!wiring_.reads_velocities) return;
+  RawVelocities velocities;
+  require(
+      read_velocities(velocities),
+      "reading the velocities of the encoders (without quanser_hil.encoder_velocities they are not read)");
 }
 
 void QuanserCard::set_up_watchdog() const {
@@ -231,11 +240,16 @@ DeviceFacts QuanserCard::facts() const {
   return facts;
 }
 
-bool QuanserCard::read_velocities(std::array<double, 2>& counts_per_s) const noexcept {
+hil::Error QuanserCard::read_velocities(RawVelocities& counts_per_s) const noexcept {
+  if (encoder_count_ == 0 || hil_.read_other == nullptr) return -hil::not_supported;
   std::array<unsigned, 2> channels = encoders_;
   for (unsigned& channel : channels) channel += hil::first_velocity_channel;
-  return encoder_count_ > 0 && hil_.read_other != nullptr &&
-         hil_.read_other(card_, channels.data(), encoder_count_, counts_per_s.data()) >= 0;
+  std::array<double, 2> read{};
+  const hil::Error error = hil_.read_other(card_, channels.data(), encoder_count_, read.data());
+  if (error < 0) return error;
+  if (wiring_.cart_channel) counts_per_s.cart = read[0];
+  if (wiring_.pendulum_channel) counts_per_s.pendulum = read[encoder_count_ - 1];
+  return error;
 }
 
 hil::Error QuanserCard::read_counts(RawCounts& counts) const noexcept {

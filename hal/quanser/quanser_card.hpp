@@ -16,6 +16,10 @@ struct RawCounts {
   std::int32_t cart = 0, pendulum = 0;
 };
 
+struct RawVelocities {
+  double cart = 0.0, pendulum = 0.0;
+};
+
 class QuanserCard {
  public:
   /// Opens the card, which may take several attempts. Throws DeviceError.
@@ -31,8 +35,8 @@ class QuanserCard {
   void clear_counts();
   /// What the card says of itself. A part it does not tell is left out.
   DeviceFacts facts() const;
-  /// Velocities of the encoders in counts per second. False: the card has none.
-  bool read_velocities(std::array<double, 2>& counts_per_s) const noexcept;
+  /// Velocities of the encoders in counts per second. A card that measures none returns an error.
+  hil::Error read_velocities(RawVelocities& counts_per_s) const noexcept;
 
   hil::Error read_counts(RawCounts& counts) const noexcept;
 
@@ -75,6 +79,7 @@ class QuanserCard {
   void set_up_output();
   void set_up_enable();
   void set_up_encoders() const;
+  void require_velocities() const;
   void set_up_watchdog() const;
   void put_out_zero() const;
   void require(hil::Error error, const std::string& doing) const;

@@ -36,11 +36,11 @@ std::string board_words(QuanserCard& card) {
 std::string read_encoders(QuanserCard& card) {
   RawCounts counts;
   if (const hil::Error error = card.read_counts(counts); error < 0) card.fail(error, "reading the encoders");
-  std::array<double, 2> velocities{};
+  RawVelocities velocities;
   return "read, counts " + std::to_string(counts.cart) + " (cart) and " + std::to_string(counts.pendulum) +
          " (pendulum); " +
-         (card.read_velocities(velocities) ? "the card also measures velocities, which are not used"
-                                           : "the card does not measure velocities");
+         (card.read_velocities(velocities) >= 0 ? "the card also measures velocities (encoder_velocities)"
+                                                : "the card does not measure velocities");
 }
 
 std::string set_up(QuanserCard& card) {

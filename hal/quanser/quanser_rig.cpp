@@ -45,7 +45,7 @@ void QuanserTransport::open_card() {
 
 DeviceSample QuanserTransport::wait_next(std::int64_t until_ns) noexcept {
   if (!sampler_) return {};
-  const DeviceSample next = sampler_->wait_for_another(sample_waited_for_, until_ns).when;
+  const DeviceSample next = sampler_->samples().wait_for_another(sample_waited_for_, until_ns).when;
   sample_waited_for_ = next.number;
   return next;
 }
@@ -78,10 +78,10 @@ RigReading QuanserTransport::read_now() noexcept {
 
 RigReading QuanserTransport::read_sample() noexcept {
   RigReading reading;
-  const CardSample sample = sampler_->latest();
+  const RingSample sample = sampler_->samples().latest();
   reading.time_ns = sample.when.time_ns;
-  if (sample.error < 0) {
-    reading.fault = has_expired() ? RigFault::watchdog_expired : fault_of(sample.error);
+  if (sample.trouble != 0) {
+    reading.fault = has_expired() ? RigFault::watchdog_expired : fault_of(sample.trouble);
     return reading;
   }
   if (sample.when.number == sample_read_) {
@@ -89,10 +89,23 @@ RigReading QuanserTransport::read_sample() noexcept {
     return reading;
   }
   sample_read_ = sample.when.number;
-  return fresh(reading, sample.counts);
+  return fresh(reading, {static_cast<std::int32_t>(sample.cart), static_cast<std::int32_t>(sample.pendulum)});
+}
+
+/// Those of now, where the file asks for them.
+RigFault QuanserTransport::add_velocities(RigReading& reading) noexcept {
+  if (!rig_.quanser->reads_velocities) return RigFault::none;
+  RawVelocities velocities;
+  const hil::Error error = card_->read_velocities(velocities);
+  if (error < 0) return fault_of(error);
+  if (rig_.quanser->cart_channel) reading.cart_counts_per_s = velocities.cart;
+  if (rig_.quanser->pendulum_channel) reading.pendulum_counts_per_s = velocities.pendulum;
+  return RigFault::none;
 }
 
 RigReading QuanserTransport::fresh(RigReading reading, const RawCounts& counts) noexcept {
+  reading.fault = add_velocities(reading);
+  if (reading.fault != RigFault::none) return reading;
   reading.cart_counts = signed_counts(counts.cart, rig_.calibration.cart.width_bits);
   reading.pendulum_counts = signed_counts(counts.pendulum, rig_.calibration.pendulum.width_bits);
   reading.sequence = ++sequence_;

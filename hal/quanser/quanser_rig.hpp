@@ -35,6 +35,7 @@ class QuanserTransport final : public Rig {
   RigFault write(double voltage_v) noexcept override;
   StopReport stop() noexcept override;
   DeviceFacts device_facts() const override;
+  bool measures_velocities() const noexcept override { return rig_.quanser->reads_velocities; }
   bool is_clock() const noexcept override { return sampler_ != nullptr; }
   DeviceSample wait_next(std::int64_t until_ns) noexcept override;
 
@@ -43,6 +44,7 @@ class QuanserTransport final : public Rig {
   RigReading read_now() noexcept;
   RigReading read_sample() noexcept;
   RigReading fresh(RigReading reading, const RawCounts& counts) noexcept;
+  RigFault add_velocities(RigReading& reading) noexcept;
   RigFault serve_watchdog() noexcept;
   RigFault enable_once() noexcept;
   bool has_expired() noexcept;

@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "hal/word_wait.hpp"
 #include "upright/base/error.hpp"
 #include "upright/hal/clock.hpp"
 
@@ -58,51 +57,15 @@ void QuanserSampler::end() noexcept {
 /// The thread.
 void QuanserSampler::take_samples() noexcept {
   RawCounts counts;
-  for (std::uint64_t number = 1;; ++number) {
+  for (RingSample sample;;) {
     const hil::Error came = card_.wait_for_sample(task_, counts);
-    const std::int64_t time_ns = monotonic_ns();
-    if (came > 0)
-      publish(number, time_ns, counts);
-    else
-      error_.store(came < 0 ? came : stopped, std::memory_order_release);
-    arrived_.fetch_add(1, std::memory_order_release);
-    wake_one(arrived_);
+    if (came > 0) {
+      sample = {{sample.when.number + 1, monotonic_ns()}, counts.cart, counts.pendulum};
+    } else {
+      sample.trouble = came < 0 ? came : stopped;
+    }
+    samples_.publish(sample);
     if (came <= 0) return;
-  }
-}
-
-void QuanserSampler::publish(std::uint64_t number, std::int64_t time_ns, const RawCounts& counts) noexcept {
-  Slot& slot = slots_[number % slots_.size()];
-  slot.cart.store(counts.cart, std::memory_order_release);
-  slot.pendulum.store(counts.pendulum, std::memory_order_release);
-  slot.time_ns.store(time_ns, std::memory_order_release);
-  slot.number.store(number, std::memory_order_release);
-}
-
-CardSample QuanserSampler::latest() const noexcept {
-  CardSample sample;
-  for (;;) {
-    const std::uint32_t arrived = arrived_.load(std::memory_order_acquire);
-    const hil::Error error = error_.load(std::memory_order_acquire);
-    // The last arrival is not a sample where it is the end.
-    const Slot& slot = slots_[(error < 0 ? arrived - 1 : arrived) % slots_.size()];
-    sample.counts.cart = slot.cart.load(std::memory_order_acquire);
-    sample.counts.pendulum = slot.pendulum.load(std::memory_order_acquire);
-    sample.when.time_ns = slot.time_ns.load(std::memory_order_acquire);
-    sample.when.number = slot.number.load(std::memory_order_acquire);
-    sample.error = error;
-    // The slot is written anew for the fourth sample from here, which begins once the third has come.
-    constexpr std::uint32_t safe_arrivals = 2;
-    if (arrived_.load(std::memory_order_acquire) - arrived <= safe_arrivals) return sample;
-  }
-}
-
-CardSample QuanserSampler::wait_for_another(std::uint64_t number, std::int64_t until_ns) const noexcept {
-  for (;;) {
-    const std::uint32_t arrived = arrived_.load(std::memory_order_acquire);
-    const CardSample sample = latest();
-    if (sample.when.number != number || sample.error < 0 || monotonic_ns() >= until_ns) return sample;
-    wait_while(arrived_, arrived, until_ns);
   }
 }
 
@@ -119,13 +82,14 @@ void QuanserSampler::require_period(double period_s, const std::string& rig_file
 }
 
 double QuanserSampler::measured_period_s(double period_s, const std::string& rig_file) const {
-  const CardSample first = wait_for_another(
-      latest().when.number, monotonic_ns() + nanoseconds(std::max(first_within_s, 2.0 * period_s)));
+  const RingSample first = samples_.wait_for_another(
+      samples_.latest().when.number, monotonic_ns() + nanoseconds(std::max(first_within_s, 2.0 * period_s)));
   const std::int64_t until_ns =
       monotonic_ns() + nanoseconds(std::max(measured_for_s, min_periods * period_s));
-  CardSample last = first;
-  while (last.error >= 0 && monotonic_ns() < until_ns) last = wait_for_another(last.when.number, until_ns);
-  if (last.error < 0) card_.fail(last.error, "sampling on the card's own clock");
+  RingSample last = first;
+  while (last.trouble == 0 && monotonic_ns() < until_ns)
+    last = samples_.wait_for_another(last.when.number, until_ns);
+  if (last.trouble != 0) card_.fail(last.trouble, "sampling on the card's own clock");
   if (last.when.number == first.when.number)
     throw DeviceError(
         "the card of " + rig_file +

@@ -145,6 +145,7 @@ void quanser_keys(YamlKeys& keys, RigFile& rig, QuanserRig& quanser) {
   const QuanserCardKind* kind = quanser_card_kind(quanser.board_type);
   if (roles.encoders() && keys.given("clock", quanser.is_clock))
     keys.one_of("clock", quanser.is_clock, clocks);
+  if (roles.encoders()) keys.flag("encoder_velocities", quanser.reads_velocities, false, Usual::left_out);
   if (roles.encoders())
     keys.map("encoder_channels", [&](YamlKeys& map) { encoder_keys(map, roles, kind, quanser); });
   if (kind != nullptr && keys.source()) follow_at_width_of(*kind, roles, rig.calibration);

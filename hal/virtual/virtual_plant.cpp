@@ -75,6 +75,13 @@ EncoderCounts VirtualPlant::counts() const {
   return counts_at(Pose{seen.cart_m, seen.theta_rad}, calibration_);
 }
 
+std::array<double, 2> VirtualPlant::counts_per_s() const {
+  const PlantState<double>& state = simulator_.engine().state();
+  const EncoderCalibration &cart = calibration_.cart, &pendulum = calibration_.pendulum;
+  return {state.cart_mps / (cart.sign * cart.per_count),
+          state.theta_radps / (pendulum.sign * pendulum.per_count)};
+}
+
 void VirtualPlant::command(double voltage_v) {
   const double safe_v = safe_voltage(voltage_v, limit_v_);
   if (safe_v == voltage_v_) return;

@@ -17,6 +17,8 @@ class VirtualPlant {
   void advance_to(std::int64_t time_ns);
   EncoderCounts counts() const;
   void command(double voltage_v);
+  /// Rate of the counts of the cart's and of the pendulum's encoder [1/s].
+  std::array<double, 2> counts_per_s() const;
   /// A valid request came: the watchdog starts anew.
   void feed(double watchdog_s);
   void let_go();

@@ -154,6 +154,7 @@ Agreement agreement_of(const RunFiles& files) {
     try {
       require_link_fits(*files.rig, files.control->period_s());
       require_spin_fits(files.rig->spin_us, files.control->period_s());
+      require_velocities(*files.control, files.rig->quanser && files.rig->quanser->reads_velocities);
     } catch (const ConfigError& error) {
       agreement.errors.emplace_back(error.what());
     }

@@ -43,14 +43,21 @@ void Controller::act_on(const ControlState& newest) noexcept {
   if (parts_.compensator) acting_ = parts_.compensator->compensate(acting_, voltage_v_);
 }
 
-void Controller::advance(double cart_m, double theta_rad) noexcept {
+/// As the device measured it, where the gain file asks for that and there is a value.
+double Controller::velocity(VelocityEstimator& estimator, double position, double measured) const noexcept {
+  const double estimated = estimator.step(position);
+  return config_.estimator.kind == EstimatorKind::device && std::isfinite(measured) ? measured : estimated;
+}
+
+void Controller::advance(const ControlInput& input) noexcept {
   if (parts_.estimator)
-    state_ = parts_.estimator->update(cart_m, theta_rad, voltage_v_);
+    state_ = parts_.estimator->update(input.cart_m, input.theta_rad, voltage_v_);
   else
-    state_ = {cart_m, theta_rad, cart_.step(cart_m), pendulum_.step(theta_rad)};
+    state_ = {input.cart_m, input.theta_rad, velocity(cart_, input.cart_m, input.cart_velocity_mps),
+              velocity(pendulum_, input.theta_rad, input.pendulum_rate_radps)};
   act_on(state_);
-  state_.cart_m = cart_m;
-  state_.theta_rad = theta_rad;
+  state_.cart_m = input.cart_m;
+  state_.theta_rad = input.theta_rad;
 }
 
 void Controller::advance_to(const ControlInput& input, std::uint64_t periods) noexcept {
@@ -61,10 +68,15 @@ void Controller::advance_to(const ControlInput& input, std::uint64_t periods) no
       continue;
     }
     const double part = static_cast<double>(i) / static_cast<double>(periods);
-    advance(before.cart_m + part * (input.cart_m - before.cart_m),
-            before.theta_rad + part * (input.theta_rad - before.theta_rad));
+    const auto between = [part](double from, double to) { return from + part * (to - from); };
+    ControlInput missing;
+    missing.cart_m = between(before.cart_m, input.cart_m);
+    missing.theta_rad = between(before.theta_rad, input.theta_rad);
+    missing.cart_velocity_mps = between(before.cart_velocity_mps, input.cart_velocity_mps);
+    missing.pendulum_rate_radps = between(before.pendulum_rate_radps, input.pendulum_rate_radps);
+    advance(missing);
   }
-  advance(input.cart_m, input.theta_rad);
+  advance(input);
 }
 
 double Controller::feedback(const Demand& demand) const noexcept {

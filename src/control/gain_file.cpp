@@ -13,11 +13,13 @@ namespace {
 constexpr const char* second_order_name = "second_order_filter";
 constexpr const char* difference_name = "difference";
 
-constexpr Words<2> velocity_estimators = {second_order_name, difference_name};
+constexpr const char* device_name = "device";
+
+constexpr Words<3> velocity_estimators = {second_order_name, difference_name, device_name};
 
 void velocity_estimator_keys(YamlKeys& keys, EstimatorConfig& config) {
   keys.one_of("kind", config.kind, velocity_estimators);
-  if (config.kind == EstimatorKind::difference) return;
+  if (config.kind != EstimatorKind::second_order_filter) return;
   keys.number("cutoff_hz", config.cutoff_hz, {0.0, 1e5, true});
   keys.number("damping", config.damping, {0.0, 100.0, true});
 }
@@ -102,6 +104,7 @@ void estimate_keys(YamlKeys& document, ControlConfig& config) {
 
 std::string estimator_text(const EstimatorConfig& config) {
   if (config.kind == EstimatorKind::difference) return std::string("{kind: ") + difference_name + "}";
+  if (config.kind == EstimatorKind::device) return std::string("{kind: ") + device_name + "}";
   return std::string("{kind: ") + second_order_name + ", cutoff_hz: " + exact_text(config.cutoff_hz) +
          ", damping: " + exact_text(config.damping) + "}";
 }

@@ -57,7 +57,7 @@ EstimatorStep second_order_step(double wc, double zeta, double period) {
 EstimatorStep make_estimator_step(const EstimatorConfig& config, double period_s) {
   if (!(period_s > 0.0) || !std::isfinite(period_s))
     throw ConfigError("the sampling period is " + exact_text(period_s) + " s: use a value above 0");
-  if (config.kind == EstimatorKind::difference) {
+  if (config.kind != EstimatorKind::second_order_filter) {
     EstimatorStep step;
     step.g2 = 1.0 / period_s;
     return step;

@@ -44,7 +44,9 @@ class Replayer {
     Pose pose = scaler_.scale(row.cart_counts, row.pendulum_counts);
     if (!begun_) pose = scaler_.nearest_turn();
     begun_ = true;
-    const ControlOutput output = controller_.step({row.tick, pose.cart_m, pose.theta_rad, 0.0});
+    // Velocities that the device measured are the logged ones; what was estimated is estimated again.
+    const ControlOutput output = controller_.step(
+        {row.tick, pose.cart_m, pose.theta_rad, 0.0, row.cart_velocity_mps, row.pendulum_rate_radps});
     requested_v_ = output.voltage_requested_v;
     held_v_ = output.voltage_v;
   }

@@ -118,14 +118,16 @@ bool ControlLoop::accept(const RigReading& reading, const Wake& wake, LoopOutcom
   return false;
 }
 
-void ControlLoop::compute(const Wake& wake, LoopOutcome& outcome) noexcept {
+void ControlLoop::compute(const RigReading& reading, const Wake& wake, LoopOutcome& outcome) noexcept {
   Pose pose = scaler_.scale(row_.cart_counts, row_.pendulum_counts);
   if (!begun_) {
     pose = scaler_.nearest_turn();
     returning_ = scripted_;
   }
   begun_ = true;
-  const ControlOutput output = controller_.step({wake.tick, pose.cart_m, pose.theta_rad, 0.0});
+  const ControlOutput output = controller_.step({wake.tick, pose.cart_m, pose.theta_rad, 0.0,
+                                                 scaler_.cart_velocity_mps(reading.cart_counts_per_s),
+                                                 scaler_.pendulum_rate_radps(reading.pendulum_counts_per_s)});
   row_.cart_m = pose.cart_m;
   row_.theta_rad = pose.theta_rad;
   row_.cart_velocity_mps = output.state.cart_velocity_mps;
@@ -261,7 +263,7 @@ ControlLoop::Stamps ControlLoop::act(const Wake& wake, LoopOutcome& outcome) noe
   const RigReading reading = rig_.read();
   read_done_ns_ = clock_.now_ns();
   const bool computed = accept(reading, wake, outcome);
-  if (computed) compute(wake, outcome);
+  if (computed) compute(reading, wake, outcome);
   const std::int64_t computed_ns = clock_.now_ns();
   if (!stopped_) write(wake, computed_ns, outcome);
   return {read_done_ns_, computed_ns, clock_.now_ns()};

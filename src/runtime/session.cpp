@@ -71,6 +71,14 @@ void require_spin_fits(double spin_us, double period_s) {
                     "sample_rate_hz in the gain file");
 }
 
+void require_velocities(const ControlConfig& control, bool rig_measures_them) {
+  const bool asks = !control.has_state_estimator() && control.estimator.kind == EstimatorKind::device;
+  if (!asks || rig_measures_them) return;
+  throw ConfigError(
+      "velocity_estimator.kind of the gain file is device, but this rig measures no velocities: use "
+      "second_order_filter, or a card that measures them (quanser_hil.encoder_velocities)");
+}
+
 std::string gap_of_encoder_watch(const RigFile& rig) {
   const std::vector<std::string> missing =
       missing_assumptions(rig.encoder_watch.value_or(StatedAssumptions{}));
@@ -150,6 +158,7 @@ std::string waiting_note(const Rig& rig, const RunSetup& setup) {
 SessionResult run_to_its_stop(RunSetup setup, Rig& rig, Clock& clock, const SignalFlag& signal,
                               SessionOptions options) {
   set_spin(setup, rig, options.realtime);
+  require_velocities(setup.control, rig.measures_velocities());
   std::optional<CpuLatencyHold> awake;
   if (!clock.is_virtual()) awake.emplace();
   Controller controller(setup.control, setup.rig.amplifier.limit_v, std::move(options.parts));

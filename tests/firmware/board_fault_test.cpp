@@ -26,6 +26,7 @@ struct Case {
   bool cuts = false;
   const char* cause = "";  ///< a part of the run's sentence
   const char* more = "";   ///< of the test's name, where a fault has several
+  LoopClock clock = LoopClock::computer;
 };
 
 Case on_the_line(const char* fault, const LineFaults& line) {
@@ -81,11 +82,22 @@ std::vector<Case> device_cases() {
   };
 }
 
+/// On the board's clock the link takes another way.
+std::vector<Case> on_the_boards_clock(std::vector<Case> cases) {
+  std::erase_if(cases, [](const Case& c) { return c.mishap == Mishap::cart_sticks || *c.more != '\0'; });
+  for (Case& c : cases) {
+    c.clock = LoopClock::board;
+    c.more = "_on_the_boards_clock";
+  }
+  return cases;
+}
+
 std::vector<Case> all() {
   // The board's watchdog takes the voltage away while the controller stands still.
   const Expectation stood_still = stops({"overrun"}, watchdog_s + period_s);
   std::vector<Case> cases = line_cases();
   for (const Case& c : device_cases()) cases.push_back(c);
+  for (const Case& c : on_the_boards_clock(cases)) cases.push_back(c);
   for (const std::vector<ProcessCase>& list : {sign_cases(), machine_cases(period_s, stood_still)})
     for (const ProcessCase& c : list) cases.push_back({.process = c});
   return cases;
@@ -131,7 +143,7 @@ class BoardFault : public testing::TestWithParam<Case> {};
 TEST_P(BoardFault, HasItsOutcome) {
   const Case& c = GetParam();
   fault_case(c.process.fault, Bench::board, cell_of(c.process.expectation), [&] {
-    BoardSetting setting(c.process, c.line);
+    BoardSetting setting(c.process, c.line, c.clock);
     const auto evidence = came_about(setting.runs(), [&] { return evidence_of(c, setting); });
     if (!evidence) return;
     ASSERT_NO_FATAL_FAILURE(judge(*evidence, c.process.expectation));

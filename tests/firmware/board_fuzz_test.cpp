@@ -32,6 +32,8 @@ class Account {
     Bytes reply;                         ///< with zeros where the device's own numbers are
     std::vector<int> read;               ///< the addresses in it
     std::vector<std::vector<int>> held;  ///< for each of them what it may have held; empty: not told here
+    bool waits = false;                  ///< it comes with the next sample
+    bool may_be_dropped = false;         ///< bytes follow the request: the master no longer waits
   };
 
   /// What has to come of bytes that follow a silence and that a silence follows. The first is whole at
@@ -51,10 +53,15 @@ class Account {
       const double taken_s = free_s + longest_per_byte_s * static_cast<double>(size);
       const Span obeyed{whole_s, std::max(whole_s, taken_s) + longest_to_obey_s};
       answers.push_back(answer(frame, obeyed));
+      answers.back().may_be_dropped = answers.back().waits && place < bytes.size();
       free_s = obeyed.to_s + longest_per_byte_s * static_cast<double>(size_of(answers.back()));
     }
     return answers;
   }
+
+  static constexpr double byte_s = 1.0 / (Board::hz / Board::byte_cycles);
+  // It takes or sends a byte per round of its loop, which an interrupt has more than half of.
+  static constexpr double longest_per_byte_s = 3 * byte_s;
 
   /// The bytes of its reply.
   static std::size_t size_of(const Answer& answer) {
@@ -81,17 +88,15 @@ class Account {
     }
     return driven;
   }
+  double sample_period_s() const { return 1e-6 * period_us_; }
   double voltage_v() const {
     return enabled_ ? std::clamp(1e-3 * voltage_mv_, -Board::supply_v, Board::supply_v) : 0.0;
   }
 
  private:
   static constexpr std::size_t longest = 256;
-  static constexpr double byte_s = 1.0 / (Board::hz / Board::byte_cycles);
   // A byte of the line's time, a round of the board's loop, and the check sum of the longest reply.
   static constexpr double longest_to_obey_s = 0.2e-3;
-  // It takes or sends a byte per round of its loop, which an interrupt has more than half of.
-  static constexpr double longest_per_byte_s = 3 * byte_s;
   // The board counts ticks of 64 us: the one that has begun, and a fraction of one, may be missing; it acts a
   // round later.
   static constexpr double earlier_s = 0.15e-3, later_s = 0.1e-3;
@@ -107,8 +112,11 @@ class Account {
   static bool inside(int first, int count, int begin, int end) {
     return first >= begin && count >= 1 && first + count <= end;
   }
-  static bool readable(int first, int count) {
-    return inside(first, count, 0, 9) || inside(first, count, 16, 19);
+  bool readable(int first, int count) const {
+    return inside(first, count, 0, period_us_ != 0 ? 10 : 9) || inside(first, count, 16, 20);
+  }
+  bool waits(int first, int count) const {
+    return readable(first, count) && inside(9, 1, first, first + count);
   }
 
   Span expires() const {
@@ -122,6 +130,7 @@ class Account {
   std::vector<int> held(int address) const {
     if (address == 17) return {int{enabled_}};
     if (address == 18) return {watchdog_ms_};
+    if (address == 19) return {period_us_};
     if (address != 16) return {};
     if (may_have_expired_) return {voltage_mv_ & 0xffff, 0};
     return {voltage_mv_ & 0xffff};
@@ -140,6 +149,7 @@ class Account {
       answer.reply = framed(Bytes(frame.begin(), frame.begin() + 6));
       return answer;
     }
+    answer.waits = waits(word(frame, 2), word(frame, 4));
     answer.reply = {1, frame[1], static_cast<std::uint8_t>(2 * word(frame, 4))};
     for (int i = 0; i < word(frame, 4); ++i) {
       answer.read.push_back(word(frame, 2) + i);
@@ -162,7 +172,8 @@ class Account {
       case 0x17:
         if (word(frame, 4) == 0 || word(frame, 8) == 0 || 2 * word(frame, 8) != frame[10]) return 3;
         if (!readable(word(frame, 2), word(frame, 4))) return 2;
-        return write(word(frame, 6), words(frame, 11, word(frame, 8)));
+        return write(word(frame, 6), words(frame, 11, word(frame, 8)),
+                     waits(word(frame, 2), word(frame, 4)) ? 19 : 20);
     }
     return 1;
   }
@@ -174,12 +185,15 @@ class Account {
     return list;
   }
 
-  int write(int first, const Words& list) {
-    if (!inside(first, static_cast<int>(list.size()), 16, 19)) return 2;
+  /// Registers from `value_end` on can be written, and not by this request.
+  int write(int first, const Words& list, int value_end = 20) {
+    if (!inside(first, static_cast<int>(list.size()), 16, 20)) return 2;
     for (std::size_t i = 0; i < list.size(); ++i) {
       const int address = first + static_cast<int>(i);
       if (address == 17 && list[i] > 1) return 3;
       if (address == 18 && (list[i] == 0 || list[i] > 10'000)) return 3;
+      if (address == 19 && list[i] != 0 && list[i] < 500) return 3;
+      if (address >= value_end) return 3;
     }
     for (std::size_t i = 0; i < list.size(); ++i) {
       const int address = first + static_cast<int>(i);
@@ -187,11 +201,12 @@ class Account {
       if (address == 17) enabled_ = list[i] == 1;
       if (address == 17 && list[i] == 0) set_voltage(0);
       if (address == 18) watchdog_ms_ = list[i];
+      if (address == 19) period_us_ = list[i];
     }
     return 0;
   }
 
-  int voltage_mv_ = 0, watchdog_ms_ = 0;
+  int voltage_mv_ = 0, watchdog_ms_ = 0, period_us_ = 0;
   bool enabled_ = false;
   bool may_have_expired_ = false;  ///< a request came when the watchdog was about to act: perhaps it has
   Span fed_{-1.0, -1.0};
@@ -227,17 +242,17 @@ class Stream {
       words.push_back(one_in(3) ? static_cast<std::uint16_t>(below(2)) : value());
     return words;
   }
-  int address() { return one_in(8) ? value() : below(20); }
-  int writable() { return one_in(8) ? address() : 16 + below(3); }
+  int address() { return one_in(8) ? value() : below(21); }
+  int writable() { return one_in(8) ? address() : 16 + below(4); }
 
   Bytes request() {
     switch (below(8)) {
       case 0:
-        return reading(3 + below(2), address(), one_in(5) ? value() : 1 + below(9));
+        return reading(3 + below(2), address(), one_in(5) ? value() : 1 + below(10));
       case 1:
         return writing_one(writable(), value());
       case 2:
-        return writing(writable(), values(1 + below(3)));
+        return writing(writable(), values(1 + below(4)));
       case 3:
         return writing(17, {1});
       case 4:
@@ -245,7 +260,7 @@ class Stream {
       case 5:
         return framed(odd());
       default:
-        return exchanging(0, 1 + below(9), writable(), values(1 + below(2)));
+        return exchanging(0, 1 + below(10), writable(), values(1 + below(2)));
     }
   }
   /// A right check sum over anything.
@@ -305,19 +320,33 @@ class Fuzzed {
     board_.send(bytes);
     while (board_.line_is_busy()) board_.run_until(board_.now() + Board::byte_cycles);
     const double silence_s = 1.1e-3, replies_s = 1e-3 * (stream_.one_in(20) ? 60 : 2);
-    board_.run_for(silence_s + replies_s);
+    // The board takes what follows a request after its reply.
+    board_.run_for(silence_s + replies_s + Account::longest_per_byte_s * static_cast<double>(bytes.size()));
     while (now_s() < last_reply_s_ + between_bytes_s) board_.run_for(between_bytes_s);
     const std::vector<Account::Answer> expected = account_.take(bytes, sent_s);
     answers += static_cast<int>(expected.size());
+    for (const Account::Answer& answer : expected) {
+      // What follows a reply that came after all is read after it.
+      if (answer.may_be_dropped) board_.run_for(replies_after_s);
+      if (answer.waits && !answer.may_be_dropped) await_reply(sent_s + account_.sample_period_s());
+    }
     return right_replies(bytes, expected, before) && right_voltage(bytes);
   }
 
  private:
   /// Three requests may take longer to answer; between two bytes the board may have one of them to obey.
   static constexpr double between_bytes_s = 1e-3;
+  /// The longest burst takes this long behind a reply.
+  static constexpr double replies_after_s = 20e-3;
 
   std::pair<std::int64_t, std::int64_t> counts() const {
     return {board_.counts(Encoder::cart), board_.counts(Encoder::pendulum)};
+  }
+
+  /// Of a request that waits for a sample, which comes until then.
+  void await_reply(double until_s) {
+    const double sent_by_s = std::max(until_s, now_s()) + 2e-3;
+    while (now_s() < sent_by_s || now_s() < last_reply_s_ + between_bytes_s) board_.run_for(between_bytes_s);
   }
 
   void move_shafts() {
@@ -336,9 +365,16 @@ class Fuzzed {
 
   bool right_replies(const Bytes& bytes, const std::vector<Account::Answer>& expected,
                      const std::pair<std::int64_t, std::int64_t>& before) {
-    std::size_t place = 0;
+    std::size_t place = 0, certain_size = 0;
+    for (const Account::Answer& answer : expected)
+      if (!answer.may_be_dropped) certain_size += Account::size_of(answer);
     for (const Account::Answer& answer : expected) {
       const std::size_t size = Account::size_of(answer);
+      if (answer.may_be_dropped) {
+        if (replies_.size() < place + size + certain_size) continue;
+      } else {
+        certain_size -= size;
+      }
       if (replies_.size() < place + size) return fail(bytes, "a reply is missing");
       const Bytes reply(replies_.begin() + static_cast<std::ptrdiff_t>(place),
                         replies_.begin() + static_cast<std::ptrdiff_t>(place + size));

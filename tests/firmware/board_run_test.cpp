@@ -11,8 +11,8 @@
 namespace upright::test {
 namespace {
 
-void balance() {
-  BoardSetting setting;
+void balance(LoopClock clock) {
+  BoardSetting setting({}, {}, clock);
   Process controller(setting.command(5.0));
   const std::string said = controller.rest();
   const int exit_code = controller.wait();
@@ -29,10 +29,16 @@ void balance() {
   }
   EXPECT_EQ(trace.back().voltage_v, 0.0);
   EXPECT_TRUE(setting.board().at_rest());
+  const std::optional<YamlMap> timing = read_run(directory).outcome->optional_map("device_clock");
+  EXPECT_EQ(timing.has_value(), clock == LoopClock::board);
 }
 
 TEST(BoardRun, Balances) {
-  in_real_time(balance);
+  in_real_time([] { balance(LoopClock::computer); });
+}
+
+TEST(BoardRun, BalancesOnTheBoardsClock) {
+  in_real_time([] { balance(LoopClock::board); });
 }
 
 }  // namespace

@@ -11,7 +11,8 @@
 namespace upright::test {
 namespace {
 
-constexpr int cart = 0, boot_count = 4, status = 5, sequence = 6, voltage = 16, enable = 17, watchdog = 18;
+constexpr int cart = 0, boot_count = 4, status = 5, sequence = 6, sample = 9, voltage = 16, enable = 17,
+              watchdog = 18, sample_period = 19;
 constexpr std::uint16_t emergency_bit = 1, plus_bit = 2, minus_bit = 4, lost_bit = 8, watchdog_bit = 16;
 constexpr double begin_s = 0.02;  // the EEPROM takes its time
 constexpr double pwm_step_v = Board::supply_v / 800;
@@ -113,6 +114,54 @@ TEST_P(Firmware, NumbersItsReadings) {
   EXPECT_EQ(read(sequence), static_cast<std::uint16_t>(first + 1));
 }
 
+TEST_P(Firmware, AnswersWithItsNextSample) {
+  constexpr double period_s = 0.002, jitter_s = 150e-6;  // a round of the loop, and the emulator's bytes
+  constexpr int samples = 200;
+  write(sample_period, 2000);
+  const Bytes request = exchanging(cart, 10, voltage, {millivolts(2.0)});
+  std::uint16_t number = words_in(master.ask(request, 0.01)).value().at(sample);
+  const double first_s = master.replied_s();
+  for (int i = 1; i <= samples; ++i) {
+    board.turn_to(Encoder::cart, 10 * i, Board::hz / 40'000);
+    const auto words = words_in(master.ask(request, 0.01));
+    ASSERT_TRUE(words && words->size() == 10);
+    EXPECT_EQ(words->at(sample), ++number);
+    EXPECT_NEAR(master.replied_s(), first_s + period_s * i, jitter_s);
+    EXPECT_EQ(words->at(1), 10 * i) << "counts of the sample, not of the request";
+  }
+  EXPECT_EQ(read(voltage), millivolts(2.0));
+}
+
+TEST_P(Firmware, CountsSamplesThatNobodyWaitsFor) {
+  write(sample_period, 2000);
+  const auto number = [&] { return words_in(master.ask(reading(3, sample, 1), 0.01)).value().at(0); };
+  const std::uint16_t before = number();
+  board.run_for(0.0205);
+  EXPECT_EQ(number(), before + 11);
+}
+
+TEST_P(Firmware, AWaitingRequestEndsWithTheNextByte) {
+  write(sample_period, 20'000);
+  master.ask(reading(3, sample, 1), 0.03);  // just after a sample
+  EXPECT_TRUE(master.ask(reading(3, cart, 10)).empty());
+  EXPECT_EQ(master.ask(reading(3, boot_count, 1)).size(), 7u);
+  EXPECT_TRUE(master.ask({0x55}, 0.03).empty()) << "the request that waited is not answered any more";
+}
+
+TEST_P(Firmware, RefusesWhatNoSampleCanAnswer) {
+  EXPECT_EQ(master.ask(reading(3, sample, 1)), refusal(3, 2)) << "as after a restart";
+  EXPECT_EQ(master.ask(writing(sample_period, {499})), refusal(0x10, 3));
+  write(sample_period, 500);
+  EXPECT_EQ(master.ask(exchanging(sample, 1, sample_period, {0})), refusal(0x17, 3));
+  EXPECT_EQ(read(sample_period), 500);
+  write(sample_period, 0);
+  EXPECT_EQ(master.ask(reading(3, sample, 1)), refusal(3, 2));
+  write(sample_period, 2000);
+  board.brown_out();
+  board.run_for(begin_s);
+  EXPECT_EQ(read(sample_period), 0);
+}
+
 TEST_P(Firmware, RefusesWhatItCannotDo) {
   EXPECT_EQ(master.ask(framed({1, 0x2b, 0x0e, 1, 0})), refusal(0x2b, 1));
   EXPECT_EQ(master.ask(reading(3, 9, 1)), refusal(3, 2));
@@ -120,7 +169,7 @@ TEST_P(Firmware, RefusesWhatItCannotDo) {
   EXPECT_EQ(master.ask(reading(3, 0, 0)), refusal(3, 3));
   EXPECT_EQ(master.ask(reading(3, 65535, 2)), refusal(3, 2));
   EXPECT_EQ(master.ask(writing(cart, {1})), refusal(0x10, 2));
-  EXPECT_EQ(master.ask(writing(watchdog, {1, 1})), refusal(0x10, 2));
+  EXPECT_EQ(master.ask(writing(watchdog, {1, 0, 1})), refusal(0x10, 2));
   EXPECT_EQ(master.ask(writing(watchdog, {0})), refusal(0x10, 3));
   EXPECT_EQ(master.ask(writing(enable, {2})), refusal(0x10, 3));
   drive(0.0);
@@ -206,6 +255,17 @@ TEST_P(Firmware, StopInputsTakeTheVoltageAwayAtOnceAndForGood) {
   EXPECT_NEAR(voltage_now(), 6.0, 2 * pwm_step_v);
 }
 
+TEST_P(Firmware, ShowsWhatIsPressedWhileTheMotorIsDisabled) {
+  board.press(StopInput::plus, true);
+  board.run_for(0.001);
+  EXPECT_EQ(read(status), plus_bit);
+  board.press(StopInput::plus, false);
+  board.run_for(0.001);
+  EXPECT_EQ(read(status), 0) << "a switch that is tested by hand need not be acknowledged";
+  drive(6.0);
+  EXPECT_NEAR(voltage_now(), 6.0, 2 * pwm_step_v);
+}
+
 TEST_P(Firmware, AnInputThatIsNotWiredIsPressed) {
   board.press(StopInput::minus, true);  // its pull-up makes it so
   board.brown_out();
@@ -227,7 +287,7 @@ TEST_P(Firmware, ASpikeOnAStopInputIsNoStop) {
 TEST_P(Firmware, SaysThatItLostEdgesAndGivesNoCountsAnyMore) {
   drive(6.0);
   const double begun_s = board.now_s();
-  board.turn_to(Encoder::cart, 4000, Board::hz / 400'000);
+  board.turn_to(Encoder::cart, 4000, Board::hz / 200'000);  // one or two edges between two samples
   board.run_for(0.02);
   EXPECT_LT(static_cast<double>(board.last_on()) / Board::hz, begun_s + 0.001);
   EXPECT_EQ(read(status), lost_bit);

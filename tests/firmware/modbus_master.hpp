@@ -94,19 +94,21 @@ class ModbusMaster {
     });
   }
 
-  /// Empty: none within 2 ms after the request.
-  Bytes ask(const Bytes& request) {
+  /// Empty: none within this time after the request.
+  Bytes ask(const Bytes& request, double patience_s = 0.002) {
     reply_.clear();
     board_.send(request);
     const Board::Cycles slice = Board::byte_cycles / 2;
     while (board_.line_is_busy()) board_.run_until(board_.now() + slice);
     // Between two bytes of a reply the board does other things, too.
     constexpr Board::Cycles over = 5 * Board::byte_cycles;
-    const Board::Cycles until = board_.now() + Board::cycles(0.002);
+    const Board::Cycles until = board_.now() + Board::cycles(patience_s);
     while (board_.now() < until && !(!reply_.empty() && board_.now() - came_ > over))
       board_.run_until(board_.now() + slice);
     return reply_;
   }
+  /// When the last byte of the latest reply came.
+  double replied_s() const { return static_cast<double>(came_) / Board::hz; }
 
  private:
   Board& board_;

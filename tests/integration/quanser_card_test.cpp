@@ -2,6 +2,7 @@
 // doctor's proof, and what a run records of the card.
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <cstdlib>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -60,11 +61,19 @@ struct CardRun {
   int exit_code;
 };
 
-CardRun run_at_200_hz(Folder& folder, const CardProcess& card, const char* duration_s) {
+constexpr const char* shipped_filter = "{kind: second_order_filter, cutoff_hz: 50, damping: 0.9}";
+
+void write_files_for_200_hz(const Folder& folder, const CardProcess& card, const char* velocity_estimator) {
   std::ofstream(folder / "rig.yaml") << card.rig_text();
   std::ofstream(folder / "gains.yaml")
-      << replaced(text_of(UPRIGHT_SOURCE_DIR "/config/gains/exponential.yaml"), "sample_rate_hz: 1000",
-                  "sample_rate_hz: 200");
+      << replaced(replaced(text_of(UPRIGHT_SOURCE_DIR "/config/gains/exponential.yaml"),
+                           "sample_rate_hz: 1000", "sample_rate_hz: 200"),
+                  shipped_filter, velocity_estimator);
+}
+
+CardRun run_at_200_hz(Folder& folder, const CardProcess& card, const char* duration_s,
+                      const char* velocity_estimator = shipped_filter) {
+  write_files_for_200_hz(folder, card, velocity_estimator);
   Process run({UPRIGHT_BINARY, "run", "--rig", folder / "rig.yaml", "--gains", folder / "gains.yaml",
                "--duration", duration_s, "--out", folder / "runs", "--json", "--unchecked"});
   nlohmann::json document = nlohmann::json::parse(run.rest());
@@ -162,6 +171,55 @@ TEST(QuanserCard, IsProvedStepByStep) {
                                               "Quanser card's encoders", "Quanser card's watchdog"}));
   EXPECT_FALSE(bench.last().locked);
   for (const CardRow& row : bench.card.record()) EXPECT_EQ(row.analog_v, 0.0);
+}
+
+/// The same, where the card's velocities are read.
+std::string with_velocities(const std::string& rig_text) {
+  return rig_text + "  encoder_velocities: true\n";
+}
+
+TEST(QuanserCard, ReadsVelocitiesOnlyWhereTheFileAsksForThem) {
+  Bench plain;
+  plain.rig->open();
+  EXPECT_FALSE(plain.rig->measures_velocities());
+  EXPECT_TRUE(std::isnan(plain.rig->read().cart_counts_per_s));
+  Bench bench(with_velocities(fake_card_rig()));
+  bench.rig->open();
+  EXPECT_TRUE(bench.rig->measures_velocities());
+  EXPECT_EQ(bench.rig->read().cart_counts_per_s, 0.0);
+  ASSERT_EQ(bench.rig->write(4.0), RigFault::none);
+  sleep_s(0.03);
+  const RigReading moving = bench.rig->read();
+  EXPECT_GT(moving.cart_counts_per_s, 100.0);
+  EXPECT_GT(moving.cart_counts, 0);
+}
+
+TEST(QuanserCard, ACardWithoutVelocitiesIsRefused) {
+  Bench bench(with_velocities(fake_card_rig()), {"--lacks-velocities", "true"});
+  const std::string sentence = refusal_of(*bench.rig);
+  EXPECT_NE(sentence.find("reading the velocities of the encoders"), std::string::npos) << sentence;
+}
+
+TEST(QuanserCard, ARunOnMeasuredVelocitiesReplays) {
+  in_real_time([] {
+    Folder folder;
+    const CardProcess card(folder, with_velocities(fake_card_rig()));
+    const CardRun run = run_at_200_hz(folder, card, "1", "{kind: device}");
+    EXPECT_END(run_end(run.text).value(), run.exit_code == 0);
+    Process replay({UPRIGHT_BINARY, "replay", only_entry(folder / "runs")});
+    replay.rest();
+    EXPECT_EQ(replay.wait(), 0);
+  });
+}
+
+TEST(QuanserCard, ARigWithoutVelocitiesCannotRunOnThem) {
+  Folder folder;
+  const CardProcess card(folder, fake_card_rig());
+  write_files_for_200_hz(folder, card, "{kind: device}");
+  Process run({UPRIGHT_BINARY, "run", "--rig", folder / "rig.yaml", "--gains", folder / "gains.yaml",
+               "--duration", "1", "--out", folder / "runs", "--unchecked"});
+  run.rest();
+  EXPECT_EQ(run.wait(), 2);
 }
 
 TEST(QuanserCard, SamplesOnItsOwnClockAreReadOnceEach) {

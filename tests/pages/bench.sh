@@ -5,6 +5,7 @@ export USER=${USER:-$(id -un)}
 
 # serve COMMAND...: starts a server and waits until it listens.
 serve() {
+  : >"$bench/server.out"  # what the previous server said
   "$@" >"$bench/server.out" 2>"$bench/server.err" </dev/null &
   local server=$!
   echo "$server" >>"$bench/servers"
@@ -61,14 +62,16 @@ tcp_device() {
   serve upright virtual-rig --rig my-rig.yaml --tcp "127.0.0.1:$(cat "$bench/port")" --theta0-deg "$1" --hang "$2"
 }
 
-# board_device: the same map as a board on a serial line, with its pendulum hanging.
-# my-rig.yaml is config/rigs/board.yaml.
+# board_device ANGLE HANG_S: the same map as a board on a serial line; ANGLE and HANG_S as for tcp_device.
+# my-rig.yaml is config/rigs/board.yaml with the response timeout that the page asks for; its watchdog leaves time to a busy
+# machine.
 board_device() {
   end_servers
   copy_rig board
   echo 'simulated: {plant: config/plants/exponential.yaml, initial: {cart_m: 0.0, theta_rad: 3.14159}}' >>my-rig.yaml
-  serve upright virtual-rig --rig my-rig.yaml --rtu "$bench/line" --theta0-deg 180 --no-pace
-  sed -i "s#/dev/ttyACM0#$bench/line#" my-rig.yaml
+  sed -i "s#/dev/ttyACM0#$bench/line#; s/response_timeout_s: .*/response_timeout_s: 0.008/;
+    s/^watchdog_s: .*/watchdog_s: 0.5/" my-rig.yaml
+  serve upright virtual-rig --rig my-rig.yaml --rtu "$bench/line" --theta0-deg "$1" --hang "$2" --no-pace
 }
 
 # example_runs COUNT: runs of the simulated rig with the paper's friction.

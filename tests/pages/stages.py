@@ -36,9 +36,12 @@ STAGES = {
         setup="example_runs 3",
         replaced=((r"PLANT --data RUN\.\.\. --out DIR", "config/plants/exponential.yaml --data runs/* --out diagnosis"),)),
     "docs/how-to/build-a-board.md": Stage(
-        setup="board_device; cp config/plants/viscous.yaml my-plant.yaml",
-        replaced=(SHORT_DOCTOR, (r"^make (?=flash SUPPLY_MV|flash-isp)", "make -C firmware ")),
-        stopped=(DOCTOR,)),
+        setup="board_device 180 0",
+        replaced=((r" --seconds 1$", ""), SHORT_DOCTOR, (r"--wait 120", "--wait 0.1"),
+                  (r"upright run (.*) --duration 30", r"board_device 3 1 && upright run \1 --duration 2")),
+        # A hanging pendulum counts as fallen.
+        stopped=(DOCTOR, r"upright run .* --wait 120 --unchecked"),
+        real_time=True),
     "docs/how-to/choose-a-delay.md": Stage(
         setup="simulated_rig", replaced=(SHORT_DOCTOR,), stopped=(DOCTOR,)),
     "docs/how-to/find-a-missing-effect.md": Stage(

@@ -170,6 +170,37 @@ TEST(Controller, KeepsItsTimeAcrossMissingSamples) {
   }
 }
 
+TEST(Controller, FeedsBackMeasuredVelocitiesWhereItIsAskedTo) {
+  ControlConfig config = gain_seven();
+  config.estimator.kind = EstimatorKind::device;
+  Controller device(config, 1e6);
+  config.estimator.kind = EstimatorKind::difference;
+  Controller difference(config, 1e6);
+  for (std::uint64_t k = 0; k < 20; ++k) {
+    ControlInput input{k, 0.001 * static_cast<double>(k * k), -0.002 * static_cast<double>(k), 0.0};
+    const ControlOutput estimated = difference.step(input);
+    if (k % 2 == 0) input.cart_velocity_mps = 0.7;
+    input.pendulum_rate_radps = -0.4;
+    const ControlOutput measured = device.step(input);
+    if (k == 0) continue;  // it begins at rest
+    EXPECT_EQ(measured.state.cart_velocity_mps, k % 2 == 0 ? 0.7 : estimated.state.cart_velocity_mps);
+    EXPECT_EQ(measured.state.pendulum_rate_radps, -0.4);
+  }
+}
+
+TEST(Controller, BridgesMeasuredVelocitiesOverMissingSamples) {
+  ControlConfig config = gain_seven(0.0042);
+  config.estimator.kind = EstimatorKind::device;
+  Controller whole(config, 1e6), holed(config, 1e6);
+  for (std::uint64_t k = 0; k < 100; ++k) {
+    const double t = static_cast<double>(k);
+    const ControlInput input{k, 0.0003 * t, -0.0001 * t, 0.0, 0.01 * t, -0.02 * t};
+    const double expected = whole.step(input).voltage_v;
+    if (k % 7 == 3 || k % 7 == 4) continue;
+    EXPECT_NEAR(holed.step(input).voltage_v, expected, 1e-9);
+  }
+}
+
 TEST(Controller, RefusesAPredictorItDoesNotHave) {
   ControlConfig config = gain_seven();
   config.compensation.kind = CompensationKind::predictor;
@@ -193,7 +224,9 @@ TEST(GainFile, WritesWhatReadsBackToTheSameBits) {
     config.gains = {any(random), any(random), any(random), any(random)};
     config.delay_s = part(random);
     config.sample_rate_hz = 1.0 + 9999.0 * part(random);
-    config.estimator = {i % 2 == 0 ? EstimatorKind::second_order_filter : EstimatorKind::difference,
+    config.estimator = {i % 2 == 0   ? EstimatorKind::second_order_filter
+                        : i % 4 == 1 ? EstimatorKind::difference
+                                     : EstimatorKind::device,
                         1.0 + 100.0 * part(random), 0.1 + part(random)};
     if (i % 3 == 0) config.compensation = {CompensationKind::predictor, "/plants/it's #1.yaml"};
     const ControlConfig back = read_gains(YamlMap::from_text(gain_text(config, {"random"}), "gains.yaml"));

@@ -127,6 +127,36 @@ TEST(RigFile, AQuansersCardMayBeTheClock) {
   EXPECT_THROW(quanser_with("q2_usb", "q2_usb\n  clock: device"), ConfigError);
 }
 
+/// The board's file with its clock.
+std::string board_as_clock() {
+  return text_of(rigs / "board.yaml") +
+         "  device_clock: {sample_address: 9, period_address: 19, seconds_per_count: 1.0e-6}\n";
+}
+
+TEST(RigFile, AModbusDeviceMayBeTheClock) {
+  const RigFile rig = read_rig(YamlMap::from_text(board_as_clock(), "rig.yaml"));
+  ASSERT_TRUE(rig.modbus->sampling.has_value());
+  EXPECT_EQ(rig.modbus->sampling->counts(0.005), 5000);
+  EXPECT_EQ(rig.modbus->sampling->counts(1.0 / 300.0), std::nullopt) << "no whole number of microseconds";
+  EXPECT_EQ(rig.modbus->sampling->counts(0.066), std::nullopt) << "more than a register holds";
+  const std::string text = rig_text(rig);
+  EXPECT_EQ(rig_text(read_rig(YamlMap::from_text(text, "again.yaml"))), text);
+  EXPECT_FALSE(read_rig_file(rigs / "board.yaml").modbus->sampling);
+}
+
+TEST(RigFile, RefusesADeviceClockThatCannotBe) {
+  const auto with = [](const std::string& from, const std::string& to) {
+    std::string text = board_as_clock();
+    return refusal(text.replace(text.find(from), from.size(), to));
+  };
+  EXPECT_NE(with("exchange: read_write", "exchange: separate").find("use exchange: read_write"),
+            std::string::npos);
+  EXPECT_NE(with("sample_address: 9", "sample_address: 5").find("shares a register"), std::string::npos);
+  EXPECT_NE(with("status_address: 5", "status_address: 11").find("has a sample_address before"),
+            std::string::npos);
+  EXPECT_NE(with("period_address: 19", "period_address: 18").find("shares a register"), std::string::npos);
+}
+
 TEST(RigFile, AQuansersLibraryIsANameOrAPathBesideTheRigFile) {
   EXPECT_EQ(quanser_with("libhil.so ", "../lib/libhil.so ").quanser->library, "/lib/libhil.so");
   const RigFile rig = quanser_with("libhil.so ", "./libhil.so ");

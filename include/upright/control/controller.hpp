@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <memory>
 
 #include "upright/control/command_source.hpp"
@@ -22,6 +23,10 @@ struct ControlInput {
   double cart_m = 0.0;       ///< position of the cart [m]
   double theta_rad = 0.0;    ///< angle of the pendulum [rad]
   double reference_m = 0.0;  ///< set-point of the cart position [m]
+  /// Velocities as the rig's device measures them, used if the gain file asks for them
+  /// (EstimatorKind::device). Not a number: not measured.
+  double cart_velocity_mps = std::numeric_limits<double>::quiet_NaN();
+  double pendulum_rate_radps = std::numeric_limits<double>::quiet_NaN();  ///< the same of the pendulum
 };
 
 /// What the control step computed.
@@ -66,7 +71,8 @@ class Controller {
   void begin(const ControlInput& input) noexcept;
   double feedback(const Demand& demand) const noexcept;
   void advance_to(const ControlInput& input, std::uint64_t periods) noexcept;
-  void advance(double cart_m, double theta_rad) noexcept;
+  void advance(const ControlInput& input) noexcept;
+  double velocity(VelocityEstimator& estimator, double position, double measured) const noexcept;
   void act_on(const ControlState& newest) noexcept;
 
   ControlConfig config_;

@@ -9,11 +9,12 @@ namespace upright {
 enum class EstimatorKind : std::uint8_t {
   second_order_filter,  ///< wc^2 s / (s^2 + 2 zeta wc s + wc^2), as on Quanser rigs
   difference,           ///< (x_k - x_{k-1}) / T
+  device,               ///< as the rig's device measures them; simulations and margins take `difference`
 };
 
 /// Section `velocity_estimator` of a gain file.
 struct EstimatorConfig {
-  EstimatorKind kind = EstimatorKind::second_order_filter;  ///< filter or difference
+  EstimatorKind kind = EstimatorKind::second_order_filter;  ///< filter, difference or device
   double cutoff_hz = 50.0;                                  ///< wc / (2 pi)
   double damping = 0.9;                                     ///< zeta
 };

@@ -112,6 +112,15 @@ class PoseScaler {
     return pose();
   }
 
+  /// Of the device's counts per second [m/s].
+  double cart_velocity_mps(double counts_per_s) const noexcept {
+    return calibration_.cart.sign * calibration_.cart.per_count * counts_per_s;
+  }
+  /// Of the device's counts per second [rad/s].
+  double pendulum_rate_radps(double counts_per_s) const noexcept {
+    return calibration_.pendulum.sign * calibration_.pendulum.per_count * counts_per_s;
+  }
+
   const Calibration& calibration() const noexcept { return calibration_; }  ///< the calibration in use
 
  private:

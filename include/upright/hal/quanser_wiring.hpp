@@ -32,6 +32,7 @@ struct QuanserRig {
   std::string board_identifier = "0";                     ///< or a URI
   std::string board_options;                              ///< for hil_set_card_specific_options; empty: none
   bool is_clock = false;                ///< the card samples on its own time, and the loop follows it
+  bool reads_velocities = false;        ///< of the encoders, which the card measures
   std::optional<int> cart_channel;      ///< absent: another backend counts
   std::optional<int> pendulum_channel;  ///< absent: another backend counts
   std::optional<QuanserOutput> output;  ///< absent: another backend has the output

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <string>
 #include <utility>
 #include <vector>
@@ -59,8 +60,11 @@ constexpr bool is_safety_input(RigFault fault) noexcept {
 struct RigReading {
   std::int64_t cart_counts = 0;      ///< of the cart's encoder
   std::int64_t pendulum_counts = 0;  ///< of the pendulum's encoder
-  std::int64_t time_ns = 0;          ///< when the counts were taken, on the loop's clock
-  std::uint64_t sequence = 0;        ///< increases with each fresh reading
+  /// As the device measures it [1/s]; not a number: it measures no velocities.
+  double cart_counts_per_s = std::numeric_limits<double>::quiet_NaN();
+  double pendulum_counts_per_s = std::numeric_limits<double>::quiet_NaN();  ///< the same of the pendulum's
+  std::int64_t time_ns = 0;    ///< when the counts were taken, on the loop's clock
+  std::uint64_t sequence = 0;  ///< increases with each fresh reading
   /// How often the link was recovered since the rig was opened: reconnected or resynchronised.
   std::uint32_t recoveries = 0;
   RigStatus status = RigStatus::fault;  ///< whether the counts are new
@@ -136,6 +140,9 @@ class Rig {
   /// False: the loop follows the computer's clock. Of an open rig; a rig around another one passes on that
   /// one's.
   virtual bool is_clock() const noexcept { return false; }
+  /// Readings hold the velocities of both encoders, as the device measures them. Of an open rig; a rig around
+  /// another one passes it on.
+  virtual bool measures_velocities() const noexcept { return false; }
   /// Waits for a sample that this function has not returned yet, at most until `until_ns`. Returns the newest
   /// sample, which has the number returned before where no new one came. A rig around another one passes it
   /// on.

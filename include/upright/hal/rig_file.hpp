@@ -71,6 +71,16 @@ struct DeviceWatchdog {
   int counts() const;  ///< its time as the register holds it
 };
 
+/// A device that samples on its own time: it answers a read of `sample_address` with its next sample.
+struct DeviceSampling {
+  int sample_address = 0;          ///< holding register: the sample's number
+  int period_address = 0;          ///< holding register: the time between samples; 0: none are taken
+  double seconds_per_count = 0.0;  ///< of that register
+
+  /// A period as the register holds it; absent: it cannot.
+  std::optional<int> counts(double period_s) const;
+};
+
 /// Section `modbus` of a rig file.
 struct ModbusRig {
   std::string host;                 ///< modbus-tcp
@@ -97,6 +107,7 @@ struct ModbusRig {
   /// Same table as the counters: why the device has stopped the motor itself, see fault_in_status().
   std::optional<int> status_address;
   std::optional<DeviceWatchdog> watchdog;  ///< absent: the device has none
+  std::optional<DeviceSampling> sampling;  ///< absent: the loop follows the computer's clock
 };
 
 /// The section of a backend that has no own member in RigFile.

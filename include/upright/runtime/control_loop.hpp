@@ -63,7 +63,7 @@ class ControlLoop {
   void log_stop(std::int64_t woke_ns, LoopOutcome& outcome) noexcept;
   void run_cycle(const Wake& wake, std::int64_t woke_ns, LoopOutcome& outcome) noexcept;
   bool accept(const RigReading& reading, const Wake& wake, LoopOutcome& outcome) noexcept;
-  void compute(const Wake& wake, LoopOutcome& outcome) noexcept;
+  void compute(const RigReading& reading, const Wake& wake, LoopOutcome& outcome) noexcept;
   bool beyond_track(const Demand& demand) noexcept;
   bool strays_on_return() noexcept;
   void watch_encoders(const Wake& wake, bool balancing, LoopOutcome& outcome) noexcept;

@@ -22,6 +22,9 @@ std::uint64_t default_periods_late(double period_s);
 /// Throws ConfigError where the loop would poll the clock for too large a share of each period.
 void require_spin_fits(double spin_us, double period_s);
 
+/// Throws ConfigError if the gain file asks for velocities that the rig's device measures, and it does not.
+void require_velocities(const ControlConfig& control, bool rig_measures_them);
+
 /// Which bounds of the encoder watch a rig file lacks where no plant is known, in a sentence; empty: none.
 std::string gap_of_encoder_watch(const RigFile& rig);
 

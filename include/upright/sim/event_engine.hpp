@@ -53,16 +53,22 @@ class EventEngine {
     while (value_of(remaining) > 0.0 && !halted_) {
       ++step_count_;
       const bool held = budget_.spent(time_s_);
-      update_bristle_step_limit(value_of(state_.motor_v));
+      BeginRate<double> plain_begin = update_bristle_step_limit(value_of(state_.motor_v));
       const S step = next_step(remaining);
-      FirstRate rate;
       const bool quick = linearises_in_middle();
+      BeginRate<S> begin;
+      if constexpr (std::is_same_v<S, double>) begin = plain_begin;
       PlantState<S> next{};
-      if (!quick) next = rk4(dynamics_, state_, drive_, step, &rate);
+      if (!quick) next = rk4(dynamics_, state_, drive_, step, &begin);
+      if constexpr (std::is_same_v<S, double>) plain_begin = begin;
       const PlantState<double> plain_next =
-          quick ? rk4(plain_, plain_state(state_), value_of(drive_), value_of(step), &rate)
+          quick ? rk4(plain_, plain_state(state_), value_of(drive_), value_of(step), &plain_begin)
                 : plain_state(next);
-      const auto along = [&](double t) { return plain_step(t); };
+      const FirstRate rate = quick ? FirstRate{plain_begin->cart_mps, plain_begin->theta_radps}
+                                   : FirstRate{value_of(begin->cart_mps), value_of(begin->theta_radps)};
+      const auto along = [&](double t) {
+        return rk4(plain_, plain_state(state_), value_of(drive_), t, &plain_begin);
+      };
       const auto found = first_event(plain_next, rate, value_of(step), held, along);
       if (!found) {
         if (!quick) state_ = next;
@@ -73,7 +79,7 @@ class EventEngine {
         time_s_ += value_of(step);
         continue;
       }
-      remaining = remaining - pass(*found, held);
+      remaining = remaining - pass(*found, held, begin);
     }
   }
 
@@ -186,6 +192,10 @@ class EventEngine {
     double after_s;
   };
 
+  /// The rate at the beginning of a step, once it is known.
+  template <class T>
+  using BeginRate = std::optional<PlantState<T>>;
+
   /// Accelerations at the beginning of a step.
   struct FirstRate {
     double cart_mps2 = 0.0;
@@ -226,9 +236,9 @@ class EventEngine {
 
   /// The initial rate of the bristles, and the greatest rate that a step must resolve: their approach to
   /// the steady deflection, the relaxation, and the cart's oscillation on their stiffness, which a fast
-  /// relaxation overdamps.
-  void update_bristle_step_limit(double motor_v) {
-    if (!dynamics_.has_bristle_state()) return;
+  /// relaxation overdamps. Returns the rate of the present state, if it was needed.
+  BeginRate<double> update_bristle_step_limit(double motor_v) {
+    if (!dynamics_.has_bristle_state()) return std::nullopt;
     const PlantState<double> s = plain_state(state_);
     const PlantState<double> rate = plain_.derivative(s, motor_v, contacts_);
     const double relaxation = plain_.bristle_relaxation_radps(s);
@@ -249,6 +259,7 @@ class EventEngine {
                             std::min(std::sqrt(change), change / std::max(relaxation, 1.0)) + on_stiffness;
     bristles_ = {relaxation + slowed, rate.cart_mps + slowed * rate.bristle_m - growth * s.bristle_m, slowed,
                  damping * push.theta_radps};
+    return rate;
   }
 
   /// Greatest rate of the motion itself, bounded so that no plant causes unbounded work.
@@ -307,10 +318,11 @@ class EventEngine {
     return Relaxation<T>(bristles_, h);
   }
 
-  /// One step under constant drive.
+  /// One step under constant drive. `begin`: the rate at its beginning, which is computed once for all step
+  /// lengths; a lagging motor's depends on the length.
   template <class T>
   PlantState<T> rk4(const Dynamics<T>& dynamics, const PlantState<T>& s, const T& drive, const T& h,
-                    FirstRate* first = nullptr) const {
+                    BeginRate<T>* begin = nullptr) const {
     std::optional<LaggedMotor<T>> lagged;
     if (dynamics.has_motor_lag()) lagged.emplace(lagged_motor(dynamics, s.motor_v, drive, h));
     const T& begin_v = lagged ? lagged->begin_v : drive;
@@ -319,8 +331,9 @@ class EventEngine {
     const auto rate = [&](const PlantState<T>& at, Stage stage) {
       return dynamics.derivative(at, stage == Stage::middle ? middle_v : end_v, contacts_);
     };
-    const PlantState<T> k1 = dynamics.derivative(s, begin_v, contacts_);
-    if (first != nullptr) *first = {value_of(k1.cart_mps), value_of(k1.theta_radps)};
+    const bool known = begin != nullptr && begin->has_value() && !lagged;
+    const PlantState<T> k1 = known ? **begin : dynamics.derivative(s, begin_v, contacts_);
+    if (begin != nullptr) *begin = k1;
     const std::optional<Relaxation<T>> bristles = relaxation_over(h);
     PlantState<T> end = runge_kutta_4(rate, s, k1, h, bristles ? &*bristles : nullptr);
     end.motor_v = lagged ? lagged->after_v : drive;
@@ -513,9 +526,9 @@ class EventEngine {
   }
 
   /// Advances to an event and through it. Returns the elapsed time with its derivative.
-  S pass(const Found& found, bool held) {
+  S pass(const Found& found, bool held, BeginRate<S>& begin) {
     S taken(found.after_s);
-    PlantState<S> at = rk4(dynamics_, state_, drive_, taken);
+    PlantState<S> at = rk4(dynamics_, state_, drive_, taken, &begin);
     if constexpr (!std::is_same_v<S, double>) {
       // The root depends on the parameters: dt = -dg / (dg/dt).
       const S g = event_indicator(dynamics_, at, contacts_, found.watch, options_);

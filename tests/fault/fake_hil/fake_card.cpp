@@ -177,6 +177,8 @@ Reply FakeCard::on_hardware(const Request& request) {
       for (std::size_t i = 0; i < request.count; ++i) reply.values[i] = read.values.at(request.channels[i]);
       return reply;
     }
+    case Call::read_other:
+      return velocities(request);
     case Call::set_counts: {
       const Reply read = counts();
       for (std::size_t i = 0; i < request.count; ++i)
@@ -232,6 +234,23 @@ Reply FakeCard::counts() {
       shown(*wiring.cart_channel, counts.cart, rig_.calibration.cart);
   reply.values.at(static_cast<std::size_t>(*wiring.pendulum_channel)) =
       shown(*wiring.pendulum_channel, counts.pendulum, rig_.calibration.pendulum);
+  return reply;
+}
+
+Reply FakeCard::velocities(const Request& request) const {
+  constexpr int no_such_channel = 119, first_channel = 14000;
+  if (mishaps_.lacks_velocities) return failed(no_such_channel);
+  const std::array<double, 2> counts_per_s = plant_.counts_per_s();
+  Reply reply;
+  for (std::size_t i = 0; i < request.count; ++i) {
+    const int encoder = static_cast<int>(request.channels[i]) - first_channel;
+    if (encoder == rig_.quanser->cart_channel)
+      reply.values[i] = counts_per_s[0];
+    else if (encoder == rig_.quanser->pendulum_channel)
+      reply.values[i] = counts_per_s[1];
+    else
+      return failed(no_such_channel);
+  }
   return reply;
 }
 

@@ -30,6 +30,7 @@ struct Mishaps {
   int jump_counts = 0;
   int failed_openings = 0;  ///< so many attempts to open it fail
   bool locked_at_start = false;
+  bool lacks_velocities = false;
   double silent_s = 1e9;  ///< once told to be silent: for so long
   // Of a task on the card's own clock.
   double drift_ppm = 0.0;        ///< its period is longer by this, from the beginning on
@@ -70,6 +71,7 @@ class FakeCard {
   Reply open();
   Reply on_hardware(const Request& request);
   Reply counts();
+  Reply velocities(const Request& request) const;
   void act_of_watchdog(const Request& request, Reply& reply);
   void expire();
   void drive();

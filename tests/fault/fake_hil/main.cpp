@@ -58,6 +58,7 @@ Arguments read(int argc, char** argv) {
       {"--drift-ppm", number(m.drift_ppm)},
       {"--drop-every", whole(m.drop_every)},
       {"--never-samples", [&m](const std::string& text) { m.never_samples = text == "true"; }},
+      {"--lacks-velocities", [&m](const std::string& text) { m.lacks_velocities = text == "true"; }},
       {"--stop-sampling-after", number(m.stop_sampling_s)},
   };
   for (int i = 1; i + 1 < argc; i += 2) flags.at(argv[i])(argv[i + 1]);
