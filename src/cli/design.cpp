@@ -15,6 +15,7 @@
 #include "design/gain_design.hpp"
 #include "design/widened_margin.hpp"
 #include "progress.hpp"
+#include "result_folder.hpp"
 #include "upright/base/error.hpp"
 #include "upright/control/gain_file.hpp"
 #include "upright/model/plant_file.hpp"
@@ -88,20 +89,6 @@ void print(const GainDesign& design, const std::optional<SampledDesign>& sampled
   std::fflush(stdout);
 }
 
-/// The plant's path as the gain file, which may lie elsewhere, names it.
-std::string path_from(const std::filesystem::path& file, const std::filesystem::path& plant) {
-  std::error_code error;
-  const auto folder = std::filesystem::absolute(file).parent_path();
-  const auto relative = std::filesystem::relative(plant, folder, error);
-  return error || relative.empty() ? std::filesystem::absolute(plant).string() : relative.string();
-}
-
-void refuse_replacing(const DesignOptions& options) {
-  if (std::filesystem::exists(options.out) && !options.force)
-    throw ConfigError(options.out +
-                      " already exists: choose another file with --out, or replace it with --force");
-}
-
 DesignWeights weights_of(const DesignOptions& options, DesignWeights weights) {
   std::copy(options.q.begin(), options.q.end(), weights.q.begin());
   weights.r = options.r.value_or(weights.r);
@@ -130,7 +117,7 @@ ControlConfig filtered(const DesignOptions& options, const GainDesign& design) {
 }
 
 void write_gains(const DesignOptions& options, const DesignWeights& weights, ControlConfig config) {
-  refuse_replacing(options);
+  refuse_replacing(options.out, options.force);
   if (options.delay_s)
     config.compensation = {CompensationKind::predictor, path_from(options.out, options.plant)};
   write_gain_file(config, options.out, comments_for(options, weights));
@@ -195,7 +182,7 @@ void design_estimator(const DesignOptions& options, const Plant& plant, Progress
       "the plant file says",
       1e3 * design.bears_delay_s, 1e3 * design.bears_unmodelled_s);
   if (!options.out.empty()) {
-    refuse_replacing(options);
+    refuse_replacing(options.out, options.force);
     ControlConfig config = design.config;
     config.state_estimator.plant = path_from(options.out, options.plant);
     if (options.delay_s) config.compensation.plant = config.state_estimator.plant;

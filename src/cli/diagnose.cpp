@@ -298,10 +298,26 @@ void write_traces(const Diagnosis& d, const Plant& given, const std::vector<Meas
   }
 }
 
+/// The 95 percent intervals of the found effects' parameters, within the ranges of plant files.
+std::vector<NumberInterval> intervals_of(const Diagnosis& d) {
+  constexpr double above_open_end = 1e-3;  // of the distance from the value, which is allowed
+  std::vector<NumberInterval> intervals;
+  for (const FoundEffect& effect : d.effects)
+    for (std::size_t i = 0; i < effect.parameters.size(); ++i) {
+      const ParameterEstimate& p = effect.parameters[i];
+      if (!(std::isfinite(p.low) && std::isfinite(p.high) && p.low < p.high)) continue;
+      const Range& range = effect_registry()[effect.effect].parameters[i].range;
+      const double lowest = range.low_open ? range.low + above_open_end * (p.value - range.low) : range.low;
+      intervals.push_back(
+          {kind_of(effect.effect) + "." + p.name, std::max(p.low, lowest), std::min(p.high, range.high)});
+    }
+  return intervals;
+}
+
 void write_results(const Diagnosis& d, const Plant& given, const std::vector<Measurement>& runs,
                    const DiagnoseFlags& flags) {
   create_result_folder(flags.out);
-  write_plant_file(d.model, fs::path(flags.out) / "model.yaml", provenance(d, flags));
+  write_plant_file(d.model, fs::path(flags.out) / "model.yaml", provenance(d, flags), intervals_of(d));
   write_plant_file(given, fs::path(flags.out) / "given.yaml", {"The plant file as given: " + flags.model});
   const fs::path folder = flags.out;
   write_result(folder / "residuals.csv", [&](std::ostream& out) { write_residuals(d, out); });

@@ -28,7 +28,16 @@ std::size_t terminal_columns() {
   return size.ws_col;
 }
 
-/// Whole seconds up to two minutes, then minutes, then hours.
+std::string bar(double share) {
+  std::string text(bar_columns + 2, '.');
+  text.front() = '[';
+  std::fill_n(text.begin() + 1, static_cast<std::ptrdiff_t>(share * bar_columns), '#');
+  text.back() = ']';
+  return text + " ";
+}
+
+}  // namespace
+
 std::string duration_text(double seconds) {
   char text[48];
   const auto whole = static_cast<long long>(std::llround(std::clamp(seconds, 0.0, 1e9)));
@@ -40,16 +49,6 @@ std::string duration_text(double seconds) {
     std::snprintf(text, sizeof text, "%lld h %lld min", whole / 3600, whole / 60 % 60);
   return text;
 }
-
-std::string bar(double share) {
-  std::string text(bar_columns + 2, '.');
-  text.front() = '[';
-  std::fill_n(text.begin() + 1, static_cast<std::ptrdiff_t>(share * bar_columns), '#');
-  text.back() = ']';
-  return text + " ";
-}
-
-}  // namespace
 
 Progress::Progress(std::string step, double takes_s)
     : on_terminal_(::isatty(STDERR_FILENO) != 0),

@@ -16,6 +16,9 @@
 
 namespace upright::cli {
 
+/// Whole seconds up to two minutes, then minutes, then hours.
+std::string duration_text(double seconds);
+
 /// Shows nothing for work that ends within a second. A thread of its own draws, so that the elapsed time goes
 /// on where the work itself reports nothing. All members may be called by any thread.
 class Progress {

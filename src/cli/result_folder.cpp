@@ -25,4 +25,17 @@ void write_result(const fs::path& file, const std::function<void(std::ostream&)>
                       ": free some space, or choose another folder with --out");
 }
 
+void refuse_replacing(const fs::path& file, bool force) {
+  if (fs::exists(file) && !force)
+    throw ConfigError(file.string() +
+                      " already exists: choose another file with --out, or replace it with --force");
+}
+
+std::string path_from(const fs::path& file, const fs::path& plant) {
+  std::error_code error;
+  const fs::path folder = fs::absolute(file).parent_path();
+  const fs::path relative = fs::relative(plant, folder, error);
+  return error || relative.empty() ? fs::absolute(plant).string() : relative.string();
+}
+
 }  // namespace upright::cli

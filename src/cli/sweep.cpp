@@ -1,4 +1,5 @@
 // `upright sweep`: outcomes over starting angle and delay, and the delays at which they change.
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <csignal>
@@ -7,6 +8,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <string>
+#include <thread>
 
 #include "commands.hpp"
 #include "json_number.hpp"
@@ -45,10 +47,24 @@ class StopOnSignal {
 struct SweepArguments {
   std::string file, out;
   unsigned threads = 0;
-  bool overwrite = false, transitions_only = false, as_json = false;
+  bool overwrite = false, transitions_only = false, estimate = false, as_json = false;
 };
 
 using Json = nlohmann::ordered_json;
+
+/// For each starting angle the largest delay that few of the plants fall at.
+Json json_of(const SweepConfig& config, const std::vector<UncertainPoint>& points) {
+  Json delays = Json::array();
+  for (const ToleratedDelay& delay : tolerated_delays(points, config.uncertainty->samples))
+    delays.push_back({{"theta0_rad", delay.theta0_rad},
+                      {"delay_s", finite_or_null(delay.delay_s)},
+                      {"share_falls", finite_or_null(delay.falls.value)},
+                      {"low", finite_or_null(delay.falls.low)},
+                      {"high", finite_or_null(delay.falls.high)}});
+  return {{"fewer_than_5_percent_fall_up_to", delays},
+          {"samples", config.uncertainty->samples},
+          {"seed", config.uncertainty->seed}};
+}
 
 Json json_of(const SweepConfig& config, const SweepResult& result, const std::string& folder) {
   std::array<std::size_t, 3> counts{};
@@ -59,10 +75,14 @@ Json json_of(const SweepConfig& config, const SweepResult& result, const std::st
     transitions.push_back({{"theta0_rad", t.theta0_rad},
                            {"oscillates_from_s", finite_or_null(t.oscillates_from_s)},
                            {"falls_from_s", finite_or_null(t.falls_from_s)}});
-  return {{"folder", folder},           {"finished", !result.interrupted},
-          {"runs", result.runs.size()}, {"runs_made", result.runs_made},
-          {"stable", counts[0]},        {"oscillating", counts[1]},
-          {"fell", counts[2]},          {"transitions", transitions}};
+  Json document;
+  if (!result.uncertain.empty()) document["uncertainty"] = json_of(config, result.uncertain);
+  const Json plain = {{"folder", folder},           {"finished", !result.interrupted},
+                      {"runs", result.runs.size()}, {"runs_made", result.runs_made},
+                      {"stable", counts[0]},        {"oscillating", counts[1]},
+                      {"fell", counts[2]},          {"transitions", transitions}};
+  document.update(plain);
+  return document;
 }
 
 std::string milliseconds_cell(double value_s) {
@@ -72,13 +92,51 @@ std::string milliseconds_cell(double value_s) {
   return text.data();
 }
 
-void print(const SweepResult& result, const std::string& folder) {
+void print(const std::vector<UncertainPoint>& points, std::uint32_t samples) {
+  std::printf("theta0 [deg]   fewer than 5 percent of %u plants fall up to [ms]\n", samples);
+  for (const ToleratedDelay& t : tolerated_delays(points, samples))
+    std::printf("%12.4f   %46s\n", t.theta0_rad * 57.29577951308232, milliseconds_cell(t.delay_s).c_str());
+}
+
+void print(const SweepConfig& config, const SweepResult& result, const std::string& folder) {
+  if (!result.uncertain.empty()) print(result.uncertain, config.uncertainty->samples);
   std::printf("theta0 [deg]   oscillates from [ms]   falls from [ms]\n");
   for (const Transition& t : result.transitions)
     std::printf("%12.4f   %20s   %15s\n", t.theta0_rad * 57.29577951308232,
                 milliseconds_cell(t.oscillates_from_s).c_str(), milliseconds_cell(t.falls_from_s).c_str());
   std::printf("%zu runs simulated, results in %s\n", result.runs_made, folder.c_str());
   std::fflush(stdout);
+}
+
+/// The threads of all ranks.
+unsigned workers(const SweepArguments& arguments, const MpiExecutor& ranks) {
+  if (ranks.count() > 1) return static_cast<unsigned>(ranks.count()) * std::max(1u, arguments.threads);
+  return arguments.threads != 0 ? arguments.threads : std::max(1u, std::thread::hardware_concurrency());
+}
+
+std::string text_of(const SweepEstimate& estimate, unsigned workers) {
+  const double all_s = static_cast<double>(estimate.runs) * estimate.run_s;
+  std::array<char, 160> text;
+  std::snprintf(text.data(), text.size(), "%zu runs of %.3g ms of processor time: about %s on %u thread%s",
+                estimate.runs, 1e3 * estimate.run_s, duration_text(all_s / workers).c_str(), workers,
+                workers == 1 ? "" : "s");
+  return text.data();
+}
+
+/// Says how long the sweep will take, and runs nothing else.
+ExitCode estimate_only(const SweepConfig& config, const SweepArguments& arguments, unsigned workers) {
+  const SweepEstimate estimate = estimate_sweep(config);
+  const double all_s = static_cast<double>(estimate.runs) * estimate.run_s;
+  if (arguments.as_json)
+    std::cout << Json({{"time_s", all_s / workers},
+                       {"threads", workers},
+                       {"runs", estimate.runs},
+                       {"processor_s_per_run", estimate.run_s}})
+                     .dump(2)
+              << "\n";
+  else
+    std::cout << text_of(estimate, workers) << "\n";
+  return ExitCode::done;
 }
 
 ExitCode run_here(const SweepArguments& arguments, const MpiExecutor& ranks) {
@@ -92,10 +150,16 @@ ExitCode run_here(const SweepArguments& arguments, const MpiExecutor& ranks) {
   options.transitions_only = arguments.transitions_only;
   options.stop = &stop_asked;
   const std::unique_ptr<SweepExecutor> executor = ranks.make_executor(config, arguments.threads);
+  const unsigned threads = workers(arguments, ranks);
+  if (arguments.estimate) return estimate_only(config, arguments, threads);
   SweepResult result;
   {
     const StopOnSignal on_signal;
     Progress progress("sweep");
+    options.estimated = [&progress, threads](const SweepEstimate& remaining) {
+      progress.aside(
+          [&] { std::fprintf(stderr, "upright: sweep: %s\n", text_of(remaining, threads).c_str()); });
+    };
     options.progress = [&progress](std::size_t done, std::size_t known) {
       progress.report(done, known, "runs");
     };
@@ -104,7 +168,7 @@ ExitCode run_here(const SweepArguments& arguments, const MpiExecutor& ranks) {
   if (arguments.as_json)
     std::cout << json_of(config, result, folder).dump(2) << "\n";
   else if (!result.interrupted)
-    print(result, folder);
+    print(config, result, folder);
   if (!result.interrupted) return ExitCode::done;
   throw Error(ExitCode::stopped, "the sweep was stopped after " + std::to_string(result.runs_made) +
                                      " runs, which are kept in " + folder +
@@ -139,8 +203,10 @@ void add_sweep(CommandLine& line) {
   command.option("--out", arguments->out, "Folder for the results (default: runs/sweep-NAME)");
   command.option("--threads", arguments->threads, "Number of threads (default: one per processor)")
       .from_to(1u, 1024u);
-  command.flag("--transitions-only", arguments->transitions_only,
-               "Search only for the delays at which the outcome changes, without the whole grid");
+  command.flag(
+      "--transitions-only", arguments->transitions_only,
+      "Search only for the delays at which the outcome changes, without the grid and its drawn plants");
+  command.flag("--estimate", arguments->estimate, "Only print how long the sweep will take");
   command.flag("--overwrite", arguments->overwrite, "Replace existing results in the folder");
   command.flag("--json", arguments->as_json, "Print one JSON document");
   command.does([arguments] { return run(*arguments); });

@@ -5,6 +5,7 @@
 
 #include "control/filter_model.hpp"
 #include "delay_margin.hpp"
+#include "uncertain_parameters.hpp"
 #include "upright/base/error.hpp"
 #include "upright/model/linear_plant.hpp"
 

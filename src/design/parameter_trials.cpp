@@ -9,6 +9,7 @@
 
 #include "base/parallel.hpp"
 #include "control/filter_model.hpp"
+#include "uncertain_parameters.hpp"
 #include "upright/control/model_parts.hpp"
 #include "upright/sim/loop/loop_run.hpp"
 
@@ -51,34 +52,6 @@ Plant all_off(const Plant& plant, const std::vector<UncertainParameter>& paramet
 }
 
 }  // namespace
-
-std::vector<UncertainParameter> uncertain_parameters(const Plant& plant) {
-  std::vector<UncertainParameter> parameters{
-      {"cart_mass_kg", [](Plant& p, double by) { p.cart_mass_kg *= by; }},
-      {"motor force_per_volt_n", [](Plant& p, double by) { p.motor.force_per_volt_n *= by; }},
-      {"motor back_emf_n_per_mps", [](Plant& p, double by) { p.motor.back_emf_n_per_mps *= by; }}};
-  if (plant.pendulum) {
-    parameters.push_back({"pendulum mass_kg", [](Plant& p, double by) {
-                            p.pendulum->given_inertia_kgm2 = p.pendulum->inertia_about_pivot_kgm2() * by;
-                            p.pendulum->mass_kg *= by;
-                          }});
-    parameters.push_back({"pendulum length_to_com_m", [](Plant& p, double by) {
-                            p.pendulum->given_inertia_kgm2 = p.pendulum->inertia_about_pivot_kgm2() * by * by;
-                            p.pendulum->length_to_com_m *= by;
-                          }});
-    parameters.push_back({"pendulum inertia_about_pivot_kgm2", [](Plant& p, double by) {
-                            p.pendulum->given_inertia_kgm2 = p.pendulum->inertia_about_pivot_kgm2() * by;
-                          }});
-  }
-  for (std::size_t i = 0; i < plant.effects.size(); ++i) {
-    const auto& entry = effect_registry()[plant.effects[i].number];
-    for (std::size_t j = 0; j < entry.parameters.size(); ++j)
-      if (entry.parameters[j].words.empty())
-        parameters.push_back({std::string(entry.kind) + " " + std::string(entry.parameters[j].name),
-                              [i, j](Plant& p, double by) { p.effects[i].values[j] *= by; }});
-  }
-  return parameters;
-}
 
 ParameterTrials try_parameters(const Plant& plant, const ControlConfig& config, double uncertainty,
                                int together) {

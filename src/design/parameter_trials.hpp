@@ -1,24 +1,12 @@
 // Sensitivity of a designed loop to the parameters of its plant.
 #pragma once
 
-#include <functional>
 #include <string>
-#include <vector>
 
 #include "upright/control/gain_file.hpp"
 #include "upright/model/plant.hpp"
 
 namespace upright {
-
-/// One parameter of a plant, and a function that scales it.
-struct UncertainParameter {
-  std::string name;  ///< name in plant files
-  std::function<void(Plant&, double by)> scale;
-};
-
-/// Mass of the cart; mass, length and inertia of the pendulum; the motor's two constants; and all values
-/// of all effects.
-std::vector<UncertainParameter> uncertain_parameters(const Plant& plant);
 
 /// Results of simulated runs from 3 degrees over some seconds, with encoders and the plant's own
 /// friction, while the estimator uses the plant file.

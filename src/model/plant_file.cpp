@@ -82,6 +82,18 @@ void plant_keys(YamlKeys& document, Plant& plant) {
   });
 }
 
+void plant_file_keys(YamlKeys& document, PlantFile& file) {
+  plant_keys(document, file.plant);
+  if (!document.given("intervals", !file.intervals.empty())) return;
+  document.items("intervals", file.intervals, [](YamlKeys& item, NumberInterval& interval) {
+    item.text("number", interval.number);
+    item.number("low", interval.low, Range::any());
+    item.number("high", interval.high, Range::any());
+    item.check("high", interval.high >= interval.low, "is below low",
+               "set it to at least " + exact_text(interval.low));
+  });
+}
+
 Plant read_plant(const YamlMap& document) {
   Plant plant;
   YamlKeyReader reader(document);
@@ -89,26 +101,42 @@ Plant read_plant(const YamlMap& document) {
   return plant;
 }
 
-Plant read_plant_file(const std::filesystem::path& file) {
+namespace {
+
+PlantFile read_whole_file(const std::filesystem::path& file) {
   const YamlMap document = YamlMap::from_file(file);
-  Plant plant = read_plant(document);
+  PlantFile whole;
+  YamlKeyReader reader(document);
+  plant_file_keys(reader, whole);
   document.finish();
-  return plant;
+  return whole;
 }
 
-std::string plant_text(const Plant& plant, const std::vector<std::string>& comments) {
+}  // namespace
+
+Plant read_plant_file(const std::filesystem::path& file) {
+  return read_whole_file(file).plant;
+}
+
+std::vector<NumberInterval> read_plant_intervals(const std::filesystem::path& file) {
+  return read_whole_file(file).intervals;
+}
+
+std::string plant_text(const Plant& plant, const std::vector<std::string>& comments,
+                       const std::vector<NumberInterval>& intervals) {
   std::string text;
   for (const std::string& comment : comments) text += "# " + comment + "\n";
-  Plant copy = plant;
+  PlantFile copy{plant, intervals};
   YamlKeyWriter writer(YamlKeyWriter::Layout::lines);
-  plant_keys(writer, copy);
+  plant_file_keys(writer, copy);
   return text + writer.written();
 }
 
 void write_plant_file(const Plant& plant, const std::filesystem::path& file,
-                      const std::vector<std::string>& comments) {
+                      const std::vector<std::string>& comments,
+                      const std::vector<NumberInterval>& intervals) {
   std::ofstream out(file);
-  out << plant_text(plant, comments);
+  out << plant_text(plant, comments, intervals);
   out.close();
   if (!out)
     throw Error(ExitCode::usage, "cannot write " + file.string() + ": check the folder and its free space");

@@ -2,11 +2,19 @@
 #pragma once
 
 #include "base/yaml_keys.hpp"
-#include "upright/model/plant.hpp"
+#include "upright/model/plant_file.hpp"
 
 namespace upright {
 
-/// Visits the keys of the whole file.
+/// What a plant file holds.
+struct PlantFile {
+  Plant plant;
+  std::vector<NumberInterval> intervals;
+};
+
+/// Visits the keys of a plant.
 void plant_keys(YamlKeys& document, Plant& plant);
+/// Visits the keys of the whole file.
+void plant_file_keys(YamlKeys& document, PlantFile& file);
 
 }  // namespace upright

@@ -68,14 +68,14 @@ std::vector<SweepRun> simulate(const Plant& plant, const RunRecord& run,
     theta0 += std::abs(r.theta0_rad) / static_cast<double>(trials.size());
     longest = std::max(longest, r.trial.delay_s);
   }
-  SweepExecutor::Group cases;
+  std::vector<LoopCase> cases;
   constexpr int count = 60;
   const double drawn_to_s = std::min(1.2 * longest, DelayLine::longest_delay_s);
   for (int i = 0; i <= count; ++i) cases.push_back({theta0, drawn_to_s * i / count});
   std::vector<SweepRun> runs;
   const std::size_t group_size = std::max<std::size_t>(1, sweep_group_size(config));
   for (std::size_t begin = 0; begin < cases.size(); begin += group_size) {
-    const SweepExecutor::Group group(
+    const std::vector<LoopCase> group(
         cases.begin() + static_cast<std::ptrdiff_t>(begin),
         cases.begin() + static_cast<std::ptrdiff_t>(std::min(begin + group_size, cases.size())));
     const std::vector<SweepRun> done = run_sweep_group(config, group);

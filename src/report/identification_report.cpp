@@ -2,12 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
 
 #include "diagnosis/plain_words.hpp"
 #include "html.hpp"
+#include "picture_file.hpp"
 #include "plot.hpp"
-#include "upright/base/error.hpp"
 #include "upright/model/dynamics.hpp"
 
 namespace upright {
@@ -26,15 +25,6 @@ double steady_friction_n(const Dynamics<double>& dynamics, double cart_m, double
   const double direction = cart_mps < 0.0 ? -1.0 : cart_mps > 0.0 ? 1.0 : 0.0;
   return direction * dynamics.cart_dry_level(cart_m, std::abs(cart_mps), direction) +
          smooth_friction_n(dynamics, state);
-}
-
-void save(const Plot& plot, const std::filesystem::path& file) {
-  std::ofstream out(file);
-  out << svg_file_of(plot);
-  out.close();
-  if (!out)
-    throw ConfigError("cannot write " + file.string() +
-                      ": free some disk space or choose another folder with --out");
 }
 
 /// The paper's Figure 3 with the data.
@@ -153,10 +143,10 @@ void write_identification_report(const Identification& id, const std::vector<Mea
   const std::filesystem::path folder = file.parent_path();
   const Plot friction = friction_plot(id);
   page.figure(friction, "Friction force at constant speed: measured, and the curve of the identified model.");
-  save(friction, folder / "friction.svg");
+  save_picture(friction, folder / "friction.svg");
   if (const auto sine = slow_sine_plot(id, runs)) {
     page.figure(*sine, "A loop shows friction that depends on the previous motion (bristles).");
-    save(*sine, folder / "slow-sine.svg");
+    save_picture(*sine, folder / "slow-sine.svg");
   }
   for (const std::string& note : id.notes) page.paragraph(in_plain_words(note) + ".");
   page.write(file);

@@ -223,9 +223,10 @@ std::string cells_data(const HeatMap& map, const Plot& plot) {
 }
 
 std::string color_scale(const HeatMap& map) {
+  const std::string end = map.light ? "" : ", 0.7 '#1f618d', 1 '#0b2545'";
   if (map.classes.empty())
-    return "set palette defined (0 '#f4f8fb', 0.35 '#7fb3d5', 0.7 '#1f618d', 1 '#0b2545')\nset cblabel " +
-           quoted(map.label) + "\n";
+    return "set palette defined (0 '#f4f8fb', 0.35 '#7fb3d5'" + end + ")\nset cblabel " + quoted(map.label) +
+           "\n";
   std::string text = "set palette maxcolors " + std::to_string(map.classes.size()) + " defined (";
   for (std::size_t k = 0; k < map.classes.size(); ++k)
     text += (k == 0 ? "" : ", ") + std::to_string(k) + " " + quoted_color(color::of_outcome(map.classes[k]));

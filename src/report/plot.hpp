@@ -47,6 +47,7 @@ struct HeatMap {
   std::string label;           ///< of the colour scale
   /// For outcomes instead of magnitudes: value k is `classes[k]`, in the colour that it has everywhere.
   std::vector<std::string> classes;
+  bool light = false;  ///< of magnitudes: pale colours, on which the lines of all series are visible
 };
 
 /// A straight line across the plot at one place, with a label.

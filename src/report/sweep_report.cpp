@@ -5,42 +5,24 @@
 #include <cstdlib>
 #include <limits>
 #include <map>
+#include <optional>
 #include <set>
-#include <sstream>
 #include <vector>
 
 #include "base/angle_units.hpp"
-#include "base/input_file.hpp"
 #include "html.hpp"
+#include "picture_file.hpp"
 #include "plot.hpp"
 #include "result_text.hpp"
+#include "sweep_rows.hpp"
+#include "uncertainty_map.hpp"
 #include "upright/base/error.hpp"
 
 namespace upright {
 
 namespace {
 
-using Row = std::vector<std::string>;
-
-std::vector<Row> read_rows(const std::filesystem::path& file, const std::string& header,
-                           std::size_t columns) {
-  InputFile in(file);
-  std::string line;
-  if (!std::getline(in, line) || line != header)
-    throw ConfigError(file.string() + " does not begin with the header " + header +
-                      ": give a folder that `upright sweep` finished");
-  std::vector<Row> rows;
-  while (std::getline(in, line)) {
-    Row row;
-    std::istringstream cells(line);
-    for (std::string cell; std::getline(cells, cell, ',');) row.push_back(cell);
-    if (row.size() != columns)
-      throw ConfigError(file.string() + ":" + std::to_string(rows.size() + 2) + ": the row does not have " +
-                        std::to_string(columns) + " columns: repeat the sweep");
-    rows.push_back(row);
-  }
-  return rows;
-}
+using Row = SweepRow;
 
 struct Map {
   std::vector<double> delays_s, angles_deg;
@@ -52,8 +34,8 @@ Map read_map(const std::filesystem::path& folder) {
   Map map;
   std::set<double> delays, angles;
   for (const Row& row :
-       read_rows(folder / "sweep.csv",
-                 "theta0_rad,delay_s,outcome,theta_amplitude_rad,cart_amplitude_m,fall_time_s", 6)) {
+       read_sweep_rows(folder / "sweep.csv",
+                       "theta0_rad,delay_s,outcome,theta_amplitude_rad,cart_amplitude_m,fall_time_s")) {
     const double angle = cell_number(row[0]) * degrees_per_radian, delay = cell_number(row[1]);
     std::size_t k = 0;
     while (k < outcome_names.size() && outcome_names[k] != row[2]) ++k;
@@ -123,6 +105,32 @@ std::string margin_sentence(const Row& row) {
          number_text(cell_number(row[2]), 4) + " rad/s.";
 }
 
+/// The delay that is safe from every starting angle.
+void answer(HtmlPage& page, const UncertaintyMap& map, const std::string& counts) {
+  double safe_s = std::numeric_limits<double>::infinity();
+  bool everywhere = true;
+  for (const double delay_s : map.tolerated_s) {
+    everywhere = everywhere && !std::isnan(delay_s);
+    safe_s = std::min(safe_s, delay_s);
+  }
+  const std::string of_plants = " of " + number_text(map.samples, 6) + " plants fall";
+  if (everywhere)
+    page.answer(Tone::good, "Fewer than 5 percent" + of_plants + " up to " + milliseconds(safe_s) + " ms",
+                "With the plant of the file, " + counts);
+  else
+    page.answer(Tone::warning, "At the shortest delay, 5 percent or more" + of_plants,
+                "With the plant of the file, " + counts);
+}
+
+void add_uncertainty(HtmlPage& page, const UncertaintyMap& map, const std::filesystem::path& folder) {
+  page.section("Plants that fall, over delay and initial angle");
+  page.paragraph("Every point has the same plants, drawn as sweep.yaml says. The gains stay as they are.");
+  const Plot plot = uncertainty_plot(map);
+  page.figure(plot, "Lines: the delays at which 10, 50 and 90 percent of the plants fall.");
+  save_picture(plot, folder / "uncertainty.svg");
+  page.table(uncertainty_table(map));
+}
+
 }  // namespace
 
 bool is_sweep_folder(const std::filesystem::path& folder) {
@@ -138,13 +146,13 @@ std::filesystem::path write_sweep_report(const std::filesystem::path& folder) {
                       " contains an unfinished sweep: repeat the sweep command to continue it");
   const Map map = read_map(folder);
   const std::vector<Row> transitions =
-      read_rows(folder / "transitions.csv", "theta0_rad,oscillates_from_s,falls_from_s", 3);
+      read_sweep_rows(folder / "transitions.csv", "theta0_rad,oscillates_from_s,falls_from_s");
   if (map.outcome.empty()) throw ConfigError(folder.string() + " contains no runs: repeat the sweep");
 
   // Folders from older versions have no margins.
   std::vector<Row> margins;
   if (std::filesystem::exists(folder / "margins.csv", ignored))
-    margins = read_rows(folder / "margins.csv", "model,critical_delay_s,crossing_radps", 3);
+    margins = read_sweep_rows(folder / "margins.csv", "model,critical_delay_s,crossing_radps");
 
   HtmlPage page("Delay sweep", folder.string());
   double first_fall = std::numeric_limits<double>::infinity();
@@ -153,10 +161,16 @@ std::filesystem::path write_sweep_report(const std::filesystem::path& folder) {
   const std::string counts = std::to_string(map.counts[0]) + " runs are stable, " +
                              std::to_string(map.counts[1]) + " oscillate, " + std::to_string(map.counts[2]) +
                              " fall.";
-  if (std::isfinite(first_fall))
+  std::optional<UncertaintyMap> uncertain;
+  if (std::filesystem::exists(folder / "uncertainty.csv", ignored))
+    uncertain = read_uncertainty_map(folder / "uncertainty.csv");
+  if (uncertain)
+    answer(page, *uncertain, counts);
+  else if (std::isfinite(first_fall))
     page.answer(Tone::warning, "Falls for delays from " + milliseconds(first_fall) + " ms", counts);
   else
     page.answer(Tone::good, "No run falls at these delays", counts);
+  if (uncertain) add_uncertainty(page, *uncertain, folder);
   page.section("Outcome over delay and initial angle");
   for (const Row& row : margins) page.paragraph(margin_sentence(row));
   const std::string lines = margins.empty() ? "" : " Dotted lines: critical delay of the linear analysis.";

@@ -96,7 +96,7 @@ std::string schema_text(const char* title, void (*visit)(Keys&, File&)) {
 constexpr std::array all_schemas = {
     FileSchema{"rig", [] { return schema_text<RigFile>("rig file of upright", rig_keys); }},
     FileSchema{"gains", [] { return schema_text<ControlConfig>("gain file of upright", gain_keys); }},
-    FileSchema{"plant", [] { return schema_text<Plant>("plant file of upright", plant_keys); }},
+    FileSchema{"plant", [] { return schema_text<PlantFile>("plant file of upright", plant_file_keys); }},
     FileSchema{"sweep",
                [] { return schema_text<SweepConfig, YamlKeys>("sweep file of upright", sweep_keys); }},
     FileSchema{"experiment",

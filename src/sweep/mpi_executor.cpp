@@ -14,6 +14,7 @@
 #include <thread>
 
 #include "base/work_queue.hpp"
+#include "sweep_tasks.hpp"
 #endif
 
 namespace upright {
@@ -51,19 +52,22 @@ bool receive(int from, std::vector<double>& numbers, MPI_Status& status) {
   return true;
 }
 
-/// Groups as numbers: for each its number, its size, and its cases.
-void append(std::vector<double>& message, std::size_t number, const SweepExecutor::Group& group) {
+/// Tasks or their results one after the other: for each its number, its size, and its numbers.
+void append(std::vector<double>& message, std::size_t number, const SweepNumbers& numbers) {
   message.push_back(static_cast<double>(number));
-  message.push_back(static_cast<double>(group.size()));
-  for (const LoopCase& start : group) message.insert(message.end(), {start.theta0_rad, start.delay_s});
+  message.push_back(static_cast<double>(numbers.size()));
+  message.insert(message.end(), numbers.begin(), numbers.end());
 }
 
-void append(std::vector<double>& message, std::size_t number, const std::vector<SweepRun>& runs) {
-  message.push_back(static_cast<double>(number));
-  message.push_back(static_cast<double>(runs.size()));
-  for (const SweepRun& run : runs)
-    message.insert(message.end(), {run.start.theta0_rad, run.start.delay_s, run.fall_time_s,
-                                   run.theta_amplitude_rad, run.cart_amplitude_m});
+/// Calls `take` for each of them.
+template <class Take>
+void for_each_in(const std::vector<double>& message, const Take& take) {
+  for (auto at = message.begin(); at != message.end();) {
+    const auto number = static_cast<std::size_t>(at[0]);
+    const auto end = at + 2 + static_cast<std::ptrdiff_t>(at[1]);
+    take(number, SweepNumbers(at + 2, end));
+    at = end;
+  }
 }
 
 class RankExecutor final : public SweepExecutor {
@@ -85,16 +89,17 @@ class RankExecutor final : public SweepExecutor {
     for (std::size_t rank = 1; rank < idle_.size(); ++rank) send(static_cast<int>(rank), end_tag, {});
   }
 
-  void run(const std::vector<Group>& groups, const Done& done, const std::atomic<bool>* stop) override {
-    WorkQueue queue(groups.size(), [stop] { return stop && *stop; });
+  void run(std::size_t count, const TaskOf& task_of, const Done& done,
+           const std::atomic<bool>* stop) override {
+    WorkQueue queue(count, [stop] { return stop && *stop; });
     std::mutex one_at_a_time;
     std::size_t away = 0;
     const auto compute_locally = [&] {
       while (const std::optional<std::size_t> mine = queue.next())
         queue.guard(*mine, [&] {
-          const std::vector<SweepRun> runs = run_sweep_group(config_, groups[*mine]);
+          const SweepNumbers result = compute_task(config_, task_of(*mine));
           const std::lock_guard lock(one_at_a_time);
-          done(*mine, runs);
+          done(*mine, result);
         });
     };
     {
@@ -103,7 +108,7 @@ class RankExecutor final : public SweepExecutor {
       // MPI is called from this thread only.
       while (away > 0 || !queue.is_over()) {
         for (std::size_t rank = 1; rank < idle_.size(); ++rank)
-          if (idle_[rank] && send_groups(rank, groups, queue)) ++away;
+          if (idle_[rank] && send_tasks(rank, task_of, queue)) ++away;
         std::vector<double> message;
         MPI_Status status;
         if (!receive(MPI_ANY_SOURCE, message, status)) {
@@ -112,39 +117,30 @@ class RankExecutor final : public SweepExecutor {
         }
         idle_[static_cast<std::size_t>(status.MPI_SOURCE)] = true;
         --away;
-        queue.guard(groups.size(), [&] { take(message, one_at_a_time, done); });
+        queue.guard(count, [&] {
+          for_each_in(message, [&](std::size_t number, const SweepNumbers& result) {
+            const std::lock_guard lock(one_at_a_time);
+            done(number, result);
+          });
+        });
       }
     }
     queue.rethrow();
   }
 
  private:
-  /// Gives a rank as many groups as it has threads. False: none are left.
-  bool send_groups(std::size_t rank, const std::vector<Group>& groups, WorkQueue& queue) {
+  /// Gives a rank as many tasks as it has threads. False: none are left.
+  bool send_tasks(std::size_t rank, const TaskOf& task_of, WorkQueue& queue) {
     std::vector<double> message;
     for (unsigned i = 0; i < threads_; ++i) {
       const std::optional<std::size_t> number = queue.next();
       if (!number) break;
-      append(message, *number, groups[*number]);
+      append(message, *number, task_of(*number));
     }
     if (message.empty()) return false;
     send(static_cast<int>(rank), work_tag, message);
     idle_[rank] = false;
     return true;
-  }
-
-  static void take(const std::vector<double>& message, std::mutex& one_at_a_time, const Done& done) {
-    for (std::size_t at = 0; at < message.size();) {
-      const auto number = static_cast<std::size_t>(message[at]);
-      std::vector<SweepRun> runs(static_cast<std::size_t>(message[at + 1]));
-      at += 2;
-      for (SweepRun& run : runs) {
-        run = {{message[at], message[at + 1]}, message[at + 2], message[at + 3], message[at + 4]};
-        at += 5;
-      }
-      const std::lock_guard lock(one_at_a_time);
-      done(number, runs);
-    }
   }
 
   const SweepConfig& config_;
@@ -184,21 +180,15 @@ void MpiExecutor::serve(const SweepConfig& config, unsigned threads) const {
     }
     if (status.MPI_TAG == end_tag) return;
     std::vector<std::size_t> numbers;
-    std::vector<SweepExecutor::Group> groups;
-    for (std::size_t at = 0; at < message.size();) {
-      numbers.push_back(static_cast<std::size_t>(message[at]));
-      SweepExecutor::Group& group = groups.emplace_back(static_cast<std::size_t>(message[at + 1]));
-      at += 2;
-      for (LoopCase& start : group) {
-        start = {message[at], message[at + 1]};
-        at += 2;
-      }
-    }
+    std::vector<SweepNumbers> tasks;
+    for_each_in(message, [&](std::size_t number, SweepNumbers task) {
+      numbers.push_back(number);
+      tasks.push_back(std::move(task));
+    });
     std::vector<double> reply;
     executor->run(
-        groups,
-        [&](std::size_t group, const std::vector<SweepRun>& runs) { append(reply, numbers[group], runs); },
-        nullptr);
+        tasks.size(), [&](std::size_t task) { return tasks[task]; },
+        [&](std::size_t task, const SweepNumbers& result) { append(reply, numbers[task], result); }, nullptr);
     send(0, result_tag, reply);
   }
 }

@@ -1,4 +1,4 @@
-// Sweeps with MPI: the first rank distributes groups to idle ranks and writes the results, which are
+// Sweeps with MPI: the first rank distributes tasks to idle ranks and writes the results, which are
 // byte-identical to those of one process. Without MPI at configure time there is one rank.
 #pragma once
 
@@ -23,7 +23,7 @@ class MpiExecutor {
   /// For the first rank: an executor for all ranks with `threads` threads each (0: one each, or every
   /// processor with a single rank). It must be destroyed before this object: this ends the other ranks.
   std::unique_ptr<SweepExecutor> make_executor(const SweepConfig& config, unsigned threads) const;
-  /// For the other ranks: computes groups from the first rank until that ends them.
+  /// For the other ranks: computes tasks from the first rank until that ends them.
   void serve(const SweepConfig& config, unsigned threads) const;
 
  private:

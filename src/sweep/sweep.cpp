@@ -8,6 +8,7 @@
 
 #include "design/delay_margin.hpp"
 #include "sweep_journal.hpp"
+#include "sweep_stages.hpp"
 #include "upright/base/error.hpp"
 #include "upright/base/yaml_reader.hpp"
 #include "upright/model/linear_plant.hpp"
@@ -39,73 +40,6 @@ bool earlier(const LoopCase& a, const LoopCase& b) {
   return a.theta0_rad != b.theta0_rad ? a.theta0_rad < b.theta0_rad : a.delay_s < b.delay_s;
 }
 
-/// Makes runs stage by stage: a stage is a list of cases that depend on earlier stages only, cut into groups
-/// the same way every time.
-class Stages {
- public:
-  Stages(const SweepConfig& config, const SweepOptions& options, SweepExecutor& executor,
-         SweepJournal* journal)
-      : config_(config), options_(options), executor_(executor), journal_(journal) {}
-
-  /// The runs of these cases, in their order; empty when stopped.
-  std::vector<SweepRun> run(const std::vector<LoopCase>& cases) {
-    const std::size_t size = sweep_group_size(config_);
-    const std::size_t groups = (cases.size() + size - 1) / size;
-    std::vector<SweepRun> runs(cases.size());
-    std::vector<SweepExecutor::Group> open;
-    std::vector<std::size_t> open_number;
-    known_ += cases.size();
-    for (std::size_t g = 0; g < groups; ++g) {
-      const auto first = cases.begin() + static_cast<std::ptrdiff_t>(g * size);
-      const std::size_t count = std::min(size, cases.size() - g * size);
-      const std::vector<SweepRun>* kept = journal_ != nullptr ? journal_->find(stage_, g) : nullptr;
-      if (kept != nullptr && are_of(*kept, first, count)) {
-        std::copy(kept->begin(), kept->end(), runs.begin() + static_cast<std::ptrdiff_t>(g * size));
-        done_ += count;
-      } else {
-        open.emplace_back(first, first + static_cast<std::ptrdiff_t>(count));
-        open_number.push_back(g);
-      }
-    }
-    std::size_t finished = 0;
-    executor_.run(
-        open,
-        [&](std::size_t group, const std::vector<SweepRun>& made) {
-          const std::size_t g = open_number[group];
-          if (journal_ != nullptr) journal_->keep(stage_, g, made);
-          std::copy(made.begin(), made.end(), runs.begin() + static_cast<std::ptrdiff_t>(g * size));
-          ++finished;
-          done_ += made.size();
-          made_ += made.size();
-          if (options_.progress) options_.progress(done_, known_);
-        },
-        options_.stop);
-    ++stage_;
-    interrupted_ = finished < open.size();
-    return interrupted_ ? std::vector<SweepRun>() : runs;
-  }
-
-  bool interrupted() const { return interrupted_; }
-  std::size_t runs_made() const { return made_; }
-
- private:
-  /// A journal that a disk or somebody has damaged keeps runs of other cases, which are made anew.
-  static bool are_of(const std::vector<SweepRun>& kept, std::vector<LoopCase>::const_iterator first,
-                     std::size_t count) {
-    if (kept.size() != count) return false;
-    return std::equal(kept.begin(), kept.end(), first, [](const SweepRun& run, const LoopCase& c) {
-      return run.start.theta0_rad == c.theta0_rad && run.start.delay_s == c.delay_s;
-    });
-  }
-
-  const SweepConfig& config_;
-  const SweepOptions& options_;
-  SweepExecutor& executor_;
-  SweepJournal* journal_;
-  std::size_t stage_ = 0, done_ = 0, known_ = 0, made_ = 0;
-  bool interrupted_ = false;
-};
-
 /// Where the outcome of one starting angle becomes `from` or worse: between `low_s` (not yet) and `high_s`.
 struct Bracket {
   std::size_t angle = 0;
@@ -120,7 +54,7 @@ struct Bracket {
 
 class TransitionSearch {
  public:
-  TransitionSearch(const SweepConfig& config, Stages& stages) : config_(config), stages_(stages) {}
+  TransitionSearch(const SweepConfig& config, SweepStages& stages) : config_(config), stages_(stages) {}
 
   /// Brackets from the whole grid, `runs` by angle and then delay.
   void bracket_on_grid(const std::vector<SweepRun>& runs) {
@@ -231,17 +165,9 @@ class TransitionSearch {
   }
 
   const SweepConfig& config_;
-  Stages& stages_;
+  SweepStages& stages_;
   std::vector<Bracket> brackets_;
 };
-
-/// Cases of the whole grid, neighbours in angle under one delay together: they fall at about the same time.
-std::vector<LoopCase> grid_cases(const SweepConfig& config) {
-  std::vector<LoopCase> cases;
-  for (const double delay : config.delay_s)
-    for (const double theta0 : config.theta0_rad) cases.push_back({theta0, delay});
-  return cases;
-}
 
 void sort_runs(std::vector<SweepRun>& runs) {
   std::stable_sort(runs.begin(), runs.end(),
@@ -279,6 +205,16 @@ std::string margins_csv(const std::vector<LinearMargin>& margins) {
   return text;
 }
 
+/// Points by angle, then delay, from counts in the order of grid_cases().
+std::vector<UncertainPoint> points_of(const SweepConfig& config, const std::vector<PlantCounts>& counts) {
+  const std::size_t angles = config.theta0_rad.size();
+  std::vector<UncertainPoint> points;
+  for (std::size_t a = 0; a < angles; ++a)
+    for (std::size_t d = 0; d < config.delay_s.size(); ++d)
+      points.push_back({{config.theta0_rad[a], config.delay_s[d]}, counts[d * angles + a]});
+  return points;
+}
+
 /// It goes last: while it is there the sweep is unfinished.
 constexpr const char* journal_name = "sweep.partial";
 
@@ -303,7 +239,7 @@ void prepare_folder(const std::filesystem::path& folder, bool overwrite) {
   if (overwrite) std::filesystem::remove(folder / journal_name, error);
   // Beside a journal they are of a call that ended while it wrote them: it was not the last word.
   const bool unfinished = std::filesystem::exists(folder / journal_name, error);
-  for (const char* name : {"sweep.csv", "transitions.csv", "margins.csv", "sweep.yaml"}) {
+  for (const char* name : {"sweep.csv", "uncertainty.csv", "transitions.csv", "margins.csv", "sweep.yaml"}) {
     const std::filesystem::path file = folder / name;
     if (overwrite)
       std::filesystem::remove(file, error);
@@ -345,7 +281,7 @@ void refuse_unstable(const SweepConfig& config, const std::vector<LinearMargin>&
 
 std::vector<Transition> find_transitions(const SweepConfig& config, SweepExecutor& executor) {
   const SweepOptions options;
-  Stages stages(config, options, executor, nullptr);
+  SweepStages stages(config, options, executor, nullptr);
   TransitionSearch search(config, stages);
   std::vector<SweepRun> runs;
   search.bracket_by_halving(runs);
@@ -360,10 +296,12 @@ SweepResult run_sweep(const SweepConfig& config, const std::filesystem::path& fo
   prepare_folder(folder, options.overwrite);
   const std::string mode = options.transitions_only ? "# transitions only\n" : "";
   SweepJournal journal(folder / journal_name, mode + config.resolved_text);
-  Stages stages(config, options, executor, &journal);
+  SweepStages stages(config, options, executor, &journal);
   TransitionSearch search(config, stages);
   SweepResult result;
   std::vector<SweepRun> refining;
+  const bool over_plants = config.uncertainty && !options.transitions_only;
+  if (over_plants) stages.expect_plants(grid_cases(config));
   bool whole = true;
   if (options.transitions_only) {
     whole = search.bracket_by_halving(result.runs) && search.refine(result.runs);
@@ -376,6 +314,11 @@ SweepResult run_sweep(const SweepConfig& config, const std::filesystem::path& fo
       whole = search.refine(refining);
     }
   }
+  if (whole && over_plants) {
+    const std::vector<PlantCounts> counts = stages.count_plants(grid_cases(config));
+    whole = !stages.interrupted();
+    if (whole) result.uncertain = points_of(config, counts);
+  }
   result.runs_made = stages.runs_made();
   result.interrupted = !whole;
   if (!whole) return result;
@@ -385,6 +328,8 @@ SweepResult run_sweep(const SweepConfig& config, const std::filesystem::path& fo
   write_file(folder / "sweep.yaml", mode + config.resolved_text);
   write_file(folder / "margins.csv", margins_csv(margins));
   write_file(folder / "transitions.csv", transitions_csv(result.transitions));
+  if (over_plants)
+    write_file(folder / "uncertainty.csv", uncertainty_csv(result.uncertain, config.uncertainty->samples));
   write_file(folder / "sweep.csv", sweep_csv(config, result.runs));
   journal.remove();
   return result;

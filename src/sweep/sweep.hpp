@@ -5,9 +5,13 @@
 #include <atomic>
 #include <filesystem>
 #include <functional>
+#include <memory>
+#include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
+#include "uncertainty.hpp"
 #include "upright/model/plant.hpp"
 #include "upright/sim/loop/loop_run.hpp"
 
@@ -23,15 +27,19 @@ class YamlKeys;
 /// A sweep file (docs/reference/files.md), including the files that it names.
 struct SweepConfig {
   LoopSetup setup;
-  std::filesystem::path plant_file;
+  std::filesystem::path plant_file, gain_file;
   Plant plant;  ///< the plant of `setup.model`, for the linear margins
   SweepEngine engine = SweepEngine::fast;
   std::vector<double> theta0_rad;
   std::vector<double> delay_s;  ///< increasing
   double stable_below_rad = 0.0016;
+  std::optional<Uncertainty> uncertainty;
   /// The sweep with the contents of all files that it names: exactly the inputs on which results depend.
   std::string resolved_text;
 };
+
+/// A task of a sweep, or what came of it.
+using SweepNumbers = std::vector<double>;
 
 /// Visits the keys of the whole file without the files that it names, for the schema.
 void sweep_keys(YamlKeys& document, SweepConfig& config);
@@ -70,12 +78,21 @@ struct LinearMargin {
 /// delay.
 std::vector<LinearMargin> linear_margins(const SweepConfig& config);
 
+/// How long a sweep will take.
+struct SweepEstimate {
+  std::size_t runs = 0;  ///< those of the grid and of all plants, without the search for transitions
+  double run_s = 0.0;    ///< processor time of one
+};
+
 struct SweepOptions {
   unsigned threads = 0;  ///< 0: one per processor
   bool overwrite = false;
   /// Find the transitions by bisection over the delays instead of running the whole grid. Assumes that a
-  /// start that falls also falls for every longer delay in the list.
+  /// start that falls also falls for every longer delay in the list. No map over plants.
   bool transitions_only = false;
+  /// Called before the first run of a sweep over plants: the runs that remain, and the processor time of
+  /// one.
+  std::function<void(const SweepEstimate& remaining)> estimated;
   /// Called after each group of runs, by one thread at a time.
   std::function<void(std::size_t runs_done, std::size_t runs_known)> progress;
   const std::atomic<bool>* stop = nullptr;  ///< set it to stop; completed runs are kept
@@ -84,32 +101,38 @@ struct SweepOptions {
 struct SweepResult {
   std::vector<SweepRun> runs;  ///< by starting angle, then delay
   std::vector<Transition> transitions;
-  std::size_t runs_made = 0;  ///< in this call, without those of an interrupted earlier call
+  std::vector<UncertainPoint> uncertain;  ///< by starting angle, then delay; empty without `uncertainty`
+  std::size_t runs_made = 0;              ///< in this call, without those of an interrupted earlier call
   bool interrupted = false;
 };
 
-/// Executes groups of runs, on this machine or on others.
+/// Executes the tasks of a sweep (sweep_tasks.hpp), on this machine or on others.
 class SweepExecutor {
  public:
-  using Group = std::vector<LoopCase>;
-  using Done = std::function<void(std::size_t group, const std::vector<SweepRun>& runs)>;
+  using TaskOf = std::function<SweepNumbers(std::size_t number)>;
+  using Done = std::function<void(std::size_t number, const SweepNumbers& result)>;
   virtual ~SweepExecutor() = default;
-  /// Calls `done` once per group, in any order but one call at a time, until all are done or `stop` is
-  /// set.
-  virtual void run(const std::vector<Group>& groups, const Done& done, const std::atomic<bool>* stop) = 0;
+  /// Calls `done` once for each of `count` tasks, in any order but one call at a time, until all are done or
+  /// `stop` is set. `task_of` is called by several threads; nothing else is kept of tasks that wait.
+  virtual void run(std::size_t count, const TaskOf& task_of, const Done& done,
+                   const std::atomic<bool>* stop) = 0;
 };
 
 /// Threads on this machine. `threads` 0: all processors.
 std::unique_ptr<SweepExecutor> make_thread_executor(const SweepConfig& config, unsigned threads);
 
 /// Simulates one group of at most `sweep_group_size(config)` runs with the sweep's engine.
-std::vector<SweepRun> run_sweep_group(const SweepConfig& config, const SweepExecutor::Group& group);
+std::vector<SweepRun> run_sweep_group(const SweepConfig& config, const std::vector<LoopCase>& group);
 std::size_t sweep_group_size(const SweepConfig& config);
+
+/// Measures a few of the runs.
+SweepEstimate estimate_sweep(const SweepConfig& config);
 
 /// Finds the transitions only, by bisection over the delays; writes no files.
 std::vector<Transition> find_transitions(const SweepConfig& config, SweepExecutor& executor);
 
-/// Runs the sweep; writes `sweep.csv`, `transitions.csv`, `margins.csv` and `sweep.yaml` into `folder`.
+/// Runs the sweep; writes `sweep.csv`, `transitions.csv`, `margins.csv`, `sweep.yaml` and, with
+/// `uncertainty`, `uncertainty.csv` into `folder`.
 /// `sweep.partial` keeps completed runs, from which a later call with the same sweep resumes. Throws
 /// ConfigError if the gains stabilise the plant neither near rest nor sliding even without delay, or if
 /// the folder already has results (unless `overwrite`) or those of another sweep.

@@ -21,7 +21,7 @@ namespace upright {
 namespace {
 
 constexpr std::int64_t max_values = 1'000'000;
-constexpr double max_runs = 1e8;
+constexpr double max_runs = 1e8, max_plant_runs = 1e9;
 
 /// The decimal number that is meant: 0.12 * 7 / 120 is 0.007 and not the sum of its roundings.
 double rounded(double value) {
@@ -151,12 +151,12 @@ void take_plant(const YamlMap& map, SweepConfig& config) {
 /// The files that a sweep names are read as soon as their keys are.
 void file_keys(YamlKeys& keys, SweepConfig& config, NamedFiles& files) {
   const YamlMap* map = keys.source();
-  std::filesystem::path gains, rig;
+  std::filesystem::path rig;
   LoopSetup& setup = config.setup;
   keys.path("plant", config.plant_file);
   if (map) take_plant(*map, config);
-  keys.path("gains", gains);
-  if (map) setup.control = read_gain_file(gains);
+  keys.path("gains", config.gain_file);
+  if (map) setup.control = read_gain_file(config.gain_file);
   keys.one_of("loop", setup.sampled, loops);
   if (setup.sampled) {
     keys.path("rig", rig);
@@ -181,6 +181,13 @@ void sweep_keys(YamlKeys& keys, SweepConfig& config, NamedFiles& files) {
   keys.number("duration_s", setup.duration_s, Range{0.0, 1e5, true});
   keys.one_of("engine", config.engine, engines);
   keys.number("smoothing", setup.model.smoothing, Range::not_negative(), 0.0);
+  keys.optional_map("uncertainty", config.uncertainty, [&config](YamlKeys& inner, Uncertainty& uncertainty) {
+    uncertainty_keys(inner, uncertainty, config.plant);
+  });
+  const double samples = config.uncertainty ? config.uncertainty->samples : 0.0;
+  keys.check("uncertainty", runs * samples <= max_plant_runs,
+             "with theta0_deg and delay_s makes too many runs",
+             "use fewer samples, angles or delays, for at most 1e9 runs");
 }
 
 }  // namespace
@@ -207,7 +214,8 @@ SweepConfig read_sweep_file(const std::filesystem::path& file) {
       "\n  outcome: {stable_below_rad: " + exact_text(config.stable_below_rad) +
       ", fell_above_rad: " + exact_text(setup.fell_above_rad) +
       "}\n  engine: " + engines[static_cast<std::size_t>(config.engine)] +
-      "\n  smoothing: " + exact_text(setup.model.smoothing) + "\n# The plant file:\n" +
+      "\n  smoothing: " + exact_text(setup.model.smoothing) + "\n" +
+      (config.uncertainty ? config.uncertainty->text() : std::string()) + "# The plant file:\n" +
       plant_text(config.plant) + "# The gain file:\n" + gain_text(setup.control) + files.model_parts;
   return config;
 }

@@ -27,15 +27,19 @@ std::string header_for(const std::string& sweep_text) {
 
 constexpr const char* line_end = " .";
 
-std::string line_of(std::size_t stage, std::size_t group, const std::vector<SweepRun>& runs) {
+std::string line_of(std::size_t stage, std::size_t group, std::size_t cases, const SweepNumbers& result) {
   std::ostringstream line;
-  line << stage << ' ' << group << ' ' << runs.size();
-  for (const SweepRun& run : runs)
-    for (const double value : {run.start.theta0_rad, run.start.delay_s, run.fall_time_s,
-                               run.theta_amplitude_rad, run.cart_amplitude_m})
-      line << ' ' << exact_text(value);
+  line << stage << ' ' << group << ' ' << cases;
+  for (const double value : result) line << ' ' << exact_text(value);
   line << line_end;
   return line.str();
+}
+
+/// The numbers of a line that line_of() wrote, after its first three.
+SweepNumbers numbers_in(std::istringstream& words) {
+  SweepNumbers numbers;
+  for (std::string word; words >> word && word != ".";) numbers.push_back(std::strtod(word.c_str(), nullptr));
+  return numbers;
 }
 
 }  // namespace
@@ -57,22 +61,9 @@ SweepJournal::SweepJournal(const std::filesystem::path& file, const std::string&
       while (std::getline(*in, line) && !in->eof() && line.ends_with(line_end)) {
         whole_bytes += line.size() + 1;
         std::istringstream words(line);
-        std::size_t stage = 0, group = 0, count = 0;
-        words >> stage >> group >> count;
-        std::vector<SweepRun> runs(count <= line.size() ? count : 0);
-        const auto number = [&words] {
-          std::string word;
-          words >> word;
-          return std::strtod(word.c_str(), nullptr);
-        };
-        for (SweepRun& run : runs) {
-          run.start.theta0_rad = number();
-          run.start.delay_s = number();
-          run.fall_time_s = number();
-          run.theta_amplitude_rad = number();
-          run.cart_amplitude_m = number();
-        }
-        done_[{stage, group}] = std::move(runs);
+        std::size_t stage = 0, group = 0, cases = 0;
+        words >> stage >> group >> cases;
+        done_[{stage, group}] = numbers_in(words);
       }
     }
   }
@@ -89,9 +80,14 @@ SweepJournal::~SweepJournal() {
   if (out_ != nullptr) std::fclose(out_);
 }
 
-const std::vector<SweepRun>* SweepJournal::find(std::size_t stage, std::size_t group) const {
+const SweepNumbers* SweepJournal::find(std::size_t stage, std::size_t group) const {
   const auto it = done_.find({stage, group});
   return it == done_.end() ? nullptr : &it->second;
+}
+
+std::size_t SweepJournal::count(std::size_t stage) const {
+  return static_cast<std::size_t>(
+      std::distance(done_.lower_bound({stage, 0}), done_.lower_bound({stage + 1, 0})));
 }
 
 void SweepJournal::check() const {
@@ -114,9 +110,9 @@ void SweepJournal::check() const {
                   " during the sweep: start the same command with that folder as --out to continue");
 }
 
-void SweepJournal::keep(std::size_t stage, std::size_t group, const std::vector<SweepRun>& runs) {
+void SweepJournal::keep(std::size_t stage, std::size_t group, std::size_t cases, const SweepNumbers& result) {
   check();
-  const std::string line = line_of(stage, group, runs) + "\n";
+  const std::string line = line_of(stage, group, cases, result) + "\n";
   if (std::fputs(line.c_str(), out_) < 0 || std::fflush(out_) != 0)
     throw Error(ExitCode::usage, "cannot write " + file_.string() +
                                      ": free some space, and start the same command again to continue");

@@ -21,10 +21,12 @@ class SweepJournal {
   SweepJournal(const SweepJournal&) = delete;
   SweepJournal& operator=(const SweepJournal&) = delete;
 
-  /// The runs of a group if the journal has them.
-  const std::vector<SweepRun>* find(std::size_t stage, std::size_t group) const;
-  /// Throws Error when the runs could not be stored.
-  void keep(std::size_t stage, std::size_t group, const std::vector<SweepRun>& runs);
+  /// What came of a group if the journal has it.
+  const SweepNumbers* find(std::size_t stage, std::size_t group) const;
+  /// How many groups of a stage it has.
+  std::size_t count(std::size_t stage) const;
+  /// Keeps what came of a group of `cases` starts. Throws Error when it could not be stored.
+  void keep(std::size_t stage, std::size_t group, std::size_t cases, const SweepNumbers& result);
   /// Throws Error when another program has removed or moved the journal, alone or with its folder.
   void check() const;
   /// Called once the results are written.
@@ -33,7 +35,7 @@ class SweepJournal {
  private:
   std::filesystem::path file_;
   std::FILE* out_ = nullptr;
-  std::map<std::pair<std::size_t, std::size_t>, std::vector<SweepRun>> done_;
+  std::map<std::pair<std::size_t, std::size_t>, SweepNumbers> done_;
 };
 
 }  // namespace upright

@@ -90,6 +90,13 @@ TEST_F(Diagnose, NamesCoulombAndStribeckInThePapersOwnCase) {
             0.2 * d.at("validation")[0].at("given").at("gap").get<double>());
   EXPECT_FALSE(d.at("validation")[0].at("found_is_worse"));
   EXPECT_EQ(run_upright("check " + in_folder("out/model.yaml")).exit_code, 0);
+  std::ostringstream model;
+  model << std::ifstream(folder_ / "out" / "model.yaml").rdbuf();
+  for (const Json& effect : d.at("effects"))
+    for (const auto& [name, parameter] : effect.at("parameters").items()) {
+      const std::string number = effect.at("kind").get<std::string>() + "." + name;
+      EXPECT_NE(model.str().find("- {number: \"" + number + "\", low: "), std::string::npos) << number;
+    }
   EXPECT_EQ(run_upright("report " + in_folder("out")).exit_code, 0);
   std::ostringstream page;
   page << std::ifstream(folder_ / "out" / "report.html").rdbuf();

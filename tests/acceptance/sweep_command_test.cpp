@@ -42,13 +42,26 @@ class SweepCommand : public ::testing::Test {
         << "\n  outcome: {stable_below_rad: 0.0016, fell_above_rad: 1.0}\n  engine: " << engine << "\n";
   }
 
+  /// A map over drawn plants, with some 20 tasks of a second in all.
+  void write_uncertain(int samples) const {
+    std::ofstream(file())
+        << "sweep:\n  plant: " << source << "/config/plants/exponential.yaml\n  gains: " << source
+        << "/config/gains/exponential.yaml\n  loop: sampled\n  rig: " << source
+        << "/config/rigs/simulated.yaml\n  theta0_deg: [1, 2, 3, 4]\n"
+        << "  delay_s: {from: 0.0, to: 0.03, count: 4}\n  duration_s: 3\n"
+        << "  outcome: {stable_below_rad: 0.0016, fell_above_rad: 1.0}\n  engine: reproducible\n"
+        << "  uncertainty: {percent: 5, samples: " << samples << ", seed: 1}\n";
+  }
+
   static ssize_t write_byte(int to, char byte) { return ::write(to, &byte, 1); }
 
   std::string file() const { return (folder_ / "sweep.yaml").string(); }
   std::string out(const std::string& name) const { return (folder_ / name).string(); }
 
   void expect_same(const std::string& a, const std::string& b) const {
-    for (const char* name : {"sweep.csv", "transitions.csv", "sweep.yaml"}) {
+    std::vector<std::string> names{"sweep.csv", "transitions.csv", "sweep.yaml"};
+    if (content(file()).find("uncertainty:") != std::string::npos) names.emplace_back("uncertainty.csv");
+    for (const std::string& name : names) {
       const std::string text = content(folder_ / a / name);
       EXPECT_FALSE(text.empty()) << name;
       EXPECT_EQ(text, content(folder_ / b / name)) << name;
@@ -231,6 +244,91 @@ TEST_F(SweepCommand, KeepsWhatIsDoneOnAnInterruptAndGoesOn) {
   expect_same("cut", "whole");
 }
 
+TEST_F(SweepCommand, SaysFirstWhichDelayFewPlantsFallAt) {
+  write_uncertain(100);
+  const CommandResult result = run_upright("sweep " + file() + " --json --out " + out("a"));
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_TRUE(std::regex_search(
+      result.err,
+      std::regex("sweep: 1616 runs of [0-9.e-]+ ms of processor time: about .* on [0-9]+ thread")))
+      << result.err;
+  const auto document = nlohmann::ordered_json::parse(result.out);
+  EXPECT_EQ(document.begin().key(), "uncertainty");
+  const auto& delays = document.at("uncertainty").at("fewer_than_5_percent_fall_up_to");
+  ASSERT_EQ(delays.size(), 4u);
+  std::istringstream rows(content(folder_ / "a" / "uncertainty.csv"));
+  std::string row;
+  std::getline(rows, row);
+  EXPECT_EQ(
+      row, "theta0_rad,delay_s,samples,share_falls,low,high,share_oscillates,oscillates_low,oscillates_high");
+  for (const auto& delay : delays) {
+    EXPECT_LT(delay.at("share_falls").get<double>(), 0.05);
+    double tolerated = -1.0;
+    bool holds = true;
+    for (int i = 0; i < 4 && std::getline(rows, row); ++i) {
+      std::istringstream cells(row);
+      std::vector<double> numbers;
+      for (std::string cell; std::getline(cells, cell, ',');) numbers.push_back(std::stod(cell));
+      holds = holds && numbers.at(3) < 0.05;
+      if (holds) tolerated = numbers.at(1);
+    }
+    EXPECT_EQ(delay.at("delay_s"), tolerated);
+  }
+  EXPECT_EQ(run_upright("report " + out("a")).exit_code, 0);
+  const std::string page = content(folder_ / "a" / "report.html");
+  EXPECT_NE(page.find("of 100 plants fall"), std::string::npos);
+  EXPECT_NE(page.find("10 percent fall at [ms]"), std::string::npos);
+  EXPECT_EQ(content(folder_ / "a" / "uncertainty.svg").find("<svg"), 0u);
+}
+
+TEST_F(SweepCommand, EstimatesOnlyAndWritesNothing) {
+  write_uncertain(200);
+  const CommandResult result =
+      run_upright("sweep " + file() + " --estimate --json --threads 2 --out " + out("a"));
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const auto document = nlohmann::json::parse(result.out);
+  EXPECT_EQ(document.at("runs"), 16 * 201);
+  EXPECT_NEAR(document.at("time_s").get<double>(),
+              document.at("processor_s_per_run").get<double>() * 16 * 201 / 2, 1e-9);
+  EXPECT_FALSE(std::filesystem::exists(out("a")));
+}
+
+/// kill -9 and Ctrl-C, several times in one map; then it goes on to its end.
+TEST_F(SweepCommand, KeepsTheCountsOfPlantsOverKillAndInterrupt) {
+  write_uncertain(250);
+  const std::string to = out("cut");
+  const auto lines = [&] {
+    const std::string text = content(folder_ / "cut" / "sweep.partial");
+    return std::count(text.begin(), text.end(), '\n');
+  };
+  std::ptrdiff_t before = 0;
+  for (const int signal : {SIGKILL, SIGINT}) {
+    const pid_t child = fork();
+    if (child == 0) {
+      execl(UPRIGHT_BINARY, UPRIGHT_BINARY, "sweep", file().c_str(), "--threads", "1", "--out", to.c_str(),
+            static_cast<char*>(nullptr));
+      _exit(127);
+    }
+    // The first lines are of the plain map and its transitions.
+    const std::ptrdiff_t enough = std::max<std::ptrdiff_t>(before, 12) + 3;
+    for (int i = 0; i < 6000 && lines() < enough; ++i)
+      std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    kill(child, signal);
+    int status = 0;
+    waitpid(child, &status, 0);
+    ASSERT_FALSE(std::filesystem::exists(folder_ / "cut" / "uncertainty.csv")) << "too late";
+    EXPECT_GE(lines(), enough);
+    before = lines();
+  }
+  EXPECT_NE(content(folder_ / "cut" / "sweep.partial").find("\n1000000 "), std::string::npos);
+  const CommandResult rest = run_upright("sweep " + file() + " --json --out " + to);
+  ASSERT_EQ(rest.exit_code, 0) << rest.err;
+  const CommandResult whole = run_upright("sweep " + file() + " --json --out " + out("whole"));
+  EXPECT_LT(nlohmann::json::parse(rest.out).at("runs_made"),
+            nlohmann::json::parse(whole.out).at("runs_made"));
+  expect_same("cut", "whole");
+}
+
 #ifdef UPRIGHT_WITH_MPI
 
 class SweepOverMpi : public SweepCommand {
@@ -245,6 +343,17 @@ class SweepOverMpi : public SweepCommand {
 TEST_F(SweepOverMpi, GivesTheBytesOfOneProcessOverTwoAndThree) {
   EXPECT_EQ(run_upright("sweep " + file() + " --out " + out("one")).exit_code, 0);
   for (const int ranks : {1, 2, 3}) {
+    const std::string to = std::to_string(ranks) + "-ranks";
+    const CommandResult result = with_ranks(ranks, file() + " --out " + out(to));
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    expect_same("one", to);
+  }
+}
+
+TEST_F(SweepOverMpi, CountsThePlantsAsOneProcessDoes) {
+  write_uncertain(100);
+  EXPECT_EQ(run_upright("sweep " + file() + " --out " + out("one")).exit_code, 0);
+  for (const int ranks : {1, 2, 4}) {
     const std::string to = std::to_string(ranks) + "-ranks";
     const CommandResult result = with_ranks(ranks, file() + " --out " + out(to));
     EXPECT_EQ(result.exit_code, 0) << result.err;

@@ -16,6 +16,7 @@
 #include "sim/loop/closed_loop.hpp"
 #include "sim/loop/fast_loop.hpp"
 #include "sweep/sweep.hpp"
+#include "sweep/sweep_tasks.hpp"
 #include "upright/control/model_parts.hpp"
 #include "upright/model/plant_file.hpp"
 
@@ -243,13 +244,12 @@ void continuous(const char* name, const std::string& plant, double smoothing) {
 void cores() {
   SweepConfig config;
   config.setup = setup_for("exponential", 100.0);
-  std::vector<SweepExecutor::Group> groups;
+  std::vector<SweepNumbers> tasks;
   const std::size_t together = runs_side_by_side();
   const std::vector<LoopCase> cases = cases_240();
   for (std::size_t first = 0; first < cases.size(); first += together)
     for (int repeat = 0; repeat < 12; ++repeat)
-      groups.emplace_back(cases.begin() + static_cast<std::ptrdiff_t>(first),
-                          cases.begin() + static_cast<std::ptrdiff_t>(first + together));
+      tasks.push_back(plain_task(std::span(cases).subspan(first, together)));
   // In turn, and the best of each: other work on the machine disturbs some of them.
   double best_s[2] = {1e300, 1e300};
   for (int repeat = 0; repeat < 9; ++repeat) {
@@ -257,7 +257,8 @@ void cores() {
       const auto begin = std::chrono::steady_clock::now();
       make_thread_executor(config, threads)
           ->run(
-              groups, [](std::size_t, const std::vector<SweepRun>&) {}, nullptr);
+              tasks.size(), [&](std::size_t task) { return tasks[task]; },
+              [](std::size_t, const SweepNumbers&) {}, nullptr);
       const std::chrono::duration<double> wall = std::chrono::steady_clock::now() - begin;
       best_s[threads - 1] = std::min(best_s[threads - 1], wall.count());
     }

@@ -74,6 +74,10 @@ STAGES = {
     "docs/how-to/improve-a-controller.md": Stage(
         setup="simulated_rig; cp config/gains/viscous.yaml my-gains.yaml; example_runs 2",
         replaced=(FAST,)),
+    "docs/how-to/optimise-gains.md": Stage(
+        # Fewer and shorter runs: seconds in place of minutes.
+        setup="sed -i 's/samples: 40/samples: 4/; s/duration_s: 6/duration_s: 3/' config/sweeps/optimise-exponential.yaml",
+        replaced=((r"upright optimise \S+", r"\g<0> --evaluations 30"),)),
     "docs/how-to/run-sweeps.md": Stage(
         replaced=((r"mpirun -n 64 (.*)", r"mpirun --allow-run-as-root --oversubscribe -n 2 \1 --overwrite"),)),
     "docs/how-to/watch-remotely.md": Stage(

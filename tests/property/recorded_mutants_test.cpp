@@ -294,7 +294,7 @@ SweepConfig short_sweep(const fs::path& folder) {
                   "\n  gains: " + (config / "gains/exponential.yaml").string() +
                   "\n  loop: continuous\n  theta0_deg: [1.0, 2.0]\n  delay_s: [0.0, 0.01, 0.02, 0.04]\n  "
                   "duration_s: 0.5\n  outcome: {stable_below_rad: 0.0016, fell_above_rad: 1.0}\n  engine: "
-                  "fast\n");
+                  "fast\n  uncertainty: {percent: 5, samples: 3, seed: 1}\n");
   return read_sweep_file(file);
 }
 
@@ -305,7 +305,7 @@ TEST(RecordedMutants, OfSweepResults) {
   const auto executor = make_thread_executor(sweep, 1);
   const fs::path done = folder.path() / "done";
   run_sweep(sweep, done, {}, *executor);
-  for (const char* name : {"sweep.csv", "transitions.csv", "margins.csv", "sweep.yaml"}) {
+  for (const char* name : {"sweep.csv", "transitions.csv", "margins.csv", "uncertainty.csv", "sweep.yaml"}) {
     const std::string good = text_of(done / name);
     feed({name, {good}, std::string("done/") + name}, folder, mutants() / 4 + 1,
          [&](const fs::path&) { write_sweep_report(done); });

@@ -1,0 +1,142 @@
+#include "sweep_tasks.hpp"
+
+#include <algorithm>
+#include <bit>
+
+#include "sim/loop/fast_loop.hpp"
+
+namespace upright {
+
+namespace {
+
+// A task: its first plant, its number of plants (0: the plant of the file), and its starts.
+constexpr std::size_t header_numbers = 2, case_numbers = 2, run_numbers = 5, count_numbers = 2;
+
+bool runs_on_lanes(const SweepConfig& config, const LoopSetup& setup) {
+  return config.engine != SweepEngine::reference && lanes_can_run(setup);
+}
+
+LaneRegisters registers_of(const SweepConfig& config) {
+  return config.engine == SweepEngine::fast ? LaneRegisters::wide : LaneRegisters::baseline;
+}
+
+std::vector<LoopCase> cases_of(const SweepNumbers& task) {
+  std::vector<LoopCase> cases;
+  for (std::size_t at = header_numbers; at + case_numbers <= task.size(); at += case_numbers)
+    cases.push_back({task[at], task[at + 1]});
+  return cases;
+}
+
+SweepNumbers task_of(std::span<const LoopCase> cases, double first_plant, double plants) {
+  SweepNumbers task{first_plant, plants};
+  for (const LoopCase& start : cases) task.insert(task.end(), {start.theta0_rad, start.delay_s});
+  return task;
+}
+
+std::vector<SweepRun> run_group(const SweepConfig& config, const LoopSetup& setup,
+                                const std::vector<LoopCase>& group) {
+  std::vector<LoopResult> results(group.size());
+  if (runs_on_lanes(config, setup)) {
+    run_on_lanes(setup, group, results, registers_of(config));
+  } else {
+    for (std::size_t i = 0; i < group.size(); ++i)
+      results[i] = config.engine == SweepEngine::reference ? run_with_reference(setup, group[i])
+                                                           : run_with_events(setup, group[i]);
+  }
+  std::vector<SweepRun> runs;
+  for (std::size_t i = 0; i < group.size(); ++i)
+    runs.push_back(
+        {group[i], results[i].fall_time_s, results[i].theta_amplitude_rad, results[i].cart_amplitude_m});
+  return runs;
+}
+
+/// FNV-1a over the numbers' bits, as a whole number that a double holds exactly.
+double checksum(const SweepNumbers& task, std::span<const double> counts) {
+  std::uint64_t hash = 0xcbf29ce484222325u;
+  const auto take = [&hash](double number) {
+    for (auto bits = std::bit_cast<std::uint64_t>(number); bits != 0; bits >>= 8u)
+      hash = (hash ^ (bits & 0xffu)) * 0x100000001b3u;
+    hash = (hash ^ 0x100u) * 0x100000001b3u;
+  };
+  std::for_each(task.begin(), task.end(), take);
+  std::for_each(counts.begin(), counts.end(), take);
+  return static_cast<double>(hash >> 12u);
+}
+
+SweepNumbers count_plants(const SweepConfig& config, const SweepNumbers& task) {
+  const std::vector<LoopCase> cases = cases_of(task);
+  const auto first = static_cast<std::uint32_t>(task[0]), plants = static_cast<std::uint32_t>(task[1]);
+  SweepNumbers result(1 + cases.size() * count_numbers, 0.0);
+  for (std::uint32_t i = 0; i < plants; ++i) {
+    const std::vector<SweepRun> runs = run_plant_group(config, first + i, cases);
+    for (std::size_t k = 0; k < runs.size(); ++k) {
+      const Outcome outcome = runs[k].outcome(config.stable_below_rad);
+      if (outcome == Outcome::fell) result[1 + k * count_numbers] += 1.0;
+      if (outcome == Outcome::oscillating) result[2 + k * count_numbers] += 1.0;
+    }
+  }
+  result[0] = checksum(task, std::span(result).subspan(1));
+  return result;
+}
+
+}  // namespace
+
+SweepNumbers plain_task(std::span<const LoopCase> cases) {
+  return task_of(cases, 0.0, 0.0);
+}
+
+SweepNumbers plants_task(std::span<const LoopCase> cases, std::uint32_t first_plant, std::uint32_t plants) {
+  return task_of(cases, first_plant, plants);
+}
+
+SweepNumbers compute_task(const SweepConfig& config, const SweepNumbers& task) {
+  if (task[1] > 0.0) return count_plants(config, task);
+  SweepNumbers result;
+  for (const SweepRun& run : run_sweep_group(config, cases_of(task)))
+    result.insert(result.end(), {run.start.theta0_rad, run.start.delay_s, run.fall_time_s,
+                                 run.theta_amplitude_rad, run.cart_amplitude_m});
+  return result;
+}
+
+std::vector<SweepRun> runs_of(const SweepNumbers& result) {
+  if (result.size() % run_numbers != 0) return {};
+  std::vector<SweepRun> runs;
+  for (auto at = result.begin(); at != result.end(); at += run_numbers)
+    runs.push_back({{at[0], at[1]}, at[2], at[3], at[4]});
+  return runs;
+}
+
+std::vector<PlantCounts> counts_of(const SweepNumbers& task, const SweepNumbers& result) {
+  const std::size_t cases = (task.size() - header_numbers) / case_numbers;
+  if (result.size() != 1 + cases * count_numbers || result[0] != checksum(task, std::span(result).subspan(1)))
+    return {};
+  std::vector<PlantCounts> counts;
+  for (auto at = result.begin() + 1; at != result.end(); at += count_numbers)
+    counts.push_back({static_cast<std::uint32_t>(at[0]), static_cast<std::uint32_t>(at[1])});
+  return counts;
+}
+
+std::vector<SweepRun> run_plant_group(const SweepConfig& config, std::uint32_t plant,
+                                      const std::vector<LoopCase>& group) {
+  LoopSetup setup = config.setup;
+  setup.model = make_model<double>(config.uncertainty->plants->draw(config.uncertainty->seed, plant));
+  setup.model.smoothing = config.setup.model.smoothing;
+  return run_group(config, setup, group);
+}
+
+std::uint32_t plants_per_task(const SweepConfig& config) {
+  return runs_on_lanes(config, config.setup) ? 50 : 5;
+}
+
+std::size_t sweep_group_size(const SweepConfig& config) {
+  if (!runs_on_lanes(config, config.setup)) return 1;
+  const std::size_t together = runs_side_by_side(registers_of(config));
+  // Lanes of continuous loops go on with the next run when they end, so that more of them waste less.
+  return config.setup.sampled ? together : 4 * together;
+}
+
+std::vector<SweepRun> run_sweep_group(const SweepConfig& config, const std::vector<LoopCase>& group) {
+  return run_group(config, config.setup, group);
+}
+
+}  // namespace upright

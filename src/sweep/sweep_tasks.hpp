@@ -1,0 +1,30 @@
+// The tasks of a sweep and what comes of them, as numbers: so they go through threads, MPI and the journal.
+#pragma once
+
+#include "sweep.hpp"
+
+namespace upright {
+
+/// Runs of the sweep's plant from these starts.
+SweepNumbers plain_task(std::span<const LoopCase> cases);
+/// Runs of the drawn plants `first_plant` and following from these starts, of which only counts are kept.
+SweepNumbers plants_task(std::span<const LoopCase> cases, std::uint32_t first_plant, std::uint32_t plants);
+
+/// The runs of one drawn plant from these starts, at most `sweep_group_size(config)`.
+std::vector<SweepRun> run_plant_group(const SweepConfig& config, std::uint32_t plant,
+                                      const std::vector<LoopCase>& group);
+
+/// What comes of a task of either kind. Depends on nothing else.
+SweepNumbers compute_task(const SweepConfig& config, const SweepNumbers& task);
+
+/// The runs that came of a plain task; empty where the numbers are not those of runs.
+std::vector<SweepRun> runs_of(const SweepNumbers& result);
+/// The counts that came of a task over plants, by start; empty where the numbers are damaged or of another
+/// task.
+std::vector<PlantCounts> counts_of(const SweepNumbers& task, const SweepNumbers& result);
+
+/// How many plants a task runs: enough that messages and the journal cost little, few enough that Ctrl-C is
+/// answered soon.
+std::uint32_t plants_per_task(const SweepConfig& config);
+
+}  // namespace upright
