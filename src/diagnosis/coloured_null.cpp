@@ -1,0 +1,80 @@
+#include "coloured_null.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace upright {
+
+namespace {
+
+FitOptions coloured() {
+  FitOptions options;
+  options.coloured_noise = true;
+  return options;
+}
+
+class ColouredNull {
+ public:
+  ColouredNull(const Search& search, const Hypothesis& known)
+      : search_(search), all_(search.all_data()), known_(known), with_(known) {
+    with_.train = fit(all_, known.train.point, known.free, coloured());
+  }
+
+  /// What the effect saves beside such a disturbance, after the penalty of its parameters.
+  double evidence_of(std::size_t effect) const {
+    Plant plant = with_.train.point.plant;
+    if (const PlantEffect* given = search_.given().find(effect); given != nullptr)
+      plant.set(effect, given->values);
+    else
+      plant.remove(effect);
+    if (!fault_of(plant).empty()) return std::numeric_limits<double>::infinity();
+    std::vector<FreeParameter> others = known_.free;
+    const double parameters = static_cast<double>(
+        std::erase_if(others, [&](const FreeParameter& p) { return p.effect == effect; }));
+    FitPoint point = with_.train.point;
+    convert_initial_states(point.starts, point.plant, plant);
+    point.plant = plant;
+    const FitResult without = fit(all_, point, others, coloured());
+    const double penalty = search_.policy().acceptance.parameter_penalty * std::max(parameters - 1.0, 0.0);
+    return without.objective - with_.train.objective - penalty;
+  }
+
+  double certainty_of(std::size_t effect) const { return search_.certainty(with_, effect); }
+
+ private:
+  const Search& search_;
+  FitData all_;
+  const Hypothesis& known_;
+  Hypothesis with_;
+};
+
+double white_evidence(const Reproduction& reproduction) {
+  double sum = 0.0;
+  for (const RunEvidence& run : reproduction.runs) sum += run.evidence;
+  return sum;
+}
+
+}  // namespace
+
+std::optional<std::size_t> outdone_by_coloured_noise(const Search& search, const Hypothesis& known,
+                                                     const std::vector<Reproduction>& effects) {
+  const AcceptancePolicy& policy = search.policy().acceptance;
+  std::optional<ColouredNull> null;
+  std::optional<std::size_t> worst;
+  double least = std::numeric_limits<double>::infinity();
+  if (known.train.point.starts.size() != search.all_data().segments.size()) return worst;
+  for (const Reproduction& found : effects) {
+    if (search.is_nuisance(found.effect) || white_evidence(found) > policy.overwhelming_evidence) continue;
+    if (!null) null.emplace(search, known);
+    const double evidence = null->evidence_of(found.effect);
+    const bool holds =
+        evidence > policy.min_evidence && null->certainty_of(found.effect) > policy.min_certainty;
+    if (holds || !(evidence < least)) continue;
+    least = evidence;
+    worst = found.effect;
+  }
+  return worst;
+}
+
+}  // namespace upright

@@ -1,0 +1,60 @@
+// A disturbance that lasts is not taken for an effect, and an effect is still found beside it.
+#include <gtest/gtest.h>
+
+#include <set>
+
+#include "blind_case.hpp"
+#include "upright/diagnosis/diagnosis.hpp"
+#include "upright/model/registry.hpp"
+
+namespace upright {
+namespace {
+
+Plant file_plant() {
+  Plant plant;
+  plant.cart_mass_kg = 0.815;
+  plant.motor = {1.7189, 7.682};
+  plant.set("viscous_friction", {3.0});
+  return plant;
+}
+
+/// Runs of a cart with a force of 0.15 N that lasts for 0.2 s.
+std::vector<Measurement> disturbed_runs(Plant plant, unsigned seed) {
+  plant.cart_mass_kg *= 0.99;
+  blind::Rig rig{.plant = plant};
+  rig.coloured.force_n = 0.15;
+  rig.coloured.force_time_s = 0.2;
+  std::vector<Measurement> runs;
+  for (unsigned r = 0; r < 3; ++r) {
+    blind::Plan plan;
+    plan.experiment = r == 1 ? blind::Experiment::square : blind::Experiment::multisine;
+    plan.rate_hz = 200.0;
+    plan.duration_s = 4.0;
+    plan.seed = 100 * seed + r;
+    runs.push_back(measure(rig, plan, std::string("run").append(std::to_string(r))));
+  }
+  return runs;
+}
+
+/// Effects that are named and are no numbers of the plant file.
+std::set<std::string> named(const std::vector<Measurement>& runs) {
+  std::set<std::string> names;
+  for (const FoundEffect& effect : diagnose(file_plant(), runs, {}).effects)
+    if (effect_registry()[effect.effect].enters != Enters::parameter) names.insert(kind_of(effect.effect));
+  return names;
+}
+
+TEST(ColouredNull, ALastingDisturbanceIsNoEffect) {
+  for (const unsigned seed : {1, 2, 3, 4, 5, 6})
+    EXPECT_EQ(named(disturbed_runs(file_plant(), seed)), std::set<std::string>{}) << seed;
+}
+
+TEST(ColouredNull, AnEffectIsNamedBesideALastingDisturbance) {
+  Plant plant = file_plant();
+  plant.set("coulomb_friction", {0.6});
+  for (const unsigned seed : {1, 2, 3})
+    EXPECT_TRUE(named(disturbed_runs(plant, seed)).contains("coulomb_friction")) << seed;
+}
+
+}  // namespace
+}  // namespace upright
