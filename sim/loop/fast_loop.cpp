@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "continuous_lanes.hpp"
-#include "event_lane.hpp"
+#include "event_period.hpp"
 #include "lane_builds.hpp"
 #include "lane_model.hpp"
 #include "lane_observer.hpp"
@@ -81,8 +81,7 @@ class SmoothPeriod {
     }
   }
 
-  [[gnu::flatten]] void advance(PlantState<Lanes>& state, const Lanes& /*command_v*/, const Lanes& motor_v,
-                                double period_s) {
+  [[gnu::flatten]] void advance(PlantState<Lanes>& state, const Lanes& motor_v, double period_s) {
     const auto rate = [&](const PlantState<Lanes>& s, Stage) { return rate_of(s, motor_v); };
     const PlantState<Lanes> first = rate(state, Stage::end);
     const int pieces = pieces_for(state, first, period_s);
@@ -117,60 +116,6 @@ class SmoothPeriod {
   double turning_mps_ = 0.0, sweep_mps_ = 0.0;
 };
 
-/// The same with true stick-slip: every lane has its contact; a lane with an event inside the period goes
-/// through it on the event engine.
-template <class Present>
-class StickSlipPeriod {
- public:
-  StickSlipPeriod(const LoopSetup& setup, const PlantModel<Lanes>& model, const Present& present)
-      : physics_(model, present), event_lane_(setup.model) {}
-
-  [[gnu::flatten]] void advance(PlantState<Lanes>& state, const Lanes& command_v, const Lanes& motor_v,
-                                double period_s) {
-    const Lanes zero(0.0), one(1.0);
-    const Lanes direction = select(state.cart_mps > zero, one,
-                                   select(state.cart_mps < zero, Lanes(-1.0), broken_away(state, motor_v)));
-    const auto rate = [&](const PlantState<Lanes>& s, Stage) {
-      return physics_.derivative_by_direction(s, motor_v, direction);
-    };
-    PlantState<Lanes> next = runge_kutta_4(rate, state, rate(state, Stage::end), Lanes(period_s));
-    const LaneMask rests = direction == zero;
-    LaneMask eventful = direction * next.cart_mps < zero;
-    if (any(rests)) eventful = eventful | (rests & !(broken_away(next, motor_v) == zero));
-    if (any(eventful)) hand_over(eventful.bits(), state, command_v, period_s, next);
-    state = next;
-  }
-
- private:
-  Lanes broken_away(const PlantState<Lanes>& state, const Lanes& motor_v) const {
-    return direction_of(excess_load(physics_, state, motor_v));
-  }
-
-  [[gnu::noinline]] void hand_over(std::uint32_t lanes, const PlantState<Lanes>& before,
-                                   const Lanes& command_v, double period_s, PlantState<Lanes>& after) {
-    const auto x0 = before.cart_m.values(), th0 = before.theta_rad.values(), v0 = before.cart_mps.values(),
-               w0 = before.theta_radps.values(), volts = command_v.values();
-    auto x = after.cart_m.values(), th = after.theta_rad.values(), v = after.cart_mps.values(),
-         w = after.theta_radps.values();
-    for (; lanes != 0; lanes &= lanes - 1) {
-      const auto i = static_cast<std::size_t>(std::countr_zero(lanes));
-      PlantState<double> state{x0[i], th0[i], v0[i], w0[i], 0.0, 0.0};
-      event_lane_.advance(state, volts[i], period_s);
-      x[i] = state.cart_m;
-      th[i] = state.theta_rad;
-      v[i] = state.cart_mps;
-      w[i] = state.theta_radps;
-    }
-    after.cart_m = Lanes::load(x.data());
-    after.theta_rad = Lanes::load(th.data());
-    after.cart_mps = Lanes::load(v.data());
-    after.theta_radps = Lanes::load(w.data());
-  }
-
-  Dynamics<Lanes, Present> physics_;
-  EventLane event_lane_;
-};
-
 template <class Period>
 void run_sampled(const LoopSetup& setup, const Dynamics<Lanes>& chain, Period& period, LaneObserver& observer,
                  std::span<const LoopCase> cases, std::span<LoopResult> results) {
@@ -196,7 +141,7 @@ void run_sampled(const LoopSetup& setup, const Dynamics<Lanes>& chain, Period& p
     }
     command = smaller(larger(observer.command_v(delay.pass(tick, feedback)), -limit), limit);
     state.motor_v = chain.actuate(command);
-    period.advance(state, command, state.motor_v, period_s);
+    period.advance(state, state.motor_v, period_s);
   }
   seen.take(static_cast<double>(ticks) * period_s, state);
   seen.finish(state, results);
@@ -210,7 +155,7 @@ void run_with(const LoopSetup& setup, const LaneEstimator* estimator, const Pres
   const Dynamics<Lanes> chain(model);
   if constexpr (may_stick<Present>) {
     if (chain.cart_can_stick()) {
-      StickSlipPeriod<Present> period(setup, model, present);
+      EventPeriod<Present> period(model, present);
       return run_sampled(setup, chain, period, observer, cases, results);
     }
   }

@@ -1,9 +1,9 @@
+#include <algorithm>
 #include <cstdlib>
 #include <optional>
 #include <string_view>
 
 #include "control/kalman_filter.hpp"
-#include "event_lane.hpp"
 #include "fast_loop.hpp"
 #include "lane_builds.hpp"
 
@@ -47,6 +47,18 @@ LaneBuild widest() {
   return {wide_lanes::runs_side_by_side, wide_lanes::run};
 }
 #endif
+
+/// The greatest rate of a plant's motion at realistic speeds [1/s].
+double fastest_rate_radps(const PlantModel<double>& model) {
+  const Dynamics<double> physics(model);
+  double fastest = 0.0;
+  for (const double speed : {0.0, 0.01, 0.1, 1.0}) {
+    PlantState<double> state;
+    state.cart_mps = speed;
+    fastest = std::max(fastest, physics.fastest_rate_radps(state));
+  }
+  return fastest;
+}
 
 const LaneBuild& lanes_for(LaneRegisters registers) {
   static const LaneBuild wide = widest();

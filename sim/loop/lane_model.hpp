@@ -48,6 +48,14 @@ inline constexpr bool may_stick<StaticEffectSet<viscous_set>> = false;
 template <>
 inline constexpr bool may_stick<StaticEffectSet<dynamic_set>> = false;
 
+/// Whether a cart with these effects may be held by bristles.
+template <class Present>
+constexpr bool may_have_bristles = false;
+template <>
+inline constexpr bool may_have_bristles<EffectSet> = true;
+template <>
+inline constexpr bool may_have_bristles<StaticEffectSet<dynamic_set>> = true;
+
 /// Calls `run` with the plant's effects: common sets at compile time, all others at run time.
 template <class Run>
 void with_effects(const EffectSet& present, const Run& run) {
