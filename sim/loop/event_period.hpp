@@ -1,15 +1,16 @@
 // How the motion gets through one period with the voltage held where the cart may stop, break away or reverse
 // within it: all lanes pass through their events side by side.
 //
-// Each lane takes steps of its own length, all lanes one step at a time, until all have reached the end of the
-// period. What a lane does depends on its own state only, so that its neighbours change no bit of it.
+// Each lane takes steps of its own length, all lanes one step at a time, until all have reached the end of
+// the period. What a lane does depends on its own state only, so that its neighbours change no bit of it.
 //
 //   - A cart that slows down steps to where it would stop with its present deceleration. From the end of a
 //     step near a stop a polynomial in time leads to the stop, forward or back.
 //   - A step that went beyond a stop, or too far beyond a breakaway, is taken again, shorter.
 //   - A cart breaks away a little after the load has passed the static friction, so that its acceleration has
-//     the direction of its motion. The stop that ends a slip is sought back from the end of a step, never from
-//     the zero of the velocity at which the slip began, so that a slip of any length is taken as a whole.
+//     the direction of its motion. The stop that ends a slip is sought back from the end of a step, never
+//     from the zero of the velocity at which the slip began, so that a slip of any length is taken as a
+//     whole.
 #pragma once
 
 #include "lane_model.hpp"
@@ -24,23 +25,43 @@ class EventPeriod {
       : physics_(model, present), sticks_(may_stick<Present> && physics_.cart_can_stick()) {}
 
   using State = PlantState<Lanes>;
+  using Mask = LaneMask;
 
-  [[gnu::flatten]] void advance(State& state, const Lanes& motor_v, double period_s) const {
-    const Lanes zero(0.0), period(period_s);
-    Steps steps{state, sign_of(state.cart_mps), period, period, state.cart_mps == zero};
-    for (int taken = 0; any(steps.left_s > zero); ++taken) {
-      const bool hold = taken >= most_steps;
-      const Begin begin = begin_of(steps, motor_v);
-      Step step{hold ? steps.left_s : length_of(steps, begin), {}, {}};
-      const auto rate = [&](const State& at, Stage stage) {
-        const Rate found = rate_of(at, motor_v, steps.direction);
-        if (stage == Stage::end) step.last = found;
-        return found.of;
-      };
-      step.end = runge_kutta_4(rate, steps.state, begin.rate, step.length_s);
-      take(steps, begin, step, period, hold);
-    }
-    state = steps.state;
+  /// Where each lane is in its period.
+  struct Steps {
+    State state{};
+    Lanes direction;     ///< of the motion, -1 or 1; 0: at rest
+    Lanes left_s;        ///< until the end of the period
+    Lanes longest_s;     ///< that the next step may be: the last one went beyond an event
+    Lanes taken;         ///< steps of this period
+    LaneMask settles{};  ///< the cart has come to rest, and the load decides how it goes on
+  };
+
+  /// The lanes at the end of their periods.
+  static LaneMask arrived(const Steps& steps) { return steps.left_s == Lanes(0.0); }
+
+  /// Begins a period in these lanes.
+  static void begin(Steps& steps, const LaneMask& lanes, double period_s) {
+    const Lanes zero(0.0), period(period_s), v = steps.state.cart_mps;
+    steps.direction = select(lanes, sign_of(v), steps.direction);
+    steps.left_s = select(lanes, period, steps.left_s);
+    steps.longest_s = select(lanes, period, steps.longest_s);
+    steps.taken = select(lanes, zero, steps.taken);
+    steps.settles = (lanes & (v == zero)) | (steps.settles & !lanes);
+  }
+
+  /// One step in every lane that is within a period.
+  [[gnu::flatten]] void advance(Steps& steps, const Lanes& motor_v, double period_s) const {
+    const LaneMask hold = steps.taken >= Lanes(most_steps);
+    const Begin begin = begin_of(steps, motor_v);
+    Step step{length_of(steps, begin, hold), {}, {}};
+    const auto rate = [&](const State& at, Stage stage) {
+      const Rate found = rate_of(at, motor_v, steps.direction);
+      if (stage == Stage::end) step.last = found;
+      return found.of;
+    };
+    step.end = runge_kutta_4(rate, steps.state, begin.rate, step.length_s);
+    take(steps, begin, step, Lanes(period_s), hold);
   }
 
  private:
@@ -50,18 +71,10 @@ class EventPeriod {
   /// The load grows by some newtons per second: velocities are changed by less than 1e-11 m/s.
   static constexpr double late_breakaway_s = 1e-6;
   /// After so many steps in a period a cart that stops stays at rest until its end: a bound on the work.
-  static constexpr int most_steps = 48;
+  static constexpr double most_steps = 48.0;
   /// A step that is taken again keeps within these parts of its length.
   static constexpr double shortest_part = 0.02, longest_part = 0.98;
 
-  /// Where each lane is in the period.
-  struct Steps {
-    State state;
-    Lanes direction;   ///< of the motion, -1 or 1; 0: at rest
-    Lanes left_s;      ///< until the end of the period
-    Lanes longest_s;   ///< that the next step may be: the last one went beyond an event
-    LaneMask settles;  ///< the cart has come to rest, and the load decides how it goes on
-  };
   struct Rate {
     State of;
     Lanes load_n;  ///< that the friction must hold if the cart is to rest
@@ -85,7 +98,7 @@ class EventPeriod {
     Begin begin{};
     const State& at = steps.state;
     if (!sticks_) {
-      begin.rate = physics_.derivative(at, motor_v, {});
+      begin.rate = unheld_rate(at, motor_v, steps.direction);
       steps.direction = select(steps.settles, sign_of(begin.rate.cart_mps), steps.direction);
       return begin;
     }
@@ -105,17 +118,25 @@ class EventPeriod {
   /// One copy for the stages of a step, as in SmoothPeriod.
   [[gnu::flatten, gnu::noinline]] Rate rate_of(const State& state, const Lanes& motor_v,
                                                const Lanes& direction) const {
-    if (!sticks_) return {physics_.derivative(state, motor_v, {}), Lanes(0.0)};
+    if (!sticks_) return {unheld_rate(state, motor_v, direction), Lanes(0.0)};
     const auto balance = physics_.balance(state, motor_v);
     return {physics_.derivative_by_direction(state, balance, direction), physics_.cart_load(state, balance)};
   }
 
+  /// Of a cart that nothing holds. At rest its direction makes no difference to it.
+  State unheld_rate(const State& state, const Lanes& motor_v, const Lanes& direction) const {
+    if constexpr (may_have_bristles<Present>)
+      if (physics_.has_bristle_state())
+        return physics_.bristle_derivative_by_direction(state, motor_v, direction);
+    return physics_.derivative(state, motor_v, {});
+  }
+
   /// To the end of the period, or to where a cart that slows down would stop.
-  static Lanes length_of(const Steps& steps, const Begin& begin) {
+  static Lanes length_of(const Steps& steps, const Begin& begin, const LaneMask& hold) {
     const Lanes zero(0.0), speed = steps.direction * steps.state.cart_mps,
-                growth = steps.direction * begin.rate.cart_mps;
+                           growth = steps.direction * begin.rate.cart_mps;
     const Lanes longest = smaller(steps.left_s, steps.longest_s);
-    const LaneMask slows = (growth < zero) & (speed > zero);
+    const LaneMask slows = (growth < zero) & (speed > zero) & !hold;
     return select(slows, smaller(longest, speed / select(slows, -growth, Lanes(1.0))), longest);
   }
 
@@ -128,17 +149,16 @@ class EventPeriod {
   };
 
   /// Takes the step in the lanes where it met nothing, or ends at what it met.
-  void take(Steps& steps, const Begin& begin, const Step& step, const Lanes& period_s, bool hold) const {
+  void take(Steps& steps, const Begin& begin, const Step& step, const Lanes& period_s,
+            const LaneMask& hold) const {
     const Lanes zero(0.0), one(1.0), h = step.length_s;
     const LaneMask active = steps.left_s > zero;
     const Lanes per_length = select(active, one / select(active, h, one), zero);
     Met met = stops_of(steps, begin, step, active, per_length);
-    if (hold) {
-      met.stops = met.stops | met.beyond;
-      met.beyond = met.breaks;
-    } else if (sticks_ && any(active & (steps.direction == zero))) {
-      find_breakaways(steps, begin, step, active, met);
-    }
+    if (sticks_ && any(active & (steps.direction == zero))) find_breakaways(steps, begin, step, active, met);
+    met.stops = met.stops | (met.beyond & hold);
+    met.beyond = met.beyond & !hold;
+    met.breaks = met.breaks & !hold;
     const LaneMask counts = !met.beyond;
     const Lanes more = select(met.stops, met.to_stop_s, zero), bend = Lanes(0.5) * more * per_length;
     const auto on = [&](Lanes State::*of) {
@@ -157,7 +177,8 @@ class EventPeriod {
     steps.direction = select(rests, zero, select(met.breaks, sign_of(step.last.load_n), steps.direction));
     steps.left_s = select(counts, steps.left_s - h - more, steps.left_s);
     steps.longest_s = select(counts, period_s, met.retry_s);
-    steps.settles = hold ? met.breaks : met.stops;
+    steps.settles = met.stops & !hold;
+    steps.taken = steps.taken + one;
   }
 
   /// Stops within a step and near its end.
@@ -165,7 +186,8 @@ class EventPeriod {
                       const Lanes& per_length) {
     const Lanes zero(0.0), two(2.0), h = step.length_s;
     const Lanes from = steps.direction * steps.state.cart_mps, growth = steps.direction * begin.rate.cart_mps,
-                to = steps.direction * step.end.cart_mps, end_growth = steps.direction * step.last.of.cart_mps;
+                to = steps.direction * step.end.cart_mps,
+                end_growth = steps.direction * step.last.of.cart_mps;
     const LaneMask none = active & !active;
     Met met{none, none, none, zero, h};
     const Lanes bend = (end_growth - growth) * per_length;

@@ -50,8 +50,8 @@ class SweepAccuracy : public testing::TestWithParam<Friction> {
     return cases;
   }
 
-  static void expect_sampled_loops_agree(const LoopSetup& setup) {
-    const std::vector<LoopCase> cases = cases_240();
+  static void expect_sampled_loops_agree(const LoopSetup& setup,
+                                         const std::vector<LoopCase>& cases = cases_240()) {
     std::vector<LoopResult> lanes(cases.size());
     run_on_lanes(setup, cases, lanes);
     for (std::size_t i = 0; i < cases.size(); ++i) {
@@ -111,6 +111,30 @@ TEST_P(SweepAccuracy, SampledLoopsWithAKalmanFilter) {
   };
   ASSERT_TRUE(lanes_can_run(setup));
   expect_sampled_loops_agree(setup);
+}
+
+/// Delays of up to 60 ms, whole and fractional periods, with a predictor that believes another plant.
+TEST_P(SweepAccuracy, SampledLoopsWithAPredictor) {
+  for (const StateEstimatorKind kind : {StateEstimatorKind::none, StateEstimatorKind::kalman}) {
+    LoopSetup setup = SweepAccuracy::setup(true);
+    setup.control.gains = {47.4, 120.0, 41.0, 22.8};
+    setup.control.state_estimator.kind = kind;
+    setup.control.rejection = {0.9, 0.05};
+    setup.control.compensation.kind = CompensationKind::predictor;
+    Plant believed = read_plant_file(std::string(UPRIGHT_SOURCE_DIR) + "/config/plants/viscous.yaml");
+    believed.set("input_delay", {0.0023});
+    believed.set("motor_lag", {0.001});
+    believed.set("constant_force", {0.05});
+    believed.set("angle_scale", {1.001});
+    setup.make_parts = [believed](const ControlConfig& asked) {
+      return make_model_parts(asked, believed, believed);
+    };
+    setup.duration_s = 0.6;
+    ASSERT_TRUE(lanes_can_run(setup));
+    std::vector<LoopCase> cases = cases_240();
+    for (LoopCase& one : cases) one.delay_s *= 4.3;
+    expect_sampled_loops_agree(setup, cases);
+  }
 }
 
 TEST_P(SweepAccuracy, ContinuousLoops) {

@@ -230,7 +230,7 @@ class Dynamics {
     S force;         ///< on the cart, without dry friction [N]
     S torque;        ///< about the pivot, without gravity [N m]
   };
-  /// For plants with a pendulum and without bristles, whose pivot cannot stick.
+  /// For plants with a pendulum whose pivot cannot stick.
   Balance balance(const PlantState<S>& state, const S& motor_v) const {
     const auto [s, c] = elementary::sine_and_cosine(state.theta_rad);
     return {s, c, cart_smooth_force(state, motor_v), pivot_smooth_torque(state.theta_radps)};
@@ -262,6 +262,20 @@ class Dynamics {
   PlantState<S> derivative_by_direction(const PlantState<S>& state, const S& motor_v,
                                         const S& direction) const {
     return derivative_by_direction(state, balance(state, motor_v), direction);
+  }
+
+  /// As `derivative`, of a cart on bristles that moves in this direction: the motion continues smoothly a
+  /// little beyond the reversal.
+  PlantState<S> bristle_derivative_by_direction(const PlantState<S>& state, const S& motor_v,
+                                                const S& direction) const {
+    const Balance at = balance(state, motor_v);
+    PlantState<S> rate{};
+    rate.bristle_m = bristle_rate(state, S(direction * state.cart_mps), direction);
+    const S force = at.force - bristle_stiffness() * state.bristle_m - bristle_damping() * rate.bristle_m;
+    accelerate(state, at.sine, at.cosine, force, at.torque, false, false, rate);
+    rate.cart_m = state.cart_mps;
+    rate.theta_rad = state.theta_radps;
+    return rate;
   }
 
   /// The force that dry friction must balance to hold a resting cart: motor, smooth forces and the
@@ -365,9 +379,11 @@ class Dynamics {
   }
 
   S bristle_rate(const PlantState<S>& state) const {
-    const S speed = absolute(state.cart_mps);
     const S direction = select(state.cart_mps < S(0.0), S(-1.0), S(1.0));
-    const S level = cart_dry_level(state.cart_m, speed, direction);
+    return bristle_rate(state, absolute(state.cart_mps), direction);
+  }
+  S bristle_rate(const PlantState<S>& state, const S& speed, const S& direction) const {
+    const S level = cart_dry_level(state.cart_m, positive_part(speed), direction);
     const S safe = select(level > S(smallest_level_n), level, S(smallest_level_n));
     return state.cart_mps - bristle_stiffness() * speed * state.bristle_m / safe;
   }
