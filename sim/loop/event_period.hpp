@@ -31,7 +31,10 @@ class EventPeriod {
   struct Steps {
     State state{};
     Lanes direction;     ///< of the motion, -1 or 1; 0: at rest
-    Lanes left_s;        ///< until the end of the period
+    Lanes motor_v;       ///< now
+    Lanes left_s;        ///< until this voltage ends
+    Lanes late_v;        ///< that follows, for
+    Lanes late_s;        ///< 0: the period ends
     Lanes longest_s;     ///< that the next step may be: the last one went beyond an event
     Lanes taken;         ///< steps of this period
     LaneMask settles{};  ///< the cart has come to rest, and the load decides how it goes on
@@ -41,27 +44,33 @@ class EventPeriod {
   static LaneMask arrived(const Steps& steps) { return steps.left_s == Lanes(0.0); }
 
   /// Begins a period in these lanes.
-  static void begin(Steps& steps, const LaneMask& lanes, double period_s) {
-    const Lanes zero(0.0), period(period_s), v = steps.state.cart_mps;
-    steps.direction = select(lanes, sign_of(v), steps.direction);
-    steps.left_s = select(lanes, period, steps.left_s);
-    steps.longest_s = select(lanes, period, steps.longest_s);
+  static void begin(Steps& steps, const LaneMask& lanes, const LaneDrive& drive) {
+    const Lanes zero(0.0);
+    const bool two_parts = drive.early_s > 0.0;
+    steps.late_v = select(lanes, drive.late_v, steps.late_v);
+    steps.late_s = two_parts ? select(lanes, Lanes(drive.late_s), steps.late_s) : zero;
     steps.taken = select(lanes, zero, steps.taken);
-    steps.settles = (lanes & (v == zero)) | (steps.settles & !lanes);
+    hold(steps, lanes, two_parts ? drive.early_v : drive.late_v,
+         Lanes(two_parts ? drive.early_s : drive.late_s));
   }
 
   /// One step in every lane that is within a period.
-  [[gnu::flatten]] void advance(Steps& steps, const Lanes& motor_v, double period_s) const {
-    const LaneMask hold = steps.taken >= Lanes(most_steps);
-    const Begin begin = begin_of(steps, motor_v);
-    Step step{length_of(steps, begin, hold), {}, {}};
+  [[gnu::flatten]] void advance(Steps& steps) const {
+    const LaneMask stay = steps.taken >= Lanes(most_steps);
+    const Begin begin = begin_of(steps);
+    Step step{length_of(steps, begin, stay), {}, {}};
     const auto rate = [&](const State& at, Stage stage) {
-      const Rate found = rate_of(at, motor_v, steps.direction);
+      const Rate found = rate_of(at, steps.motor_v, steps.direction);
       if (stage == Stage::end) step.last = found;
       return found.of;
     };
     step.end = runge_kutta_4(rate, steps.state, begin.rate, step.length_s);
-    take(steps, begin, step, Lanes(period_s), hold);
+    take(steps, begin, step, stay);
+    const LaneMask next = (steps.left_s == Lanes(0.0)) & (steps.late_s > Lanes(0.0));
+    if (any(next)) {
+      hold(steps, next, steps.late_v, steps.late_s);
+      steps.late_s = select(next, Lanes(0.0), steps.late_s);
+    }
   }
 
  private:
@@ -90,13 +99,24 @@ class EventPeriod {
     Rate last;  ///< at its end, by the last stage
   };
 
+  /// Holds a voltage in these lanes. The load on carts at rest changes with it.
+  static void hold(Steps& steps, const LaneMask& lanes, const Lanes& motor_v, const Lanes& duration_s) {
+    const Lanes v = steps.state.cart_mps;
+    steps.motor_v = select(lanes, motor_v, steps.motor_v);
+    steps.direction = select(lanes, sign_of(v), steps.direction);
+    steps.left_s = select(lanes, duration_s, steps.left_s);
+    steps.longest_s = select(lanes, duration_s, steps.longest_s);
+    steps.settles = (lanes & (v == Lanes(0.0))) | (steps.settles & !lanes);
+  }
+
   Lanes excess_of(const Lanes& load_n, const Begin& begin) const {
     return larger(load_n - begin.forward_n, -load_n - begin.backward_n);
   }
 
-  [[gnu::flatten, gnu::noinline]] Begin begin_of(Steps& steps, const Lanes& motor_v) const {
+  [[gnu::flatten, gnu::noinline]] Begin begin_of(Steps& steps) const {
     Begin begin{};
     const State& at = steps.state;
+    const Lanes& motor_v = steps.motor_v;
     if (!sticks_) {
       begin.rate = unheld_rate(at, motor_v, steps.direction);
       steps.direction = select(steps.settles, sign_of(begin.rate.cart_mps), steps.direction);
@@ -132,11 +152,11 @@ class EventPeriod {
   }
 
   /// To the end of the period, or to where a cart that slows down would stop.
-  static Lanes length_of(const Steps& steps, const Begin& begin, const LaneMask& hold) {
+  static Lanes length_of(const Steps& steps, const Begin& begin, const LaneMask& stay) {
     const Lanes zero(0.0), speed = steps.direction * steps.state.cart_mps,
                            growth = steps.direction * begin.rate.cart_mps;
     const Lanes longest = smaller(steps.left_s, steps.longest_s);
-    const LaneMask slows = (growth < zero) & (speed > zero) & !hold;
+    const LaneMask slows = (growth < zero) & (speed > zero) & !stay;
     return select(slows, smaller(longest, speed / select(slows, -growth, Lanes(1.0))), longest);
   }
 
@@ -149,16 +169,15 @@ class EventPeriod {
   };
 
   /// Takes the step in the lanes where it met nothing, or ends at what it met.
-  void take(Steps& steps, const Begin& begin, const Step& step, const Lanes& period_s,
-            const LaneMask& hold) const {
+  void take(Steps& steps, const Begin& begin, const Step& step, const LaneMask& stay) const {
     const Lanes zero(0.0), one(1.0), h = step.length_s;
     const LaneMask active = steps.left_s > zero;
     const Lanes per_length = select(active, one / select(active, h, one), zero);
     Met met = stops_of(steps, begin, step, active, per_length);
     if (sticks_ && any(active & (steps.direction == zero))) find_breakaways(steps, begin, step, active, met);
-    met.stops = met.stops | (met.beyond & hold);
-    met.beyond = met.beyond & !hold;
-    met.breaks = met.breaks & !hold;
+    met.stops = met.stops | (met.beyond & stay);
+    met.beyond = met.beyond & !stay;
+    met.breaks = met.breaks & !stay;
     const LaneMask counts = !met.beyond;
     const Lanes more = select(met.stops, met.to_stop_s, zero), bend = Lanes(0.5) * more * per_length;
     const auto on = [&](Lanes State::*of) {
@@ -176,8 +195,8 @@ class EventPeriod {
                                         (steps.direction * begin.rate.cart_mps <= zero));
     steps.direction = select(rests, zero, select(met.breaks, sign_of(step.last.load_n), steps.direction));
     steps.left_s = select(counts, steps.left_s - h - more, steps.left_s);
-    steps.longest_s = select(counts, period_s, met.retry_s);
-    steps.settles = met.stops & !hold;
+    steps.longest_s = select(counts, steps.left_s, met.retry_s);
+    steps.settles = met.stops & !stay;
     steps.taken = steps.taken + one;
   }
 

@@ -3,6 +3,7 @@
 #include <optional>
 
 #include "continuous_lanes.hpp"
+#include "control/whole_periods.hpp"
 #include "event_period.hpp"
 #include "lane_builds.hpp"
 #include "lane_model.hpp"
@@ -58,6 +59,30 @@ class LaneDelay {
   bool same_ = true, exact_ = true;
 };
 
+/// The plant's own input delay, the same for all lanes. Before the first command zero volts are commanded.
+template <class Mask>
+class LaneInput {
+ public:
+  LaneInput(const Dynamics<Lanes>& chain, double period_s)
+      : delay_(whole_periods(chain.input_delay_s().values()[0], period_s)),
+        period_s_(period_s),
+        drives_(delay_.whole + 1) {
+    drives_.fill(chain.actuate(Lanes(0.0)));
+  }
+
+  LaneDrive pass(const Mask& lanes, const Lanes& drive_v) {
+    if (delay_.whole == 0 && delay_.fraction == 0.0) return {drive_v, drive_v, 0.0, period_s_};
+    drives_.push(lanes, drive_v);
+    const double early_s = delay_.fraction * period_s_;
+    return {drives_.ago(delay_.whole + 1), drives_.ago(delay_.whole), early_s, period_s_ - early_s};
+  }
+
+ private:
+  WholePeriods delay_;
+  double period_s_;
+  LaneRing<Mask> drives_;
+};
+
 /// How the motion gets through one period with the voltage held: smooth friction.
 template <class Present>
 class SmoothPeriod {
@@ -65,9 +90,15 @@ class SmoothPeriod {
   using Mask = EveryLane;
   struct Steps {
     PlantState<Lanes> state{};
+    LaneDrive drive;
   };
   static EveryLane arrived(const Steps& /*steps*/) { return {}; }
-  static void begin(const Steps& /*steps*/, EveryLane /*lanes*/, double /*period_s*/) {}
+  static void begin(Steps& steps, EveryLane /*lanes*/, const LaneDrive& drive) { steps.drive = drive; }
+  void advance(Steps& steps) const {
+    const LaneDrive& drive = steps.drive;
+    if (drive.early_s > 0.0) advance(steps.state, drive.early_v, drive.early_s);
+    advance(steps.state, drive.late_v, drive.late_s);
+  }
 
   SmoothPeriod(const LoopSetup& setup, const PlantModel<Lanes>& model, const Present& present)
       : physics_(model, present) {
@@ -83,8 +114,7 @@ class SmoothPeriod {
     }
   }
 
-  [[gnu::flatten]] void advance(Steps& steps, const Lanes& motor_v, double period_s) const {
-    PlantState<Lanes>& state = steps.state;
+  [[gnu::flatten]] void advance(PlantState<Lanes>& state, const Lanes& motor_v, double period_s) const {
     const auto rate = [&](const PlantState<Lanes>& s, Stage) { return rate_of(s, motor_v); };
     const PlantState<Lanes> first = rate(state, Stage::end);
     const int pieces = pieces_for(state, first, period_s);
@@ -134,6 +164,7 @@ void run_sampled(const LoopSetup& setup, const Dynamics<Lanes>& chain, const Per
   using Mask = typename Period::Mask;
   const double period_s = setup.control.period_s();
   LaneDelay<Mask> delay(cases, period_s);
+  LaneInput<Mask> input(chain, period_s);
   LaneResults seen(setup, cases.size());
   typename Period::Steps steps;
   PlantState<Lanes>& state = steps.state;
@@ -156,10 +187,11 @@ void run_sampled(const LoopSetup& setup, const Dynamics<Lanes>& chain, const Per
       first = false;
       const Lanes wanted = observer.command_v(goes_on, delay.pass(goes_on, newest), command);
       command = select(goes_on, smaller(larger(wanted, -limit), limit), command);
-      state.motor_v = chain.actuate(command);
-      Period::begin(steps, goes_on, period_s);
+      const LaneDrive drive = input.pass(goes_on, chain.actuate(command));
+      state.motor_v = drive.late_v;
+      Period::begin(steps, goes_on, drive);
     }
-    period.advance(steps, state.motor_v, period_s);
+    period.advance(steps);
   }
   seen.finish(state, results);
 }

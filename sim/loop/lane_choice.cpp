@@ -108,7 +108,6 @@ bool lanes_can_run(const LoopSetup& setup) {
   if (setup.model.cart_locked || !setup.model.has_pendulum) return false;
   const Dynamics<double> physics(setup.model);
   if (physics.has_motor_lag() || physics.pivot_has_kink()) return false;
-  if (setup.sampled && physics.input_delay_s() > 0.0) return false;
   // Faster plants than that need steps that the lanes do not take.
   constexpr double fastest_radps = 1e3;
   return fastest_rate_radps(setup.model) < fastest_radps;

@@ -27,13 +27,14 @@ struct Friction {
 
 class SweepAccuracy : public testing::TestWithParam<Friction> {
  protected:
-  static LoopSetup setup(bool sampled) {
+  static LoopSetup setup(bool sampled, double input_delay_s = 0.0) {
     LoopSetup made;
     Plant plant =
         read_plant_file(std::string(UPRIGHT_SOURCE_DIR) + "/config/plants/" + GetParam().plant + ".yaml");
     if (GetParam().table)
       plant.set("force_table",
                 {0.0, -0.6, 0.6, 0.3, 0.1, -0.2, 0.1, 0.3, 0.2, 0.0, -0.2, -0.3, -0.1, 0.2, -0.1, -0.3});
+    if (input_delay_s > 0.0) plant.set("input_delay", {input_delay_s});
     made.model = make_model<double>(plant);
     made.model.smoothing = GetParam().smoothing;
     made.control.gains = {70.7107, 304.9273, 143.3152, 61.0833};
@@ -134,6 +135,15 @@ TEST_P(SweepAccuracy, SampledLoopsWithAPredictor) {
     std::vector<LoopCase> cases = cases_240();
     for (LoopCase& one : cases) one.delay_s *= 4.3;
     expect_sampled_loops_agree(setup, cases);
+  }
+}
+
+TEST_P(SweepAccuracy, SampledLoopsOfAPlantWithAnInputDelay) {
+  for (const double input_delay_s : {0.0004, 0.002, 0.0033}) {
+    LoopSetup setup = SweepAccuracy::setup(true, input_delay_s);
+    setup.duration_s = 0.5;
+    ASSERT_TRUE(lanes_can_run(setup));
+    expect_sampled_loops_agree(setup);
   }
 }
 
