@@ -1,8 +1,9 @@
 // How the motion gets through one period with the voltage held where the cart may stop, break away or reverse
 // within it: all lanes pass through their events side by side.
 //
-// Each lane takes steps of its own length, all lanes one step at a time, until all have reached the end of
-// the period. What a lane does depends on its own state only, so that its neighbours change no bit of it.
+// Each lane takes steps of its own length, all lanes one step at a time; whichever has come to the end of its
+// period begins the next. What a lane does depends on its own state only, so that its neighbours change no
+// bit of it.
 //
 //   - A cart that slows down steps to where it would stop with its present deceleration. From the end of a
 //     step near a stop a polynomial in time leads to the stop, forward or back.
@@ -33,8 +34,8 @@ class EventPeriod {
     Lanes direction;     ///< of the motion, -1 or 1; 0: at rest
     Lanes motor_v;       ///< now
     Lanes left_s;        ///< until this voltage ends
-    Lanes late_v;        ///< that follows, for
-    Lanes late_s;        ///< 0: the period ends
+    Lanes late_v;        ///< the voltage that follows then
+    Lanes late_s;        ///< and how long it acts; 0: the period ends
     Lanes longest_s;     ///< that the next step may be: the last one went beyond an event
     Lanes taken;         ///< steps of this period
     LaneMask settles{};  ///< the cart has come to rest, and the load decides how it goes on
@@ -77,10 +78,12 @@ class EventPeriod {
   /// So near to a stop, in time, a step may end; the polynomial's error is below 1e-10 of the velocities.
   static constexpr double near_stop_s = 1e-5;
   /// A breakaway is placed so long after the load passes the static friction, and accepted up to twice that.
-  /// The load grows by some newtons per second: velocities are changed by less than 1e-11 m/s.
+  /// The load grows by some newtons per second: velocities are changed by less than 1e-10 m/s.
   static constexpr double late_breakaway_s = 1e-6;
   /// After so many steps in a period a cart that stops stays at rest until its end: a bound on the work.
   static constexpr double most_steps = 48.0;
+  /// No step towards a stop is shorter, so that quotients by its length stay finite.
+  static constexpr double shortest_s = 1e-12;
   /// A step that is taken again keeps within these parts of its length.
   static constexpr double shortest_part = 0.02, longest_part = 0.98;
 
@@ -157,7 +160,8 @@ class EventPeriod {
                            growth = steps.direction * begin.rate.cart_mps;
     const Lanes longest = smaller(steps.left_s, steps.longest_s);
     const LaneMask slows = (growth < zero) & (speed > zero) & !stay;
-    return select(slows, smaller(longest, speed / select(slows, -growth, Lanes(1.0))), longest);
+    const Lanes stop_s = speed / select(slows, -growth, Lanes(1.0));
+    return select(slows & (stop_s < longest), larger(stop_s, smaller(longest, Lanes(shortest_s))), longest);
   }
 
   /// What a step met, by lane.
@@ -175,6 +179,7 @@ class EventPeriod {
     const Lanes per_length = select(active, one / select(active, h, one), zero);
     Met met = stops_of(steps, begin, step, active, per_length);
     if (sticks_ && any(active & (steps.direction == zero))) find_breakaways(steps, begin, step, active, met);
+    met.to_stop_s = select(met.beyond, zero, met.to_stop_s);
     met.stops = met.stops | (met.beyond & stay);
     met.beyond = met.beyond & !stay;
     met.breaks = met.breaks & !stay;
@@ -222,7 +227,8 @@ class EventPeriod {
     const LaneMask rises = growth > zero;
     const Lanes stop_s = select(rises, growth + root, two * from) /
                          select(met.beyond, select(rises, Lanes(-2.0) * square, root - growth), Lanes(1.0));
-    met.retry_s = larger(Lanes(shortest_part) * h, smaller(Lanes(longest_part) * h, stop_s));
+    const Lanes shortest = Lanes(shortest_part) * h, longest = Lanes(longest_part) * h;
+    met.retry_s = select(stop_s > shortest, select(stop_s < longest, stop_s, longest), shortest);
     return met;
   }
 
@@ -236,7 +242,10 @@ class EventPeriod {
     met.breaks = over & (late_s <= Lanes(2.0 * late_breakaway_s));
     const LaneMask too_late = over & !met.breaks;
     met.beyond = met.beyond | too_late;
-    met.retry_s = select(too_late, step.length_s - late_s + Lanes(late_breakaway_s), met.retry_s);
+    const Lanes earlier_s = step.length_s - late_s + Lanes(late_breakaway_s);
+    // Of a motion that has left all bounds, the load may be no number.
+    const Lanes retry_s = select(earlier_s < step.length_s, earlier_s, Lanes(shortest_part) * step.length_s);
+    met.retry_s = select(too_late, retry_s, met.retry_s);
   }
 
   Dynamics<Lanes, Present> physics_;

@@ -197,6 +197,28 @@ TEST_P(SweepEncodersApart, AResultDoesNotDependOnTheRunsBesideIt) {
   }
 }
 
+/// Without a voltage limit some of these motions leave all bounds within a period.
+TEST(SweepEncodersDiverging, EveryRunEnds) {
+  for (const char* plant : {"dynamic", "exponential"}) {
+    LoopSetup setup;
+    setup.model = make_model<double>(
+        read_plant_file(std::string(UPRIGHT_SOURCE_DIR) + "/config/plants/" + plant + ".yaml"));
+    setup.control.gains = {70.7107, 340.3402, 143.3, 61.0};
+    setup.control.estimator.cutoff_hz = 2000.0;
+    setup.sampled = true;
+    setup.cart_resolution_m = 2.27485e-5;
+    setup.angle_resolution_rad = 1.5339808e-3;
+    setup.duration_s = 5.0;
+    std::vector<LoopCase> cases;
+    for (int i = 0; i < 256; ++i) cases.push_back({0.0175 * (1 + i % 5), 0.00025 * i});
+    for (const LaneRegisters registers : {LaneRegisters::wide, LaneRegisters::baseline}) {
+      std::vector<LoopResult> lanes(cases.size());
+      run_on_lanes(setup, cases, lanes, registers);
+      EXPECT_TRUE(lanes.back().fell());
+    }
+  }
+}
+
 std::string name_of_loop(const testing::TestParamInfo<Loop>& loop) {
   return loop.param.name;
 }
