@@ -538,13 +538,7 @@ class ContinuousRuns {
     choose_step(i, first_step_s);
   }
 
-  static constexpr bool may_have_bristles() {
-    if constexpr (std::is_same_v<Present, EffectSet>)
-      return true;
-    else
-      return Present::template has<effect_index<effects::BristleFriction>()>();
-  }
-  static constexpr bool has_bristles = may_have_bristles();
+  static constexpr bool has_bristles = may_have_bristles<Present>;
 
   const LoopSetup& setup_;
   Dynamics<Lanes> chain_;

@@ -1,14 +1,15 @@
 #include <algorithm>
-#include <bit>
+#include <cmath>
 #include <optional>
-#include <vector>
 
 #include "continuous_lanes.hpp"
-#include "event_lane.hpp"
+#include "control/whole_periods.hpp"
+#include "event_period.hpp"
 #include "lane_builds.hpp"
 #include "lane_model.hpp"
 #include "lane_observer.hpp"
 #include "lane_results.hpp"
+#include "lane_ring.hpp"
 #include "upright/control/delay_line.hpp"
 #include "upright/model/dynamics.hpp"
 #include "upright/sim/runge_kutta.hpp"
@@ -17,56 +18,88 @@ namespace upright {
 
 namespace {
 
-/// Feedback voltages on their way, one ring for all lanes. The feedback is linear, so that delaying the
-/// voltage is delaying the state.
+/// Feedback voltages on their way. The feedback is linear, so that delaying the voltage is delaying the
+/// state.
+template <class Mask>
 class LaneDelay {
  public:
-  LaneDelay(std::span<const LoopCase> cases, double period_s) {
-    std::size_t longest = 0;
+  LaneDelay(std::span<const LoopCase> cases, double period_s) : ring_(longest_of(cases, period_s) + 1) {
     std::array<double, lane_count> fraction{};
     for (std::size_t i = 0; i < lane_count; ++i) {
       const DelayLine line(cases[std::min(i, cases.size() - 1)].delay_s, period_s);
       whole_[i] = line.whole_periods();
       fraction[i] = line.fraction();
-      longest = std::max(longest, whole_[i]);
       same_ = same_ && whole_[i] == whole_[0];
       exact_ = exact_ && line.exact();
     }
     fraction_ = Lanes::load(fraction.data());
-    ring_.resize(std::bit_ceil(longest + 2) * lane_count);
   }
 
-  void start(const Lanes& volts) {
-    for (std::size_t i = 0; i < ring_.size(); i += lane_count) volts.store(&ring_[i]);
-  }
+  void start(const Lanes& volts) { ring_.fill(volts); }
 
-  Lanes pass(std::size_t tick, const Lanes& volts) {
-    volts.store(&ring_[slot(tick)]);
-    const Lanes later = back(tick, 0);
+  Lanes pass(const Mask& lanes, const Lanes& volts) {
+    ring_.push(lanes, volts);
+    const Lanes later = back(0);
     if (exact_) return later;
-    return later + fraction_ * (back(tick, 1) - later);
+    return later + fraction_ * (back(1) - later);
   }
 
  private:
-  std::size_t slot(std::size_t tick) const { return tick * lane_count & (ring_.size() - 1); }
-
-  Lanes back(std::size_t tick, std::size_t more) const {
-    if (same_) return Lanes::load(&ring_[slot(tick - whole_[0] - more)]);
-    std::array<double, lane_count> volts;
-    for (std::size_t i = 0; i < lane_count; ++i) volts[i] = ring_[slot(tick - whole_[i] - more) + i];
-    return Lanes::load(volts.data());
+  static std::size_t longest_of(std::span<const LoopCase> cases, double period_s) {
+    std::size_t longest = 0;
+    for (const LoopCase& run : cases)
+      longest = std::max(longest, DelayLine(run.delay_s, period_s).whole_periods());
+    return longest;
   }
+  Lanes back(std::size_t more) const { return same_ ? ring_.ago(whole_[0] + more) : ring_.ago(whole_, more); }
 
+  LaneRing<Mask> ring_;
   std::array<std::size_t, lane_count> whole_{};
   Lanes fraction_;
-  std::vector<double> ring_;
   bool same_ = true, exact_ = true;
+};
+
+/// The plant's own input delay, the same for all lanes. Before the first command zero volts are commanded.
+template <class Mask>
+class LaneInput {
+ public:
+  LaneInput(const Dynamics<Lanes>& chain, double period_s)
+      : delay_(whole_periods(chain.input_delay_s().values()[0], period_s)),
+        period_s_(period_s),
+        drives_(delay_.whole + 1) {
+    drives_.fill(chain.actuate(Lanes(0.0)));
+  }
+
+  LaneDrive pass(const Mask& lanes, const Lanes& drive_v) {
+    if (delay_.whole == 0 && delay_.fraction == 0.0) return {drive_v, drive_v, 0.0, period_s_};
+    drives_.push(lanes, drive_v);
+    const double early_s = delay_.fraction * period_s_;
+    return {drives_.ago(delay_.whole + 1), drives_.ago(delay_.whole), early_s, period_s_ - early_s};
+  }
+
+ private:
+  WholePeriods delay_;
+  double period_s_;
+  LaneRing<Mask> drives_;
 };
 
 /// How the motion gets through one period with the voltage held: smooth friction.
 template <class Present>
 class SmoothPeriod {
  public:
+  using Mask = EveryLane;
+  struct Steps {
+    PlantState<Lanes> state{};
+    LaneDrive drive;
+  };
+  static EveryLane arrived(const Steps& /*steps*/) { return {}; }
+  static void begin(Steps& steps, EveryLane /*lanes*/, const LaneDrive& drive) { steps.drive = drive; }
+  void advance(Steps& steps) const {
+    const LaneDrive& drive = steps.drive;
+    if (drive.early_s > 0.0) advance(steps.state, drive.early_v, drive.early_s);
+    advance(steps.state, drive.late_v, drive.late_s);
+  }
+
   SmoothPeriod(const LoopSetup& setup, const PlantModel<Lanes>& model, const Present& present)
       : physics_(model, present) {
     const double smoothing = setup.model.smoothing;
@@ -81,8 +114,7 @@ class SmoothPeriod {
     }
   }
 
-  [[gnu::flatten]] void advance(PlantState<Lanes>& state, const Lanes& /*command_v*/, const Lanes& motor_v,
-                                double period_s) {
+  [[gnu::flatten]] void advance(PlantState<Lanes>& state, const Lanes& motor_v, double period_s) const {
     const auto rate = [&](const PlantState<Lanes>& s, Stage) { return rate_of(s, motor_v); };
     const PlantState<Lanes> first = rate(state, Stage::end);
     const int pieces = pieces_for(state, first, period_s);
@@ -117,105 +149,71 @@ class SmoothPeriod {
   double turning_mps_ = 0.0, sweep_mps_ = 0.0;
 };
 
-/// The same with true stick-slip: every lane has its contact; a lane with an event inside the period goes
-/// through it on the event engine.
-template <class Present>
-class StickSlipPeriod {
- public:
-  StickSlipPeriod(const LoopSetup& setup, const PlantModel<Lanes>& model, const Present& present)
-      : physics_(model, present), event_lane_(setup.model) {}
+EveryLane narrowed(EveryLane lanes, const LaneMask& /*to*/) {
+  return lanes;
+}
+LaneMask narrowed(const LaneMask& lanes, const LaneMask& to) {
+  return lanes & to;
+}
 
-  [[gnu::flatten]] void advance(PlantState<Lanes>& state, const Lanes& command_v, const Lanes& motor_v,
-                                double period_s) {
-    const Lanes zero(0.0), one(1.0);
-    const Lanes direction = select(state.cart_mps > zero, one,
-                                   select(state.cart_mps < zero, Lanes(-1.0), broken_away(state, motor_v)));
-    const auto rate = [&](const PlantState<Lanes>& s, Stage) {
-      return physics_.derivative_by_direction(s, motor_v, direction);
-    };
-    PlantState<Lanes> next = runge_kutta_4(rate, state, rate(state, Stage::end), Lanes(period_s));
-    const LaneMask rests = direction == zero;
-    LaneMask eventful = direction * next.cart_mps < zero;
-    if (any(rests)) eventful = eventful | (rests & !(broken_away(next, motor_v) == zero));
-    if (any(eventful)) hand_over(eventful.bits(), state, command_v, period_s, next);
-    state = next;
-  }
-
- private:
-  Lanes broken_away(const PlantState<Lanes>& state, const Lanes& motor_v) const {
-    return direction_of(excess_load(physics_, state, motor_v));
-  }
-
-  [[gnu::noinline]] void hand_over(std::uint32_t lanes, const PlantState<Lanes>& before,
-                                   const Lanes& command_v, double period_s, PlantState<Lanes>& after) {
-    const auto x0 = before.cart_m.values(), th0 = before.theta_rad.values(), v0 = before.cart_mps.values(),
-               w0 = before.theta_radps.values(), volts = command_v.values();
-    auto x = after.cart_m.values(), th = after.theta_rad.values(), v = after.cart_mps.values(),
-         w = after.theta_radps.values();
-    for (; lanes != 0; lanes &= lanes - 1) {
-      const auto i = static_cast<std::size_t>(std::countr_zero(lanes));
-      PlantState<double> state{x0[i], th0[i], v0[i], w0[i], 0.0, 0.0};
-      event_lane_.advance(state, volts[i], period_s);
-      x[i] = state.cart_m;
-      th[i] = state.theta_rad;
-      v[i] = state.cart_mps;
-      w[i] = state.theta_radps;
-    }
-    after.cart_m = Lanes::load(x.data());
-    after.theta_rad = Lanes::load(th.data());
-    after.cart_mps = Lanes::load(v.data());
-    after.theta_radps = Lanes::load(w.data());
-  }
-
-  Dynamics<Lanes, Present> physics_;
-  EventLane event_lane_;
-};
-
+/// Lanes in step, or each lane at its own pace: whichever has come to the end of its period is controlled.
 template <class Period>
-void run_sampled(const LoopSetup& setup, const Dynamics<Lanes>& chain, Period& period, LaneObserver& observer,
-                 std::span<const LoopCase> cases, std::span<LoopResult> results) {
+void run_sampled(const LoopSetup& setup, const Dynamics<Lanes>& chain, const Period& period,
+                 std::span<const LoopCase> cases, std::span<LoopResult> results,
+                 LaneObserver<typename Period::Mask> observer) {
+  using Mask = typename Period::Mask;
   const double period_s = setup.control.period_s();
-  LaneDelay delay(cases, period_s);
+  LaneDelay<Mask> delay(cases, period_s);
+  LaneInput<Mask> input(chain, period_s);
   LaneResults seen(setup, cases.size());
-  PlantState<Lanes> state{};
+  typename Period::Steps steps;
+  PlantState<Lanes>& state = steps.state;
   std::array<double, lane_count> theta0;
   for (std::size_t i = 0; i < lane_count; ++i) theta0[i] = cases[std::min(i, cases.size() - 1)].theta0_rad;
   state.theta_rad = Lanes::load(theta0.data());
-  const Lanes limit(setup.amplifier_limit_v);
-  Lanes feedback(0.0), command(0.0);
-  const auto ticks = static_cast<std::size_t>(std::llround(setup.duration_s * setup.control.sample_rate_hz));
-  for (std::size_t tick = 0; tick < ticks; ++tick) {
-    seen.take(static_cast<double>(tick) * period_s, state);
-    if (seen.all_fell()) break;
-    const Outputs<Lanes> shown = chain.measure(state);
-    if (tick == 0) {
-      feedback = observer.start(shown);
-      delay.start(feedback);
-    } else {
-      feedback = observer.take(shown, command);
+  const Lanes limit(setup.amplifier_limit_v), one(1.0);
+  const Lanes periods(std::round(setup.duration_s * setup.control.sample_rate_hz));
+  Lanes begun(0.0), command(0.0);
+  for (bool first = true;;) {
+    const Mask arrived = narrowed(Period::arrived(steps), begun <= periods);
+    if (any(arrived)) {
+      seen.take(arrived, begun * Lanes(period_s), state);
+      begun = select(arrived, begun + one, begun);
+      if (seen.all_fell() || !any(begun <= periods)) break;
+      const Mask goes_on = narrowed(arrived, begun <= periods);
+      const Outputs<Lanes> shown = chain.measure(state);
+      const Lanes newest = first ? observer.start(shown) : observer.take(goes_on, shown, command);
+      if (first) delay.start(newest);
+      first = false;
+      const Lanes wanted = observer.command_v(goes_on, delay.pass(goes_on, newest), command);
+      command = select(goes_on, smaller(larger(wanted, -limit), limit), command);
+      const LaneDrive drive = input.pass(goes_on, chain.actuate(command));
+      state.motor_v = drive.late_v;
+      Period::begin(steps, goes_on, drive);
     }
-    command = smaller(larger(observer.command_v(delay.pass(tick, feedback)), -limit), limit);
-    state.motor_v = chain.actuate(command);
-    period.advance(state, command, state.motor_v, period_s);
+    period.advance(steps);
   }
-  seen.take(static_cast<double>(ticks) * period_s, state);
   seen.finish(state, results);
 }
 
+/// Runs that fit the lanes, from number `first` on.
 template <class Present>
-void run_with(const LoopSetup& setup, const LaneEstimator* estimator, const Present& present,
+void run_with(const LoopSetup& setup, const LaneParts& parts, const Present& present, std::size_t first,
               std::span<const LoopCase> cases, std::span<LoopResult> results) {
-  LaneObserver observer(setup, estimator);
   const PlantModel<Lanes> model = on_lanes(setup.model);
   const Dynamics<Lanes> chain(model);
-  if constexpr (may_stick<Present>) {
-    if (chain.cart_can_stick()) {
-      StickSlipPeriod<Present> period(setup, model, present);
-      return run_sampled(setup, chain, period, observer, cases, results);
-    }
+  if constexpr (may_stick<Present> || may_have_bristles<Present>) {
+    // Encoder steps let the voltage jump, and the cart reverse, in most periods; so do predictors of long
+    // delays.
+    const bool jumps =
+        setup.cart_resolution_m > 0.0 || setup.angle_resolution_rad > 0.0 || !parts.predictions.empty();
+    const bool reverses = jumps && chain.cart_has_kink() && setup.model.smoothing == 0.0;
+    if (chain.cart_can_stick() || reverses)
+      return run_sampled(setup, chain, EventPeriod<Present>(model, present), cases, results,
+                         LaneObserver<LaneMask>(setup, parts, first, cases.size()));
   }
-  SmoothPeriod<Present> period(setup, model, present);
-  run_sampled(setup, chain, period, observer, cases, results);
+  run_sampled(setup, chain, SmoothPeriod<Present>(setup, model, present), cases, results,
+              LaneObserver<EveryLane>(setup, parts, first, cases.size()));
 }
 
 }  // namespace
@@ -226,13 +224,13 @@ std::size_t runs_side_by_side() {
   return lane_count;
 }
 
-void run(const LoopSetup& setup, const LaneEstimator* estimator, std::span<const LoopCase> cases,
+void run(const LoopSetup& setup, const LaneParts& parts, std::span<const LoopCase> cases,
          std::span<LoopResult> results) {
   if (!setup.sampled) return run_continuous_on_lanes(setup, cases, results);
   with_effects(setup.model.present, [&](const auto& present) {
     for (std::size_t first = 0; first < cases.size(); first += lane_count) {
       const std::size_t count = std::min(lane_count, cases.size() - first);
-      run_with(setup, estimator, present, cases.subspan(first, count), results.subspan(first, count));
+      run_with(setup, parts, present, first, cases.subspan(first, count), results.subspan(first, count));
     }
   });
 }

@@ -8,9 +8,9 @@
 
 namespace upright {
 
-/// Whether `run_on_lanes` supports these runs. It excludes delay compensation, the extended Kalman filter,
-/// motor lag, dry friction of the pivot, a cart alone, stiff bristles and other dynamics much faster than a
-/// millisecond, and the plant's own input delay in a sampled loop.
+/// Whether `run_on_lanes` supports these runs. It excludes the extended Kalman filter, motor lag, dry
+/// friction of the pivot, a cart alone, stiff bristles and other dynamics much faster than a millisecond, and
+/// estimators in a continuous loop.
 bool lanes_can_run(const LoopSetup& setup);
 
 /// The target of the lanes: the registers of this processor, fastest, with last digits that differ
@@ -22,10 +22,10 @@ std::size_t runs_side_by_side(LaneRegisters registers = LaneRegisters::wide);
 
 /// Simulates any number of runs, in groups.
 ///
-/// Sampled loops: RK4 with additional substeps where the friction reverses. With stick-slip, the event
-/// engine simulates a lane through each period in which its cart stops or breaks away. A fallen run
-/// causes no work once all others in its group have fallen. The last digits of a result depend on the
-/// other runs of its group, so that callers keep groups fixed.
+/// Sampled loops: RK4. With smooth friction, additional substeps where it reverses, the same in all lanes:
+/// the last digits of a result depend on the other runs of its group, so that callers keep groups fixed. With
+/// stick-slip, and where a cart on bristles often reverses, each lane steps to its own events, and its result
+/// depends on nothing else. A fallen run causes no work once all others in its group have fallen.
 ///
 /// Continuous loops: each with its own adaptive steps and its own events.
 void run_on_lanes(const LoopSetup& setup, std::span<const LoopCase> cases, std::span<LoopResult> results,

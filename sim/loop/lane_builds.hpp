@@ -3,9 +3,12 @@
 // wide_lanes.
 #pragma once
 
+#include <optional>
 #include <span>
+#include <vector>
 
 #include "control/kalman_step.hpp"
+#include "control/predictor_step.hpp"
 #include "upright/model/dynamics.hpp"
 #include "upright/sim/loop/loop_run.hpp"
 
@@ -17,13 +20,22 @@ struct LaneEstimator {
   PlantModel<double> model;  ///< its plant, for the static actuator chain
 };
 
+/// What the controllers know of their plants.
+struct LaneParts {
+  std::optional<LaneEstimator> estimator;
+  /// Predictors of different delays, the model of their plant, and which of them each run has.
+  std::vector<FeedbackPrediction> predictions;
+  PlantModel<double> predicted;
+  std::vector<std::size_t> prediction_of;
+};
+
 }  // namespace upright
 
-#define UPRIGHT_DECLARE_LANES(name)                                                                 \
-  namespace name {                                                                                  \
-  std::size_t runs_side_by_side();                                                                  \
-  void run(const LoopSetup& setup, const LaneEstimator* estimator, std::span<const LoopCase> cases, \
-           std::span<LoopResult> results);                                                          \
+#define UPRIGHT_DECLARE_LANES(name)                                                         \
+  namespace name {                                                                          \
+  std::size_t runs_side_by_side();                                                          \
+  void run(const LoopSetup& setup, const LaneParts& parts, std::span<const LoopCase> cases, \
+           std::span<LoopResult> results);                                                  \
   }
 
 namespace upright {

@@ -1,9 +1,11 @@
+#include <algorithm>
 #include <cstdlib>
-#include <optional>
+#include <map>
 #include <string_view>
 
+#include "control/estimate_predictor.hpp"
 #include "control/kalman_filter.hpp"
-#include "event_lane.hpp"
+#include "control/predictor.hpp"
 #include "fast_loop.hpp"
 #include "lane_builds.hpp"
 
@@ -14,7 +16,7 @@ namespace {
 /// One compilation of the lanes.
 struct LaneBuild {
   std::size_t (*runs_side_by_side)();
-  void (*run)(const LoopSetup& setup, const LaneEstimator* estimator, std::span<const LoopCase> cases,
+  void (*run)(const LoopSetup& setup, const LaneParts& parts, std::span<const LoopCase> cases,
               std::span<LoopResult> results);
 };
 
@@ -48,21 +50,64 @@ LaneBuild widest() {
 }
 #endif
 
+/// The greatest rate of a plant's motion at realistic speeds [1/s].
+double fastest_rate_radps(const PlantModel<double>& model) {
+  const Dynamics<double> physics(model);
+  double fastest = 0.0;
+  for (const double speed : {0.0, 0.01, 0.1, 1.0}) {
+    PlantState<double> state;
+    state.cart_mps = speed;
+    fastest = std::max(fastest, physics.fastest_rate_radps(state));
+  }
+  return fastest;
+}
+
 const LaneBuild& lanes_for(LaneRegisters registers) {
   static const LaneBuild wide = widest();
   return registers == LaneRegisters::wide ? wide : baseline;
 }
 
+FeedbackPrediction prediction_of(const ModelParts& parts, const Gains& gains, PlantModel<double>& predicted) {
+  if (const auto* predictor = dynamic_cast<const Predictor*>(parts.compensator.get())) {
+    predicted = predictor->model();
+    return predictor->feedback(gains);
+  }
+  const auto& predictor = dynamic_cast<const EstimatePredictor&>(*parts.compensator);
+  predicted = predictor.model();
+  return predictor.feedback(gains,
+                            dynamic_cast<const KalmanFilter&>(*parts.estimator).step().rejecting_v_per_n);
+}
+
+LaneParts parts_of(const LoopSetup& setup, std::span<const LoopCase> cases) {
+  LaneParts made;
+  ControlConfig control = setup.control;
+  if (control.has_state_estimator()) {
+    const ModelParts parts = setup.make_parts(control);
+    const auto& filter = dynamic_cast<const KalmanFilter&>(*parts.estimator);
+    made.estimator = {filter.step(), filter.model()};
+  }
+  if (control.compensation.kind == CompensationKind::none) return made;
+  std::map<double, std::size_t> of_delay;
+  for (const LoopCase& run : cases) {
+    const auto [at, fresh] = of_delay.try_emplace(run.delay_s, made.predictions.size());
+    if (fresh) {
+      control.delay_s = run.delay_s;
+      made.predictions.push_back(prediction_of(setup.make_parts(control), control.gains, made.predicted));
+    }
+    made.prediction_of.push_back(at->second);
+  }
+  return made;
+}
+
 }  // namespace
 
 bool lanes_can_run(const LoopSetup& setup) {
-  const bool estimates = setup.sampled && setup.control.state_estimator.kind == StateEstimatorKind::kalman &&
-                         setup.control.compensation.kind == CompensationKind::none;
-  if (setup.make_parts && !estimates) return false;
+  if (setup.make_parts &&
+      (!setup.sampled || setup.control.state_estimator.kind == StateEstimatorKind::extended_kalman))
+    return false;
   if (setup.model.cart_locked || !setup.model.has_pendulum) return false;
   const Dynamics<double> physics(setup.model);
   if (physics.has_motor_lag() || physics.pivot_has_kink()) return false;
-  if (setup.sampled && physics.input_delay_s() > 0.0) return false;
   // Faster plants than that need steps that the lanes do not take.
   constexpr double fastest_radps = 1e3;
   return fastest_rate_radps(setup.model) < fastest_radps;
@@ -74,13 +119,7 @@ std::size_t runs_side_by_side(LaneRegisters registers) {
 
 void run_on_lanes(const LoopSetup& setup, std::span<const LoopCase> cases, std::span<LoopResult> results,
                   LaneRegisters registers) {
-  std::optional<LaneEstimator> estimator;
-  if (setup.make_parts) {
-    const ModelParts parts = setup.make_parts(setup.control);
-    const auto& filter = dynamic_cast<const KalmanFilter&>(*parts.estimator);
-    estimator = {filter.step(), filter.model()};
-  }
-  lanes_for(registers).run(setup, estimator ? &*estimator : nullptr, cases, results);
+  lanes_for(registers).run(setup, setup.make_parts ? parts_of(setup, cases) : LaneParts{}, cases, results);
 }
 
 }  // namespace upright

@@ -21,6 +21,13 @@ inline PlantModel<Lanes> on_lanes(const PlantModel<double>& model) {
   return lanes;
 }
 
+/// The voltages at the motors over a period: the early one for its first part, if the plant's input delay has
+/// a fraction of a period, then the late one.
+struct LaneDrive {
+  Lanes early_v, late_v;
+  double early_s = 0.0, late_s = 0.0;
+};
+
 /// The effects in the derivative: without those of the actuator, the sensors and the base parameters,
 /// which act once per period or at the beginning.
 inline std::uint64_t moving_effects(const EffectSet& present) {
@@ -47,6 +54,14 @@ template <>
 inline constexpr bool may_stick<StaticEffectSet<viscous_set>> = false;
 template <>
 inline constexpr bool may_stick<StaticEffectSet<dynamic_set>> = false;
+
+/// Whether a cart with these effects may be held by bristles.
+template <class Present>
+constexpr bool may_have_bristles = false;
+template <>
+inline constexpr bool may_have_bristles<EffectSet> = true;
+template <>
+inline constexpr bool may_have_bristles<StaticEffectSet<dynamic_set>> = true;
 
 /// Calls `run` with the plant's effects: common sets at compile time, all others at run time.
 template <class Run>

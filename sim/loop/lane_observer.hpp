@@ -1,5 +1,5 @@
 // What the controllers of sampled loops know of their plants, by lane: encoders with the velocity estimator,
-// or with a stationary Kalman filter.
+// or with a stationary Kalman filter; and predictors of the delay.
 #pragma once
 
 #include <array>
@@ -8,6 +8,8 @@
 
 #include "lane_builds.hpp"
 #include "lane_model.hpp"
+#include "lane_predictor.hpp"
+#include "lane_ring.hpp"
 #include "upright/control/velocity_estimator.hpp"
 #include "upright/model/dynamics.hpp"
 #include "upright/sim/loop/loop_run.hpp"
@@ -21,12 +23,13 @@ class LaneSensor {
 
   void start(const Lanes& value) { position = previous_ = stepped(value); }
 
-  void take(const Lanes& value) {
-    position = stepped(value);
+  template <class Mask>
+  void take(const Mask& lanes, const Lanes& value) {
+    position = select(lanes, stepped(value), position);
     const Lanes dx = position - previous_;
     const Lanes next = Lanes(step_.p21) * lag_ + Lanes(step_.p22) * velocity + Lanes(step_.g2) * dx;
-    lag_ = Lanes(step_.p11) * lag_ + Lanes(step_.p12) * velocity + Lanes(step_.g1) * dx;
-    velocity = next;
+    lag_ = select(lanes, Lanes(step_.p11) * lag_ + Lanes(step_.p12) * velocity + Lanes(step_.g1) * dx, lag_);
+    velocity = select(lanes, next, velocity);
     previous_ = position;
   }
 
@@ -44,31 +47,32 @@ class LaneSensor {
 
 /// The filter of KalmanFilter (src/control), which has the reasons, while no reading is missing and no
 /// pendulum turns over.
+template <class Mask>
 class LaneKalmanFilter {
  public:
   explicit LaneKalmanFilter(const LaneEstimator& estimator)
       : step_(estimator.step),
         actuator_(on_lanes(estimator.model)),
-        drives_(estimator.step.input_periods + 2) {}
+        drives_(estimator.step.input_periods + 1) {}
 
   void start(const LaneSensor& cart, const LaneSensor& pendulum) {
     state_.fill(Lanes(0.0));
     const Lanes resting = actuator_.actuate(Lanes(0.0));
-    for (Lanes& drive : drives_) drive = resting;
-    newest_ = 0;
+    drives_.fill(resting);
     if (step_.late[filter_motor] != 0.0) state_[filter_motor] = resting;
     state_[filter_cart] = step_.position_of(0, cart.position);
     state_[filter_theta] = step_.position_of(1, pendulum.position);
   }
 
-  void take(const LaneSensor& cart, const LaneSensor& pendulum, const Lanes& applied_v) {
-    newest_ = newest_ + 1 == drives_.size() ? 0 : newest_ + 1;
-    drives_[newest_] = actuator_.actuate(applied_v);
-    step_.propagate(state_, ago(step_.input_periods), ago(step_.input_periods + 1));
+  void take(const Mask& lanes, const LaneSensor& cart, const LaneSensor& pendulum, const Lanes& applied_v) {
+    drives_.push(lanes, actuator_.actuate(applied_v));
+    State state = state_;
+    step_.propagate(state, drives_.ago(step_.input_periods), drives_.ago(step_.input_periods + 1));
     const Lanes x = step_.position_of(0, cart.position), theta = step_.position_of(1, pendulum.position);
-    step_.correct(state_, x - state_[filter_cart], theta - state_[filter_theta] - state_[filter_angle_zero]);
+    step_.correct(state, x - state[filter_cart], theta - state[filter_theta] - state[filter_angle_zero]);
     const LaneMask far = absolute(theta) > Lanes(KalmanStep::linear_within_rad);
-    if (any(far)) follow(far, x, theta, cart.velocity, pendulum.velocity);
+    if (any(far)) follow(state, far, x, theta, cart.velocity, pendulum.velocity);
+    for (std::size_t i = 0; i < state.size(); ++i) state_[i] = select(lanes, state[i], state_[i]);
   }
 
   Lanes feedback(const Gains& gains) const {
@@ -81,18 +85,23 @@ class LaneKalmanFilter {
            Lanes(gains.pendulum_rate_v_per_radps) * shown(filter_pendulum_rate, 1) +
            step_.rejecting_v(Lanes(step_.share) * state_[filter_cart_force]);
   }
+  /// The true states, for a prediction.
+  LanePredictor::State estimate() const {
+    return {state_[filter_cart],          state_[filter_theta],
+            state_[filter_cart_velocity], state_[filter_pendulum_rate],
+            state_[filter_motor],         Lanes(step_.share) * state_[filter_cart_force]};
+  }
   Lanes command_v(const Lanes& wanted_v) const { return step_.command_v(wanted_v); }
   /// The voltage that cancels the known force alone.
   Lanes resting_v() const { return step_.rejecting_v(Lanes(0.0)); }
 
  private:
-  Lanes ago(std::size_t periods) const {
-    return drives_[newest_ >= periods ? newest_ - periods : newest_ + drives_.size() - periods];
-  }
-  void follow(const LaneMask& lanes, const Lanes& x, const Lanes& theta, const Lanes& shown_mps,
-              const Lanes& shown_radps) {
-    const auto replace = [&](std::size_t state, const Lanes& value) {
-      state_[state] = select(lanes, value, state_[state]);
+  using State = std::array<Lanes, filter_states>;
+
+  void follow(State& state, const LaneMask& lanes, const Lanes& x, const Lanes& theta, const Lanes& shown_mps,
+              const Lanes& shown_radps) const {
+    const auto replace = [&](std::size_t of, const Lanes& value) {
+      state[of] = select(lanes, value, state[of]);
     };
     replace(filter_cart, x);
     replace(filter_theta, theta);
@@ -103,44 +112,70 @@ class LaneKalmanFilter {
 
   KalmanStep step_;
   Dynamics<Lanes> actuator_;
-  std::array<Lanes, filter_states> state_;
-  std::vector<Lanes> drives_;  ///< voltages behind the static chain, a ring; newest at `newest_`
-  std::size_t newest_ = 0;
+  State state_;
+  LaneRing<Mask> drives_;  ///< voltages behind the static chain
 };
 
+template <class Mask>
 class LaneObserver {
  public:
-  LaneObserver(const LoopSetup& setup, const LaneEstimator* estimator)
+  /// `first`: of the runs in these lanes, of which there are `count`.
+  LaneObserver(const LoopSetup& setup, const LaneParts& parts, std::size_t first, std::size_t count)
       : gains_(setup.control.gains),
         cart_(make_estimator_step(setup.control.estimator, setup.control.period_s()),
               setup.cart_resolution_m),
         pendulum_(make_estimator_step(setup.control.estimator, setup.control.period_s()),
                   setup.angle_resolution_rad) {
-    if (estimator) filter_.emplace(*estimator);
+    if (parts.estimator) filter_.emplace(*parts.estimator);
+    if (parts.predictions.empty()) return;
+    std::vector<const FeedbackPrediction*> predictions;
+    for (std::size_t i = 0; i < lane_count; ++i)
+      predictions.push_back(&parts.predictions[parts.prediction_of[first + std::min(i, count - 1)]]);
+    predictor_.emplace(parts.predicted, predictions);
   }
 
-  /// The feedback at the start, before the first period.
+  /// At the start, before the first period. Returns what the delay holds.
   Lanes start(const Outputs<Lanes>& shown) {
     cart_.start(shown.cart_m);
     pendulum_.start(shown.theta_rad);
     if (filter_) filter_->start(cart_, pendulum_);
-    return filter_ ? sensed_feedback() + filter_->resting_v() : sensed_feedback();
+    started_ = false;
+    if (!predictor_) return start_feedback();
+    const LanePredictor::State held =
+        predictor_->shown(cart_.position, pendulum_.position, Lanes(0.0), Lanes(0.0));
+    predictor_->start(held);
+    return predictor_->known_v(held);
   }
-  /// The feedback after a period. `applied_v`: the voltage commanded over the period that just ended, after
-  /// the amplifier's limit.
-  Lanes take(const Outputs<Lanes>& shown, const Lanes& applied_v) {
-    cart_.take(shown.cart_m);
-    pendulum_.take(shown.theta_rad);
-    if (!filter_) return sensed_feedback();
-    filter_->take(cart_, pendulum_, applied_v);
-    return filter_->feedback(gains_);
+  /// After a period of these lanes. Returns what goes through the delay. `applied_v`: the voltage commanded
+  /// over the period that just ended, after the amplifier's limit.
+  Lanes take(const Mask& lanes, const Outputs<Lanes>& shown, const Lanes& applied_v) {
+    started_ = true;
+    cart_.take(lanes, shown.cart_m);
+    pendulum_.take(lanes, shown.theta_rad);
+    if (filter_) filter_->take(lanes, cart_, pendulum_, applied_v);
+    if (predictor_)
+      return predictor_->known_v(filter_ ? filter_->estimate()
+                                         : predictor_->shown(cart_.position, pendulum_.position,
+                                                             cart_.velocity, pendulum_.velocity));
+    return filter_ ? filter_->feedback(gains_) : sensed_feedback();
   }
-  /// The command for a feedback, delayed or not.
-  Lanes command_v(const Lanes& feedback_v) const {
-    return filter_ ? filter_->command_v(feedback_v) : feedback_v;
+  /// The command for what comes out of the delay.
+  Lanes command_v(const Mask& lanes, const Lanes& delayed_v, const Lanes& applied_v) {
+    Lanes feedback = delayed_v;
+    if (predictor_ && started_) {
+      const LaneMask every = applied_v == applied_v;
+      feedback = predictor_->feedback_v(lanes & every, delayed_v, applied_v);
+      if (filter_) feedback = feedback + filter_->resting_v();
+    } else if (predictor_) {
+      feedback = start_feedback();
+    }
+    return filter_ ? filter_->command_v(feedback) : feedback;
   }
 
  private:
+  Lanes start_feedback() const {
+    return filter_ ? sensed_feedback() + filter_->resting_v() : sensed_feedback();
+  }
   Lanes sensed_feedback() const {
     return Lanes(gains_.cart_position_v_per_m) * cart_.position +
            Lanes(gains_.pendulum_angle_v_per_rad) * pendulum_.position +
@@ -150,7 +185,9 @@ class LaneObserver {
 
   Gains gains_;
   LaneSensor cart_, pendulum_;
-  std::optional<LaneKalmanFilter> filter_;
+  std::optional<LaneKalmanFilter<Mask>> filter_;
+  std::optional<LanePredictor> predictor_;
+  bool started_ = false;  ///< a period has ended
 };
 
 }  // namespace upright

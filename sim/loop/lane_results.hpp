@@ -1,6 +1,7 @@
 // Results of parallel runs so far, by lane.
 #pragma once
 
+#include <bit>
 #include <span>
 
 #include "lanes.hpp"
@@ -18,17 +19,20 @@ class LaneResults {
     fall_time_s_.fill(std::numeric_limits<double>::quiet_NaN());
   }
 
-  /// Records the motion at a time. Fallen lanes are reset to rest upright.
-  void take(double time_s, PlantState<Lanes>& state) {
-    if (any(!(absolute(state.theta_rad) < Lanes(fell_above_rad_)))) drop_fallen(time_s, state);
-    previous_theta_ = state.theta_rad;
-    previous_s_ = time_s;
-    cart_max_ = larger(cart_max_, absolute(state.cart_m));
-    if (time_s < window_begin_s_) return;
-    theta_low_ = smaller(theta_low_, state.theta_rad);
-    theta_high_ = larger(theta_high_, state.theta_rad);
-    cart_low_ = smaller(cart_low_, state.cart_m);
-    cart_high_ = larger(cart_high_, state.cart_m);
+  /// Records the motion of these lanes, each at its time. Fallen lanes are reset to rest upright.
+  template <class Mask>
+  void take(const Mask& lanes, const Lanes& time_s, PlantState<Lanes>& state) {
+    const LaneMask fallen = lanes & !(absolute(state.theta_rad) < Lanes(fell_above_rad_));
+    if (any(fallen)) drop_fallen(fallen.bits(), time_s, state);
+    previous_theta_ = select(lanes, state.theta_rad, previous_theta_);
+    previous_s_ = select(lanes, time_s, previous_s_);
+    cart_max_ = select(lanes, larger(cart_max_, absolute(state.cart_m)), cart_max_);
+    const LaneMask late = lanes & (time_s >= Lanes(window_begin_s_));
+    if (!any(late)) return;
+    theta_low_ = select(late, smaller(theta_low_, state.theta_rad), theta_low_);
+    theta_high_ = select(late, larger(theta_high_, state.theta_rad), theta_high_);
+    cart_low_ = select(late, smaller(cart_low_, state.cart_m), cart_low_);
+    cart_high_ = select(late, larger(cart_high_, state.cart_m), cart_high_);
   }
 
   bool all_fell() const { return alive_ == 0; }
@@ -48,17 +52,18 @@ class LaneResults {
   }
 
  private:
-  void drop_fallen(double time_s, PlantState<Lanes>& state) {
+  void drop_fallen(std::uint32_t fallen, const Lanes& time_s, PlantState<Lanes>& state) {
     auto x = state.cart_m.values(), th = state.theta_rad.values(), v = state.cart_mps.values(),
          w = state.theta_radps.values(), z = state.bristle_m.values();
-    const auto before = previous_theta_.values(), cart_max = cart_max_.values();
-    for (std::size_t i = 0; i < lane_count; ++i) {
-      if (std::abs(th[i]) < fell_above_rad_) continue;
+    const auto before = previous_theta_.values(), cart_max = cart_max_.values(), now_s = time_s.values(),
+               previous_s = previous_s_.values();
+    for (; fallen != 0; fallen &= fallen - 1) {
+      const auto i = static_cast<std::size_t>(std::countr_zero(fallen));
       if (alive(i)) {
         alive_ &= ~(1u << i);
         const double rise = std::abs(th[i]) - std::abs(before[i]);
         const double part = rise > 0.0 ? (fell_above_rad_ - std::abs(before[i])) / rise : 1.0;
-        fall_time_s_[i] = previous_s_ + std::clamp(part, 0.0, 1.0) * (time_s - previous_s_);
+        fall_time_s_[i] = previous_s[i] + std::clamp(part, 0.0, 1.0) * (now_s[i] - previous_s[i]);
         fallen_cart_m_[i] = std::max(cart_max[i], std::abs(x[i]));
         fallen_[i] = {x[i], th[i], v[i], w[i], 0.0, z[i]};
       }
@@ -76,9 +81,8 @@ class LaneResults {
   std::uint32_t alive_;
   std::array<double, lane_count> fall_time_s_, fallen_cart_m_{};
   std::array<PlantState<double>, lane_count> fallen_{};
-  Lanes previous_theta_, cart_max_;
+  Lanes previous_theta_, previous_s_, cart_max_;
   Lanes theta_low_{infinite}, theta_high_{-infinite}, cart_low_{infinite}, cart_high_{-infinite};
-  double previous_s_ = 0.0;
 };
 
 }  // namespace upright

@@ -173,6 +173,12 @@ struct LaneMask {
   }
 };
 
+/// A mask that leaves out no lane, where all go in step: `select` costs nothing.
+struct EveryLane {
+  friend bool any(EveryLane) { return true; }
+  friend LaneMask operator&(EveryLane, const LaneMask& b) { return b; }
+};
+
 /// One number for each run.
 class Lanes {
  public:
@@ -232,6 +238,7 @@ class Lanes {
       result.part_[i] = xsimd::select(condition.part[i], yes.part_[i], no.part_[i]);
     return result;
   }
+  UPRIGHT_LANES_INLINE friend Lanes select(EveryLane, const Lanes& yes, const Lanes& /*no*/) { return yes; }
   UPRIGHT_LANES_INLINE friend Lanes absolute(const Lanes& a) {
     return map(a, [](const Batch& x) { return xsimd::abs(x); });
   }

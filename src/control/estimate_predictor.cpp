@@ -1,5 +1,6 @@
 #include "estimate_predictor.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include "base/angle_units.hpp"
@@ -23,18 +24,16 @@ EstimatePredictor::EstimatePredictor(const ControlConfig& config, const Plant& p
   free_steps_ = periods_within(config.delay_s, period_s);
   const ModelStep step = step_over(model, period_s), part = step_over(model, fraction * period_s),
                   lead = step_over(model, model.input_delay_s);
-  step_a_ = step.a.topLeftCorner<carried, carried>();
-  step_b_ = step.b.head<carried>();
-  step_constant_ = step.constant.head<carried>();
-  lead_a_ = lead.a.topLeftCorner<carried, carried>();
-  lead_b_ = lead.b.head<carried>();
-  lead_constant_ = lead.constant.head<carried>();
+  step_ = predictor_step(step.a, step.b, step.constant);
+  lead_ = predictor_step(lead.a, lead.b, lead.constant);
+  const Matrix step_a = step.a.topLeftCorner<carried, carried>();
+  const Vector step_b = step.b.head<carried>(), step_constant = step.constant.head<carried>();
   const auto count = static_cast<Eigen::Index>(whole) + 1;
   on_their_way_.resize(carried, count);
   for (Eigen::Index column = count - 1; column > 0; --column) {
-    on_their_way_.col(column) = a_ * step_b_;
-    constant_ += a_ * step_constant_;
-    a_ = (a_ * step_a_).eval();
+    on_their_way_.col(column) = a_ * step_b;
+    constant_ += a_ * step_constant;
+    a_ = (a_ * step_a).eval();
   }
   on_their_way_.col(0) = a_ * part.b.head<carried>();
   constant_ += a_ * part.constant.head<carried>();
@@ -77,8 +76,9 @@ void EstimatePredictor::start(const ControlState& state) noexcept {
   Vector held = true_state(state);
   turn_rad_ = full_turn_rad * std::round(held(filter_theta) / full_turn_rad);
   held(filter_theta) -= turn_rad_;
-  if (step_b_(filter_motor) != 0.0) held(filter_motor) = resting_v;
-  free_state_ = lead_a_ * held + lead_b_ * resting_v + lead_constant_;
+  if (step_.b[filter_motor] != 0.0) held(filter_motor) = resting_v;
+  std::copy(held.begin(), held.end(), free_state_.begin());
+  lead_.propagate(free_state_, resting_v);
 }
 
 ControlState EstimatePredictor::compensate(const ControlState& delayed, double applied_v) noexcept {
@@ -87,8 +87,8 @@ ControlState EstimatePredictor::compensate(const ControlState& delayed, double a
   if (steps_ < free_steps_) {
     // The estimate is from before the start, when the body was held: go on from the start itself.
     ++steps_;
-    free_state_ = (step_a_ * free_state_ + step_b_ * drive_v + step_constant_).eval();
-    return shown(free_state_);
+    step_.propagate(free_state_, drive_v);
+    return shown(Vector::Map(free_state_.data()));
   }
   Vector state = true_state(delayed);
   turn_rad_ = full_turn_rad * std::round(state(filter_theta) / full_turn_rad);
@@ -103,6 +103,26 @@ ControlState EstimatePredictor::compensate(const ControlState& delayed, double a
   }
   if (i < count) even += on_their_way_.col(i) * drives[i];
   return shown(even + odd);
+}
+
+FeedbackPrediction EstimatePredictor::feedback(const Gains& gains, double volts_per_newton) const {
+  Vector row = Vector::Zero();
+  const FeedbackPrediction::Row volts = row_of(gains);
+  row.head<4>() = Eigen::Vector4d::Map(volts.data()).cwiseProduct(scale_.head<4>());
+  row(filter_cart_force) = volts_per_newton;
+  FeedbackPrediction made;
+  const Eigen::Matrix<double, 1, carried> known = row.transpose() * a_;
+  std::copy(known.begin(), known.end(), made.known.begin());
+  std::copy(row.begin(), row.end(), made.freely.begin());
+  made.constant_v = row.dot(constant_);
+  const Eigen::RowVectorXd on_their_way = row.transpose() * on_their_way_;
+  made.on_their_way.assign(on_their_way.begin(), on_their_way.end());
+  made.free_periods = free_steps_;
+  made.step = step_;
+  made.lead = lead_;
+  made.lags = step_.b[filter_motor] != 0.0;
+  made.scale = {scale_(0), scale_(1)};
+  return made;
 }
 
 EstimatePredictor::Linear EstimatePredictor::linear() const {

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "filter_model.hpp"
+#include "predictor_step.hpp"
 #include "upright/control/state_estimator.hpp"
 #include "upright/model/dynamics.hpp"
 
@@ -30,9 +31,14 @@ class EstimatePredictor final : public DelayCompensator {
     Eigen::Matrix<double, 6, Eigen::Dynamic> voltages;
   };
   Linear linear() const;
+  /// What the feedback by these gains amounts to, with `volts_per_newton` of the predicted force, to simulate
+  /// many loops side by side, and the model of whose static actuator chain.
+  FeedbackPrediction feedback(const Gains& gains, double volts_per_newton) const;
+  const PlantModel<double>& model() const { return actuator_.model(); }
 
  private:
-  static constexpr int carried = 6;  ///< all states but the angle's zero, which is removed from the estimate
+  static constexpr int carried =
+      predicted_states;  ///< all states but the angle's zero, which is removed from the estimate
   using Vector = Eigen::Matrix<double, carried, 1>;
   using Matrix = Eigen::Matrix<double, carried, carried>;
 
@@ -46,16 +52,15 @@ class EstimatePredictor final : public DelayCompensator {
   Matrix a_ = Matrix::Identity();  ///< over the prediction horizon
   Vector constant_ = Vector::Zero();
   Eigen::Matrix<double, carried, Eigen::Dynamic>
-      on_their_way_;        ///< oldest first; the first for a fraction of a period
-  Matrix step_a_, lead_a_;  ///< over a period; over the input delay
-  Vector step_b_, step_constant_, lead_b_, lead_constant_;
+      on_their_way_;            ///< oldest first; the first for a fraction of a period
+  PredictorStep step_, lead_;   ///< over a period; over the input delay
   std::size_t free_steps_ = 0;  ///< periods from the start until the estimate dates from after the start
 
   std::vector<double> drives_;  ///< a ring stored twice, so that its window is contiguous
   std::size_t window_ = 0;
   std::size_t first_ = 0;
   std::size_t steps_ = 0;
-  Vector free_state_;
+  PredictorStep::Column free_state_{};
   double turn_rad_ = 0.0;
 };
 

@@ -1,8 +1,10 @@
 #include "predictor.hpp"
 
 #include <Eigen/Dense>
+#include <algorithm>
 #include <cmath>
 
+#include "kalman_step.hpp"
 #include "upright/base/error.hpp"
 #include "upright/model/linear_plant.hpp"
 #include "whole_periods.hpp"
@@ -56,12 +58,14 @@ Predictor::Predictor(const ControlConfig& config, const Plant& plant) : actuator
   whole_ = horizon.whole;
   fraction_ = horizon.fraction;
   free_steps_ = periods_within(config.delay_s, period_s);
-  step_ = sampled_line(a, b, f, period_s);
-  lead_ = sampled_line(a, b, f, linear.input_delay_s);
-  motor_gain_ = step_.b(model_states - 1);
-  motor_decay_ = motor_gain_ == 0.0 ? 0.0 : step_.a(model_states - 1, model_states - 1);
-  const Recovery recovery = recover(step_, make_estimator_step(config.estimator, period_s));
-  combine(step_, sampled_line(a, b, f, fraction_ * period_s), recovery);
+  const Line line = sampled_line(a, b, f, period_s);
+  step_ = predictor_step(line.a, line.b, line.f);
+  const Line lead = sampled_line(a, b, f, linear.input_delay_s);
+  lead_ = predictor_step(lead.a, lead.b, lead.f);
+  filter_.motor_gain = line.b(model_states - 1);
+  filter_.motor_decay = filter_.motor_gain == 0.0 ? 0.0 : line.a(model_states - 1, model_states - 1);
+  const Recovery recovery = recover(line, make_estimator_step(config.estimator, period_s));
+  combine(line, sampled_line(a, b, f, fraction_ * period_s), recovery);
   if (!weights_.measured.allFinite() || !weights_.on_their_way.allFinite())
     throw ConfigError("the prediction over " + exact_text(horizon_s_) + " s is not finite, " +
                       matrix_text("A", a) + ": use a shorter delay or a slower plant");
@@ -72,8 +76,8 @@ Predictor::Predictor(const ControlConfig& config, const Plant& plant) : actuator
 
 Predictor::Recovery Predictor::recover(const Line& line, const EstimatorStep& filter) {
   const FilterPolynomials p = polynomials_of(filter);
-  m1_ = p.m1;
-  m0_ = p.m0;
+  filter_.m1 = p.m1;
+  filter_.m0 = p.m0;
   const Matrix identity = Matrix::Identity(), square = line.a * line.a;
   const Matrix m = square + p.m1 * line.a + p.m0 * identity;
   const Matrix n = p.n2 * square + p.n1 * line.a + p.n0 * identity;
@@ -127,17 +131,36 @@ Predictor::Linear Predictor::linear() const {
           per_volt * weights_.filtered_next,
           per_volt * weights_.filtered_motor,
           fraction_,
-          m1_,
-          m0_,
-          motor_decay_,
-          motor_gain_};
+          filter_.m1,
+          filter_.m0,
+          filter_.motor_decay,
+          filter_.motor_gain};
 }
 
-void Predictor::filter_voltage(double drive_v) noexcept {
-  filtered_motor_ = motor_decay_ * filtered_motor_ + motor_gain_ * filtered_now_;
-  const double next = drive_v - m1_ * filtered_next_ - m0_ * filtered_now_;
-  filtered_now_ = filtered_next_;
-  filtered_next_ = next;
+FeedbackPrediction Predictor::feedback(const Gains& gains) const {
+  const FeedbackPrediction::Row of_gains = row_of(gains);
+  const Eigen::Vector4d volts = Eigen::Vector4d::Map(of_gains.data());
+  const Eigen::RowVector4d row = volts.cwiseProduct(scale_).transpose();
+  FeedbackPrediction made;
+  const Eigen::RowVector4d known = row * weights_.measured;
+  std::copy(known.begin(), known.end(), made.known.begin());
+  std::copy(row.begin(), row.end(), made.freely.begin());
+  made.freely_constant_v = volts.dot(offset_);
+  made.constant_v = made.freely_constant_v + row * weights_.constant;
+  made.now = row * weights_.filtered_now;
+  made.next = row * weights_.filtered_next;
+  made.motor = row * weights_.filtered_motor;
+  const Eigen::RowVectorXd on_their_way = row * weights_.on_their_way;
+  made.on_their_way.assign(on_their_way.begin(), on_their_way.end());
+  made.fraction = fraction_;
+  made.free_periods = free_steps_;
+  made.step = step_;
+  made.lead = lead_;
+  made.filter = filter_;
+  made.lags = filter_.motor_gain != 0.0;
+  made.scale = {scale_(0), scale_(1)};
+  made.offset = {offset_(0), offset_(1)};
+  return made;
 }
 
 void Predictor::take(double drive_v) noexcept {
@@ -150,14 +173,14 @@ void Predictor::start(const ControlState& state) noexcept {
   const double resting_v = actuator_.actuate(0.0);
   for (double& drive : drives_) drive = resting_v;
   first_ = 0;
-  filtered_now_ = filtered_next_ = resting_v / (1.0 + m1_ + m0_);
-  filtered_motor_ = motor_gain_ == 0.0 ? 0.0 : filtered_now_;
+  filtered_ = filter_.started(resting_v);
   steps_ = 0;
   const Eigen::Vector4d measured(state.cart_m, state.theta_rad, state.cart_velocity_mps,
                                  state.pendulum_rate_radps);
-  Vector held;
-  held << (measured - offset_).cwiseQuotient(scale_), motor_gain_ == 0.0 ? 0.0 : resting_v;
-  free_state_ = lead_.a * held + lead_.b * resting_v + lead_.f;
+  const Eigen::Vector4d held = (measured - offset_).cwiseQuotient(scale_);
+  std::copy(held.begin(), held.end(), free_state_.begin());
+  free_state_[filter_motor] = filter_.motor_gain == 0.0 ? 0.0 : resting_v;
+  lead_.propagate(free_state_, resting_v);
 }
 
 ControlState Predictor::shown(const Eigen::Vector4d& state) const noexcept {
@@ -170,18 +193,18 @@ ControlState Predictor::compensate(const ControlState& delayed, double applied_v
   take(drive_v);
   // The window, oldest first: one that acted before the measurement, one that acted around it, then the rest.
   const double* drives = &drives_[first_];
-  filter_voltage((1.0 - fraction_) * drives[1] + fraction_ * drives[0]);
+  filter_.take(filtered_, (1.0 - fraction_) * drives[1] + fraction_ * drives[0]);
   if (steps_ < free_steps_) {
     // What is measured is from before the start, when the body was held: go on from the start itself.
     ++steps_;
-    free_state_ = (step_.a * free_state_ + step_.b * drive_v + step_.f).eval();
-    return shown(free_state_.head<4>());
+    step_.propagate(free_state_, drive_v);
+    return shown(Eigen::Vector4d::Map(free_state_.data()));
   }
   const Eigen::Vector4d measured(delayed.cart_m, delayed.theta_rad, delayed.cart_velocity_mps,
                                  delayed.pendulum_rate_radps);
   Eigen::Vector4d even = weights_.constant + weights_.measured * (measured - offset_).cwiseQuotient(scale_);
-  even += weights_.filtered_now * filtered_now_ + weights_.filtered_next * filtered_next_ +
-          weights_.filtered_motor * filtered_motor_;
+  even += weights_.filtered_now * filtered_.now + weights_.filtered_next * filtered_.next +
+          weights_.filtered_motor * filtered_.motor;
   Eigen::Vector4d odd = Eigen::Vector4d::Zero();
   const double* on_their_way = drives + 1;
   const Eigen::Index count = weights_.on_their_way.cols();

@@ -21,6 +21,7 @@
 #include <memory>
 #include <vector>
 
+#include "predictor_step.hpp"
 #include "upright/control/gain_file.hpp"
 #include "upright/control/state_estimator.hpp"
 #include "upright/control/velocity_estimator.hpp"
@@ -54,6 +55,10 @@ class Predictor final : public DelayCompensator {
     double fraction, m1, m0, motor_decay, motor_gain;
   };
   Linear linear() const;
+  /// What the feedback by these gains amounts to, to simulate many loops side by side, and the model of whose
+  /// static actuator chain.
+  FeedbackPrediction feedback(const Gains& gains) const;
+  const PlantModel<double>& model() const { return actuator_.model(); }
 
  private:
   /// Fed-back states and, last, the motor's voltage (zero rows and columns where it does not lag).
@@ -75,7 +80,6 @@ class Predictor final : public DelayCompensator {
   Recovery recover(const Line& line, const EstimatorStep& filter);
   void combine(const Line& line, const Line& part, const Recovery& recovery);
   void take(double drive_v) noexcept;
-  void filter_voltage(double drive_v) noexcept;
   ControlState shown(const Eigen::Vector4d& state) const noexcept;
 
   /// `compensate` for true states and drive voltages, as numbers.
@@ -93,16 +97,16 @@ class Predictor final : public DelayCompensator {
   double fraction_ = 0.0;       ///< and the rest of one
   std::size_t free_steps_ = 0;  ///< periods from the start on until a measurement is from after the start
   Eigen::Vector4d scale_, offset_;
-  Line step_, lead_;  ///< over a period; over the input delay
-  double m1_ = 0.0, m0_ = 0.0, motor_decay_ = 0.0, motor_gain_ = 0.0;
+  PredictorStep step_, lead_;  ///< over a period; over the input delay
+  VoltageFilter filter_;
   Weights weights_;
 
   std::vector<double> drives_;  ///< a ring kept twice, so that its window is contiguous
   std::size_t window_ = 0;      ///< length of the window: whole_ + 2
   std::size_t first_ = 0;       ///< its oldest entry
-  double filtered_now_ = 0.0, filtered_next_ = 0.0, filtered_motor_ = 0.0;
+  VoltageFilter::State<double> filtered_;
   std::size_t steps_ = 0;
-  Vector free_state_;
+  PredictorStep::Column free_state_{};
 };
 
 }  // namespace upright

@@ -5,97 +5,45 @@
 //
 // 240 runs over starting angle and delay, 10 s each at 1 kHz, gain (7), velocity filter, no encoders (their
 // steps make the loop chaotic, so that trajectories cannot be compared).
+#include "sweep_bench.hpp"
+
 #include <algorithm>
 #include <boost/numeric/odeint.hpp>
 #include <chrono>
 #include <cmath>
 #include <cstdio>
-#include <ctime>
 #include <vector>
 
 #include "sim/loop/closed_loop.hpp"
-#include "sim/loop/fast_loop.hpp"
 #include "sweep/sweep.hpp"
 #include "sweep/sweep_tasks.hpp"
 #include "upright/control/model_parts.hpp"
-#include "upright/model/plant_file.hpp"
 
 namespace {
 
 using namespace upright;
 
-double cpu_s() {
-  timespec now{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
-}
-
-LoopSetup setup_for(const std::string& plant, double smoothing) {
-  LoopSetup setup;
-  setup.model = make_model<double>(
-      read_plant_file(std::string(UPRIGHT_SOURCE_DIR) + "/config/plants/" + plant + ".yaml"));
-  setup.model.smoothing = smoothing;
-  setup.control.gains = {70.7107, 304.9273, 143.3152, 61.0833};
-  setup.sampled = true;
-  setup.duration_s = 10.0;
-  return setup;
-}
-
-/// Delays up to 14 ms, under which no start falls.
-std::vector<LoopCase> cases_240() {
-  std::vector<LoopCase> cases;
-  for (int delay_ms = 0; delay_ms < 15; ++delay_ms)
-    for (int i = 0; i < 16; ++i) cases.push_back({0.005 + 0.003 * i, 1e-3 * delay_ms});
-  return cases;
-}
-
 struct Rhs {
-  const Dynamics<double>* dynamics;
+  const Dynamics<double>& dynamics;
   double motor_v;
   void operator()(const std::array<double, 4>& y, std::array<double, 4>& rate, double) const {
-    const PlantState<double> d = dynamics->derivative({y[0], y[1], y[2], y[3]}, motor_v, {});
+    const PlantState<double> d = dynamics.derivative({y[0], y[1], y[2], y[3]}, motor_v, {});
     rate = {d.cart_m, d.theta_rad, d.cart_mps, d.theta_radps};
   }
 };
 
-/// The loop around any way of crossing one period; `cross(rhs, state, period)`. Snapshots at `marks`.
-template <class Cross>
-std::vector<double> run_loop(const LoopSetup& setup, const LoopCase& start, const std::vector<double>& marks,
-                             Cross&& cross) {
-  const Dynamics<double> dynamics(setup.model);
-  ControlConfig control = setup.control;
-  control.delay_s = start.delay_s;
-  Controller controller(control, setup.amplifier_limit_v);
-  std::array<double, 4> state{0.0, start.theta0_rad, 0.0, 0.0};
-  std::vector<double> shown;
-  const double period_s = control.period_s();
-  const auto ticks = static_cast<std::uint64_t>(std::llround(setup.duration_s / period_s));
-  std::size_t mark = 0;
-  for (std::uint64_t tick = 0; tick < ticks; ++tick) {
-    ControlInput input;
-    input.tick = tick;
-    input.cart_m = state[0];
-    input.theta_rad = state[1];
-    cross(Rhs{&dynamics, dynamics.actuate(controller.step(input).voltage_v)}, state, period_s);
-    if (mark < marks.size() && static_cast<double>(tick + 1) * period_s >= marks[mark] - 1e-9) {
-      shown.push_back(state[1]);
-      ++mark;
-    }
-  }
-  return shown;
-}
-
-void tight(const Rhs& rhs, std::array<double, 4>& state, double period_s) {
+void tight(const Dynamics<double>& dynamics, double motor_v, std::array<double, 4>& state, double period_s) {
+  const Rhs rhs{dynamics, motor_v};
   boost::numeric::odeint::runge_kutta4<std::array<double, 4>> stepper;
   constexpr int pieces = 64;
   for (int i = 0; i < pieces; ++i) stepper.do_step(rhs, state, 0.0, period_s / pieces);
 }
 
-void dopri5(const Rhs& rhs, std::array<double, 4>& state, double period_s) {
+void dopri5(const Dynamics<double>& dynamics, double motor_v, std::array<double, 4>& state, double period_s) {
   namespace odeint = boost::numeric::odeint;
   static thread_local auto stepper =
       odeint::make_controlled(1e-8, 1e-8, odeint::runge_kutta_dopri5<std::array<double, 4>>());
-  odeint::integrate_adaptive(stepper, rhs, state, 0.0, period_s, period_s);
+  odeint::integrate_adaptive(stepper, Rhs{dynamics, motor_v}, state, 0.0, period_s, period_s);
 }
 
 const std::vector<double> marks = {0.1, 0.25, 0.5, 1.0, 2.0, 5.0, 10.0};
@@ -112,23 +60,6 @@ double lane_error(LoopSetup setup, const std::vector<LoopCase>& cases,
       worst = std::max(worst, std::abs(results[i].end.theta_rad - truth[i][m]));
   }
   return worst;
-}
-
-double lanes_ms(const LoopSetup& setup, const std::vector<LoopCase>& cases) {
-  std::vector<LoopResult> results(cases.size());
-  double best = 1e300;
-  for (int repeat = 0; repeat < 5; ++repeat) {
-    const double begin = cpu_s();
-    run_on_lanes(setup, cases, results);
-    best = std::min(best, cpu_s() - begin);
-  }
-  return 1e3 * best / static_cast<double>(cases.size());
-}
-
-double events_ms(const LoopSetup& setup, const std::vector<LoopCase>& cases) {
-  const double begin = cpu_s();
-  for (std::size_t i = 0; i < cases.size(); i += 4) run_with_events(setup, cases[i]);
-  return 1e3 * (cpu_s() - begin) / static_cast<double>(cases.size() / 4);
 }
 
 void smooth() {
@@ -167,13 +98,9 @@ void stick_slip() {
 }
 
 /// The velocity filter, and a Kalman filter that knows the viscous plant, with the same gains.
-void estimating(const char* name, const std::string& plant, double smoothing, bool encoders) {
+void estimating(const char* name, const std::string& plant, double smoothing) {
   LoopSetup setup = setup_for(plant, smoothing);
   setup.amplifier_limit_v = 15.0;
-  if (encoders) {
-    setup.cart_resolution_m = 2.27485e-5;
-    setup.angle_resolution_rad = 1.5339808e-3;
-  }
   const std::vector<LoopCase> cases = cases_240();
   const double filter = lanes_ms(setup, cases);
   setup.control.state_estimator.kind = StateEstimatorKind::kalman;
@@ -271,9 +198,9 @@ void cores() {
 int main() {
   smooth();
   stick_slip();
-  estimating("smooth exponential friction", "exponential", 100.0, false);
-  estimating("bristles", "dynamic", 0.0, false);
-  estimating("true stick-slip and encoders", "exponential", 0.0, true);
+  estimating("smooth exponential friction", "exponential", 100.0);
+  estimating("bristles", "dynamic", 0.0);
+  bench_as_the_rig_is();
   continuous("smooth exponential friction", "exponential", 100.0);
   continuous("exponential friction, true stick-slip", "exponential", 0.0);
   continuous("bristles", "dynamic", 0.0);

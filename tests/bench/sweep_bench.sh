@@ -10,5 +10,5 @@ venv=build/bench-venv
 $venv/bin/python -c 'import numba, scipy' 2>/dev/null || $venv/bin/pip install --quiet numba scipy
 log=$(mktemp)
 trap 'rm -f "$log"' EXIT
-build/release/tests/bench/sweep_bench | tee "$log" | grep -v '^LANES_MS'
-$venv/bin/python tests/bench/sweep_bench.py "$(sed -n 's/^LANES_MS //p' "$log")"
+build/release/tests/bench/sweep_bench | tee "$log" | grep -v '_MS '
+$venv/bin/python tests/bench/sweep_bench.py "$(sed -n 's/^LANES_MS //p' "$log")" "$(sed -n 's/^RIG_MS //p' "$log")"

@@ -27,13 +27,14 @@ struct Friction {
 
 class SweepAccuracy : public testing::TestWithParam<Friction> {
  protected:
-  static LoopSetup setup(bool sampled) {
+  static LoopSetup setup(bool sampled, double input_delay_s = 0.0) {
     LoopSetup made;
     Plant plant =
         read_plant_file(std::string(UPRIGHT_SOURCE_DIR) + "/config/plants/" + GetParam().plant + ".yaml");
     if (GetParam().table)
       plant.set("force_table",
                 {0.0, -0.6, 0.6, 0.3, 0.1, -0.2, 0.1, 0.3, 0.2, 0.0, -0.2, -0.3, -0.1, 0.2, -0.1, -0.3});
+    if (input_delay_s > 0.0) plant.set("input_delay", {input_delay_s});
     made.model = make_model<double>(plant);
     made.model.smoothing = GetParam().smoothing;
     made.control.gains = {70.7107, 304.9273, 143.3152, 61.0833};
@@ -50,8 +51,8 @@ class SweepAccuracy : public testing::TestWithParam<Friction> {
     return cases;
   }
 
-  static void expect_sampled_loops_agree(const LoopSetup& setup) {
-    const std::vector<LoopCase> cases = cases_240();
+  static void expect_sampled_loops_agree(const LoopSetup& setup,
+                                         const std::vector<LoopCase>& cases = cases_240()) {
     std::vector<LoopResult> lanes(cases.size());
     run_on_lanes(setup, cases, lanes);
     for (std::size_t i = 0; i < cases.size(); ++i) {
@@ -111,6 +112,39 @@ TEST_P(SweepAccuracy, SampledLoopsWithAKalmanFilter) {
   };
   ASSERT_TRUE(lanes_can_run(setup));
   expect_sampled_loops_agree(setup);
+}
+
+/// Delays of up to 60 ms, whole and fractional periods, with a predictor that believes another plant.
+TEST_P(SweepAccuracy, SampledLoopsWithAPredictor) {
+  for (const StateEstimatorKind kind : {StateEstimatorKind::none, StateEstimatorKind::kalman}) {
+    LoopSetup setup = SweepAccuracy::setup(true);
+    setup.control.gains = {47.4, 120.0, 41.0, 22.8};
+    setup.control.state_estimator.kind = kind;
+    setup.control.rejection = {0.9, 0.05};
+    setup.control.compensation.kind = CompensationKind::predictor;
+    Plant believed = read_plant_file(std::string(UPRIGHT_SOURCE_DIR) + "/config/plants/viscous.yaml");
+    believed.set("input_delay", {0.0023});
+    believed.set("motor_lag", {0.001});
+    believed.set("constant_force", {0.05});
+    believed.set("angle_scale", {1.001});
+    setup.make_parts = [believed](const ControlConfig& asked) {
+      return make_model_parts(asked, believed, believed);
+    };
+    setup.duration_s = 0.6;
+    ASSERT_TRUE(lanes_can_run(setup));
+    std::vector<LoopCase> cases = cases_240();
+    for (LoopCase& one : cases) one.delay_s *= 4.3;
+    expect_sampled_loops_agree(setup, cases);
+  }
+}
+
+TEST_P(SweepAccuracy, SampledLoopsOfAPlantWithAnInputDelay) {
+  for (const double input_delay_s : {0.0004, 0.002, 0.0033}) {
+    LoopSetup setup = SweepAccuracy::setup(true, input_delay_s);
+    setup.duration_s = 0.5;
+    ASSERT_TRUE(lanes_can_run(setup));
+    expect_sampled_loops_agree(setup);
+  }
 }
 
 TEST_P(SweepAccuracy, ContinuousLoops) {

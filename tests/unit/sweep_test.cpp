@@ -100,6 +100,15 @@ TEST(FastLoop, AgreesWithTheEventEngineWithAKalmanFilter) {
   expect_lanes_agree(estimating("dynamic", StateEstimatorKind::kalman), 5e-6);
 }
 
+TEST(FastLoop, AgreesWithTheEventEngineWithAPredictor) {
+  for (const StateEstimatorKind kind : {StateEstimatorKind::none, StateEstimatorKind::kalman}) {
+    LoopSetup setup = estimating("dynamic", kind);
+    setup.control.compensation.kind = CompensationKind::predictor;
+    setup.duration_s = 2.0;
+    expect_lanes_agree(setup, 5e-6);
+  }
+}
+
 TEST(FastLoop, FallsAndStaysUpWithAKalmanFilterAndEncoders) {
   LoopSetup setup = estimating("exponential", StateEstimatorKind::kalman);
   setup.cart_resolution_m = 2.27485e-5;
@@ -136,9 +145,6 @@ TEST(Loops, ReferenceEngineTakesEstimatorsAndPredictors) {
 
 TEST(FastLoop, LeavesToTheEventEngineWhatItCannotDo) {
   EXPECT_FALSE(lanes_can_run(estimating("viscous", StateEstimatorKind::extended_kalman)));
-  LoopSetup predicting = estimating("viscous", StateEstimatorKind::kalman);
-  predicting.control.compensation.kind = CompensationKind::predictor;
-  EXPECT_FALSE(lanes_can_run(predicting));
   Plant plant = read_plant_file(source + "/config/plants/viscous.yaml");
   LoopSetup setup = sampled("viscous");
   plant.set("motor_lag", {0.002});

@@ -223,24 +223,58 @@ class Dynamics {
     return value_of(bristle_stiffness()) * std::abs(v) / std::max(level, smallest_level_n);
   }
 
-  /// As `derivative`, with the mode of the cart's contact as a number, so that lanes may differ: -1 or 1
-  /// slides in that direction, 0 sticks. For plants whose cart can stick and whose pivot cannot.
-  PlantState<S> derivative_by_direction(const PlantState<S>& state, const S& motor_v,
+  /// The motion before the cart's dry friction acts, for engines whose lanes differ in the modes of their
+  /// contacts.
+  struct Balance {
+    S sine, cosine;  ///< of the angle
+    S force;         ///< on the cart, without dry friction [N]
+    S torque;        ///< about the pivot, without gravity [N m]
+  };
+  /// For plants with a pendulum whose pivot cannot stick.
+  Balance balance(const PlantState<S>& state, const S& motor_v) const {
+    const auto [s, c] = elementary::sine_and_cosine(state.theta_rad);
+    return {s, c, cart_smooth_force(state, motor_v), pivot_smooth_torque(state.theta_radps)};
+  }
+
+  /// As `cart_load`, of a cart at rest.
+  S cart_load(const PlantState<S>& state, const Balance& at) const {
+    const S turn = gravity_torque_ * at.sine + at.torque;
+    return at.force + coupling_ * (at.sine * state.theta_radps * state.theta_radps -
+                                   at.cosine * turn / base_.inertia_about_pivot_kgm2);
+  }
+
+  /// As `derivative`, with the mode of the cart's contact as a number: -1 or 1 slides in that direction, 0
+  /// sticks.
+  PlantState<S> derivative_by_direction(const PlantState<S>& state, const Balance& at,
                                         const S& direction) const {
-    PlantState<S> rate{};
     const S level = cart_dry_level(state.cart_m, positive_part(S(direction * state.cart_mps)), direction);
-    const S force = cart_smooth_force(state, motor_v) - level * direction;
-    const S torque = model_.has_pendulum ? pivot_smooth_torque(state.theta_radps) : S(0.0);
-    accelerate(state, force, torque, false, !model_.has_pendulum, rate);
+    PlantState<S> rate{};
+    accelerate(state, at.sine, at.cosine, at.force - level * direction, at.torque, false, false, rate);
     const auto rests = direction == S(0.0);
     rate.cart_mps = select(rests, S(0.0), rate.cart_mps);
     rate.cart_m = select(rests, S(0.0), state.cart_mps);
     rate.theta_rad = state.theta_radps;
-    if (model_.has_pendulum) {
-      const S turn =
-          (gravity_torque_ * elementary::sin(state.theta_rad) + torque) / base_.inertia_about_pivot_kgm2;
-      rate.theta_radps = select(rests, turn, rate.theta_radps);
-    }
+    const S turn = (gravity_torque_ * at.sine + at.torque) / base_.inertia_about_pivot_kgm2;
+    rate.theta_radps = select(rests, turn, rate.theta_radps);
+    return rate;
+  }
+  /// The same in one call.
+  PlantState<S> derivative_by_direction(const PlantState<S>& state, const S& motor_v,
+                                        const S& direction) const {
+    return derivative_by_direction(state, balance(state, motor_v), direction);
+  }
+
+  /// As `derivative`, of a cart on bristles that moves in this direction: the motion continues smoothly a
+  /// little beyond the reversal.
+  PlantState<S> bristle_derivative_by_direction(const PlantState<S>& state, const S& motor_v,
+                                                const S& direction) const {
+    const Balance at = balance(state, motor_v);
+    PlantState<S> rate{};
+    rate.bristle_m = bristle_rate(state, S(direction * state.cart_mps), direction);
+    const S force = at.force - bristle_stiffness() * state.bristle_m - bristle_damping() * rate.bristle_m;
+    accelerate(state, at.sine, at.cosine, force, at.torque, false, false, rate);
+    rate.cart_m = state.cart_mps;
+    rate.theta_rad = state.theta_radps;
     return rate;
   }
 
@@ -345,9 +379,11 @@ class Dynamics {
   }
 
   S bristle_rate(const PlantState<S>& state) const {
-    const S speed = absolute(state.cart_mps);
     const S direction = select(state.cart_mps < S(0.0), S(-1.0), S(1.0));
-    const S level = cart_dry_level(state.cart_m, speed, direction);
+    return bristle_rate(state, absolute(state.cart_mps), direction);
+  }
+  S bristle_rate(const PlantState<S>& state, const S& speed, const S& direction) const {
+    const S level = cart_dry_level(state.cart_m, positive_part(speed), direction);
     const S safe = select(level > S(smallest_level_n), level, S(smallest_level_n));
     return state.cart_mps - bristle_stiffness() * speed * state.bristle_m / safe;
   }
@@ -376,6 +412,12 @@ class Dynamics {
       return;
     }
     const auto [s, c] = elementary::sine_and_cosine(state.theta_rad);
+    accelerate(state, s, c, force, torque, cart_rests, pivot_rests, rate);
+  }
+
+  /// The same with a pendulum, whose angle has this sine and cosine.
+  void accelerate(const PlantState<S>& state, const S& s, const S& c, const S& force, const S& torque,
+                  bool cart_rests, bool pivot_rests, PlantState<S>& rate) const {
     const S push = force + coupling_ * s * state.theta_radps * state.theta_radps;
     if (pivot_rests) {
       if (!cart_rests) rate.cart_mps = push / total_mass_;

@@ -1,0 +1,242 @@
+// Sweeps of the loop as the rig is: encoder steps, the amplifier's limit, true stick-slip and bristles. One
+// count more or less changes the voltage, so that two engines go apart for good some time after the first
+// count in which they differ. Until then they agree to 1e-6; afterwards in what becomes of the runs.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "sim/loop/closed_loop.hpp"
+#include "sim/loop/fast_loop.hpp"
+#include "upright/control/model_parts.hpp"
+#include "upright/model/plant_file.hpp"
+#include "upright/sim/event_engine.hpp"
+
+namespace upright {
+namespace {
+
+struct Loop {
+  const char* name;
+  const char* plant;
+  double smoothing = 0.0;
+  bool estimates = false;       ///< by a Kalman filter
+  double longest_stay_s = 0.0;  ///< delays up to this do not fall within the first half second
+  bool predicts = false;        ///< the delay is compensated
+};
+
+class SweepEncoders : public testing::TestWithParam<Loop> {
+ protected:
+  static Plant plant_of(const std::string& name) {
+    return read_plant_file(std::string(UPRIGHT_SOURCE_DIR) + "/config/plants/" + name + ".yaml");
+  }
+
+  static LoopSetup setup() {
+    LoopSetup made;
+    made.model = make_model<double>(plant_of(GetParam().plant));
+    made.model.smoothing = GetParam().smoothing;
+    made.control.gains = {70.7107, 304.9273, 143.3152, 61.0833};
+    made.sampled = true;
+    made.cart_resolution_m = 2.27485e-5;
+    made.angle_resolution_rad = 1.5339808e-3;
+    made.amplifier_limit_v = 15.0;
+    made.fell_above_rad = 0.6;
+    made.duration_s = 10.0;
+    if (GetParam().estimates) {
+      made.control.gains = {47.4, 120.0, 41.0, 22.8};
+      made.control.state_estimator.kind = StateEstimatorKind::kalman;
+    }
+    if (GetParam().predicts) {
+      made.control.gains = {47.4, 120.0, 41.0, 22.8};
+      made.control.compensation.kind = CompensationKind::predictor;
+    }
+    if (GetParam().estimates || GetParam().predicts) {
+      const Plant believed = plant_of("viscous");
+      made.make_parts = [believed](const ControlConfig& asked) {
+        return make_model_parts(asked, believed, believed);
+      };
+    }
+    return made;
+  }
+
+  static std::vector<LoopCase> random_cases(std::size_t count, double longest_s, std::uint64_t seed) {
+    std::mt19937_64 random(seed);
+    std::uniform_real_distribution<double> part(0.0, 1.0);
+    std::vector<LoopCase> cases(count);
+    for (LoopCase& one : cases) one = {0.005 + 0.08 * part(random), longest_s * part(random)};
+    return cases;
+  }
+
+  /// After each period, by the event engine with steps so short that it is the truth.
+  static std::vector<PlantState<double>> states_of(const LoopSetup& setup, const LoopCase& start,
+                                                   std::size_t periods) {
+    EngineOptions tight;
+    tight.max_step_s = 5e-5;
+    ControlConfig control = setup.control;
+    control.delay_s = start.delay_s;
+    Controller controller(control, setup.amplifier_limit_v,
+                          setup.make_parts ? setup.make_parts(control) : ModelParts{});
+    SampledLoop<EventEngine<double>> loop(setup.model, control.sample_rate_hz, tight);
+    PlantState<double> released;
+    released.theta_rad = start.theta0_rad;
+    loop.start(released);
+    std::vector<PlantState<double>> states;
+    while (states.size() < periods) {
+      loop.step([&](std::uint64_t tick, const Measured& measured) {
+        ControlInput input;
+        input.tick = tick;
+        input.cart_m = std::nearbyint(measured[0] / setup.cart_resolution_m) * setup.cart_resolution_m;
+        input.theta_rad =
+            std::nearbyint(measured[1] / setup.angle_resolution_rad) * setup.angle_resolution_rad;
+        return controller.step(input).voltage_v;
+      });
+      states.push_back(loop.engine().state());
+    }
+    return states;
+  }
+
+  static bool same_counts(const LoopSetup& setup, const PlantState<double>& a, const PlantState<double>& b) {
+    const auto same = [](double one, double other, double step) {
+      return std::nearbyint(one / step) == std::nearbyint(other / step);
+    };
+    return same(a.cart_m, b.cart_m, setup.cart_resolution_m) &&
+           same(a.theta_rad, b.theta_rad, setup.angle_resolution_rad);
+  }
+};
+
+TEST_P(SweepEncoders, AgreeUntilTheFirstCountThatDiffers) {
+  constexpr double bar = 1e-6;
+  constexpr std::size_t periods = 400;
+  LoopSetup setup = SweepEncoders::setup();
+  const std::vector<LoopCase> cases = random_cases(240, GetParam().longest_stay_s, 24);
+  std::vector<std::vector<LoopResult>> lanes(periods + 1, std::vector<LoopResult>(cases.size()));
+  for (std::size_t tick = 1; tick <= periods; ++tick) {
+    setup.duration_s = static_cast<double>(tick) * setup.control.period_s();
+    run_on_lanes(setup, cases, lanes[tick]);
+  }
+  std::size_t together = 0;
+  for (std::size_t i = 0; i < cases.size(); ++i) {
+    const std::vector<PlantState<double>> truth = states_of(setup, cases[i], periods);
+    double worst = 0.0;
+    bool same = true;
+    for (std::size_t tick = 1; tick <= periods && same; ++tick) {
+      const PlantState<double>&lane = lanes[tick][i].end, &state = truth[tick - 1];
+      worst =
+          std::max({worst, std::abs(lane.theta_rad - state.theta_rad), std::abs(lane.cart_m - state.cart_m)});
+      same = same_counts(setup, lane, state);
+    }
+    EXPECT_LT(worst, bar) << cases[i].theta0_rad << " rad, " << cases[i].delay_s << " s";
+    together += same ? 1 : 0;
+  }
+  EXPECT_GT(together, cases.size() / 2);
+}
+
+/// Loops that fall from a delay within the range below.
+class SweepEncodersFalls : public SweepEncoders {};
+
+TEST_P(SweepEncodersFalls, FallWhereTheEventEngineFalls) {
+  const LoopSetup setup = SweepEncoders::setup();
+  const std::vector<LoopCase> cases = random_cases(400, 0.12, 25);
+  std::vector<LoopResult> lanes(cases.size());
+  run_on_lanes(setup, cases, lanes);
+  std::size_t differ = 0, fell = 0;
+  for (std::size_t i = 0; i < cases.size(); ++i) {
+    const bool falls = run_with_events(setup, cases[i]).fell();
+    fell += falls ? 1 : 0;
+    differ += falls != lanes[i].fell() ? 1 : 0;
+  }
+  EXPECT_LE(differ, cases.size() / 200);  // 99.5 percent agree
+  EXPECT_GT(fell, cases.size() / 8);
+  EXPECT_LT(fell, cases.size() * 7 / 8);
+}
+
+TEST_P(SweepEncodersFalls, FallFromTheSameDelay) {
+  const LoopSetup setup = SweepEncoders::setup();
+  const auto falls_from = [](const auto& falls) {
+    double stays_s = 0.0, falls_s = 0.12;
+    while (falls_s - stays_s > 2e-5) {
+      const double middle_s = 0.5 * (stays_s + falls_s);
+      (falls(middle_s) ? falls_s : stays_s) = middle_s;
+    }
+    return falls_s;
+  };
+  std::vector<double> apart_s;
+  for (int i = 0; i < 21; ++i) {
+    const double theta0_rad = 0.01 + 0.004 * i;
+    const double on_lanes_s = falls_from([&](double delay_s) {
+      const LoopCase start[] = {{theta0_rad, delay_s}};
+      LoopResult result[1];
+      run_on_lanes(setup, start, result);
+      return result[0].fell();
+    });
+    const double alone_s = falls_from([&](double delay_s) {
+      return run_with_events(setup, {theta0_rad, delay_s}).fell();
+    });
+    apart_s.push_back(std::abs(on_lanes_s - alone_s));
+  }
+  std::nth_element(apart_s.begin(), apart_s.begin() + 10, apart_s.end());
+  EXPECT_LT(apart_s[10], 1e-4);
+}
+
+/// Of smooth friction, lanes take their substeps together.
+class SweepEncodersApart : public SweepEncoders {};
+
+TEST_P(SweepEncodersApart, AResultDoesNotDependOnTheRunsBesideIt) {
+  LoopSetup setup = SweepEncoders::setup();
+  setup.duration_s = 1.0;
+  const std::vector<LoopCase> cases = random_cases(40, 0.06, 26);
+  std::vector<LoopResult> together(cases.size()), alone(1);
+  run_on_lanes(setup, cases, together);
+  for (std::size_t i = 0; i < cases.size(); i += 3) {
+    run_on_lanes(setup, std::span(cases).subspan(i, 1), alone);
+    EXPECT_EQ(alone[0].end.theta_rad, together[i].end.theta_rad) << i;
+    EXPECT_EQ(alone[0].end.cart_mps, together[i].end.cart_mps) << i;
+    EXPECT_EQ(alone[0].theta_amplitude_rad, together[i].theta_amplitude_rad) << i;
+  }
+}
+
+/// Without a voltage limit some of these motions leave all bounds within a period.
+TEST(SweepEncodersDiverging, EveryRunEnds) {
+  for (const char* plant : {"dynamic", "exponential"}) {
+    LoopSetup setup;
+    setup.model = make_model<double>(
+        read_plant_file(std::string(UPRIGHT_SOURCE_DIR) + "/config/plants/" + plant + ".yaml"));
+    setup.control.gains = {70.7107, 340.3402, 143.3, 61.0};
+    setup.control.estimator.cutoff_hz = 2000.0;
+    setup.sampled = true;
+    setup.cart_resolution_m = 2.27485e-5;
+    setup.angle_resolution_rad = 1.5339808e-3;
+    setup.duration_s = 5.0;
+    std::vector<LoopCase> cases;
+    for (int i = 0; i < 256; ++i) cases.push_back({0.0175 * (1 + i % 5), 0.00025 * i});
+    for (const LaneRegisters registers : {LaneRegisters::wide, LaneRegisters::baseline}) {
+      std::vector<LoopResult> lanes(cases.size());
+      run_on_lanes(setup, cases, lanes, registers);
+      EXPECT_TRUE(lanes.back().fell());
+    }
+  }
+}
+
+std::string name_of_loop(const testing::TestParamInfo<Loop>& loop) {
+  return loop.param.name;
+}
+const Loop with_events[] = {{"stick_slip", "exponential", 0.0, false, 0.014},
+                            {"stick_slip_estimated", "exponential", 0.0, true, 0.05},
+                            {"bristles", "dynamic", 0.0, false, 0.014},
+                            {"bristles_estimated", "dynamic", 0.0, true, 0.05}};
+const Loop with_predictor[] = {{"predicted", "exponential", 0.0, false, 0.1, true},
+                               {"estimated_and_predicted", "dynamic", 0.0, true, 0.1, true}};
+const Loop smooth[] = {{"smooth", "exponential", 100.0, false, 0.014}};
+
+INSTANTIATE_TEST_SUITE_P(Events, SweepEncoders, testing::ValuesIn(with_events), name_of_loop);
+INSTANTIATE_TEST_SUITE_P(Predictor, SweepEncoders, testing::ValuesIn(with_predictor), name_of_loop);
+INSTANTIATE_TEST_SUITE_P(Smooth, SweepEncoders, testing::ValuesIn(smooth), name_of_loop);
+INSTANTIATE_TEST_SUITE_P(Events, SweepEncodersFalls, testing::ValuesIn(with_events), name_of_loop);
+INSTANTIATE_TEST_SUITE_P(Smooth, SweepEncodersFalls, testing::ValuesIn(smooth), name_of_loop);
+INSTANTIATE_TEST_SUITE_P(Events, SweepEncodersApart, testing::ValuesIn(with_events), name_of_loop);
+INSTANTIATE_TEST_SUITE_P(Predictor, SweepEncodersApart, testing::ValuesIn(with_predictor), name_of_loop);
+
+}  // namespace
+}  // namespace upright
