@@ -170,13 +170,16 @@ void modbus_keys(YamlKeys& keys, Backend link, const RigFile& rig_file, ModbusRi
     optional_address_key(keys, "enable_address", rig.enable_address);
     keys.optional_map("device_watchdog", rig.watchdog, watchdog_keys);
   }
-  if (roles.output && roles.encoders()) keys.optional_map("device_clock", rig.sampling, sampling_keys);
+  if (roles.output && roles.encoders() &&
+      keys.decides_by_presence("device_clock", rig.sampling.has_value())) {
+    keys.map("device_clock", [&](YamlKeys& map) { sampling_keys(map, YamlKeys::made(rig.sampling)); });
+    keys.needs("device_clock", rig.exchange == ModbusExchange::read_write,
+               "needs one exchange that carries counts and voltage", "use exchange: read_write");
+  }
   if (const YamlMap* map = keys.source()) check_registers(*map, rig, roles);
   keys.needs("exchange", rig.exchange != ModbusExchange::read_write || !rig.input_registers,
              "is read_write, which reads holding registers only",
              "use exchange: separate, or table: holding");
-  keys.needs("device_clock", !rig.sampling || rig.exchange == ModbusExchange::read_write,
-             "needs one exchange that carries counts and voltage", "use exchange: read_write");
   keys.check("response_timeout_s", rig.response_timeout_s < rig_file.watchdog_s, "is not below watchdog_s",
              "set it to less than watchdog_s");
 }
