@@ -179,7 +179,7 @@ TEST_F(SweepCommand, OnePlantFilePredictsTheFallsOfBothControllers) {
 
 /// On a terminal: the bar shows the time left, Ctrl-C stops it, and the same command goes on from there.
 TEST_F(SweepCommand, ShowsTheTimeLeftOnATerminalAndStopsOnItsCtrlC) {
-  write("60", "fast");
+  write("1000", "fast");
   const std::string to = out("cut");
   int terminal = -1;
   const pid_t child = forkpty(&terminal, nullptr, nullptr, nullptr);
