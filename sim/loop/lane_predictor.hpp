@@ -160,6 +160,7 @@ class LanePredictor {
   static std::vector<const std::vector<double>*> weights_of(
       const std::vector<const FeedbackPrediction*>& predictions) {
     std::vector<const std::vector<double>*> weights;
+    weights.reserve(predictions.size());
     for (const FeedbackPrediction* prediction : predictions) weights.push_back(&prediction->on_their_way);
     return weights;
   }
