@@ -1,6 +1,7 @@
 // A disturbance that lasts is not taken for an effect, and an effect is still found beside it.
 #include <gtest/gtest.h>
 
+#include <random>
 #include <set>
 
 #include "blind_case.hpp"
@@ -37,9 +38,9 @@ std::vector<Measurement> disturbed_runs(Plant plant, unsigned seed) {
 }
 
 /// Effects that are named and are no numbers of the plant file.
-std::set<std::string> named(const std::vector<Measurement>& runs) {
+std::set<std::string> named(const std::vector<Measurement>& runs, const Plant& believed = file_plant()) {
   std::set<std::string> names;
-  for (const FoundEffect& effect : diagnose(file_plant(), runs, {}).effects)
+  for (const FoundEffect& effect : diagnose(believed, runs, {}).effects)
     if (effect_registry()[effect.effect].enters != Enters::parameter) names.insert(kind_of(effect.effect));
   return names;
 }
@@ -47,6 +48,16 @@ std::set<std::string> named(const std::vector<Measurement>& runs) {
 TEST(ColouredNull, ALastingDisturbanceIsNoEffect) {
   for (const unsigned seed : {1, 2, 3, 4, 5, 6})
     EXPECT_EQ(named(disturbed_runs(file_plant(), seed)), std::set<std::string>{}) << seed;
+}
+
+/// A rig of a laboratory on which nothing is hidden. With white noise alone a constant force was named.
+TEST(ColouredNull, ADisturbedRigWithoutAnEffectGetsNone) {
+  blind::Request request;
+  request.seed = 906ull * 1000003ull + 10ull;
+  request.size = static_cast<blind::Size>(std::mt19937_64(request.seed)() % 3);
+  request.condition = blind::Condition::laboratory;
+  const blind::Case blind = make_case(request);
+  EXPECT_EQ(named(measure_all(blind), blind.believed), std::set<std::string>{});
 }
 
 TEST(ColouredNull, AnEffectIsNamedBesideALastingDisturbance) {
