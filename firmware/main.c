@@ -41,9 +41,9 @@ int main(void) {
     const uint8_t now = clock_now();
     const uint8_t elapsed_steps = (uint8_t)(now - before);
     before = now;
-    steps_of_tick = (uint8_t)(steps_of_tick + elapsed_steps % STEPS_PER_TICK);
-    const uint8_t elapsed_ticks = (uint8_t)(elapsed_steps / STEPS_PER_TICK + steps_of_tick / STEPS_PER_TICK);
-    steps_of_tick %= STEPS_PER_TICK;
+    const uint16_t steps = (uint16_t)(steps_of_tick + elapsed_steps);
+    const uint8_t elapsed_ticks = (uint8_t)(steps / STEPS_PER_TICK);
+    steps_of_tick = steps % STEPS_PER_TICK;
     if (sampling_is_due(elapsed_steps)) modbus_sample();
     registers_watch(elapsed_ticks);
     modbus_serve(elapsed_ticks);

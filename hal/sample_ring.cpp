@@ -42,4 +42,16 @@ RingSample SampleRing::wait_for_another(std::uint64_t number, std::int64_t until
   }
 }
 
+DeviceSample SampleReader::wait_next(const SampleRing& ring, std::int64_t until_ns) noexcept {
+  const DeviceSample next = ring.wait_for_another(waited_for_, until_ns).when;
+  waited_for_ = next.number;
+  return next;
+}
+
+bool SampleReader::is_new(const RingSample& sample) noexcept {
+  if (sample.when.number == read_) return false;
+  read_ = sample.when.number;
+  return true;
+}
+
 }  // namespace upright

@@ -40,4 +40,16 @@ class SampleRing {
   std::atomic<std::uint32_t> published_{0};
 };
 
+/// What the loop has waited for and read of a ring.
+class SampleReader {
+ public:
+  /// As Rig::wait_next.
+  DeviceSample wait_next(const SampleRing& ring, std::int64_t until_ns) noexcept;
+  /// Whether this sample was not read before. It is then.
+  bool is_new(const RingSample& sample) noexcept;
+
+ private:
+  std::uint64_t waited_for_ = 0, read_ = 0;
+};
+
 }  // namespace upright

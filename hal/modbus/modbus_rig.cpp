@@ -213,7 +213,7 @@ void ModbusTransport::begin_serving() {
   checks_refused_in_a_row_ = reads_refused_in_a_row_ = writes_refused_in_a_row_ = 0;
   recoveries_ = 0;
   samples_.publish({});
-  sample_read_ = sample_waited_for_ = 0;
+  sample_reader_ = {};
   next_sample_ns_ = monotonic_ns();
   pause_ns_ = first_connect_pause_ns;
   next_attempt_ns_ = stop_begun_ns_ = 0;
@@ -228,9 +228,7 @@ void ModbusTransport::ring() noexcept {
 }
 
 DeviceSample ModbusTransport::wait_next(std::int64_t until_ns) noexcept {
-  const DeviceSample next = samples_.wait_for_another(sample_waited_for_, until_ns).when;
-  sample_waited_for_ = next.number;
-  return next;
+  return sample_reader_.wait_next(samples_, until_ns);
 }
 
 RigReading ModbusTransport::newest_sample() noexcept {
@@ -238,11 +236,11 @@ RigReading ModbusTransport::newest_sample() noexcept {
   RigReading reading;
   reading.time_ns = sample.when.time_ns;
   reading.recoveries = recoveries_.load(std::memory_order_relaxed);
-  if (sample.when.number == sample_read_) {
+  if (!sample_reader_.is_new(sample)) {
     reading.fault = sample.trouble != 0 ? static_cast<RigFault>(sample.trouble) : RigFault::link_timeout;
     return reading;
   }
-  sample_read_ = reading.sequence = sample.when.number;
+  reading.sequence = sample.when.number;
   reading.cart_counts = sample.cart;
   reading.pendulum_counts = sample.pendulum;
   reading.status = RigStatus::fresh;

@@ -112,7 +112,7 @@ class ModbusTransport final : public Rig {
   std::atomic<int> stop_exception_{0};
 
   // The loop's own.
-  std::uint64_t sample_read_ = 0, sample_waited_for_ = 0;
+  SampleReader sample_reader_;
 
   // The thread's own.
   std::uint32_t read_served_ = 0, write_served_ = 0;

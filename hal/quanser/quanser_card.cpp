@@ -240,30 +240,30 @@ DeviceFacts QuanserCard::facts() const {
   return facts;
 }
 
-hil::Error QuanserCard::read_velocities(RawVelocities& counts_per_s) const noexcept {
+/// What was read of the encoders that are wired, in the order of their channels.
+template <class Raw, class Value>
+Raw QuanserCard::by_encoder(const std::array<Value, 2>& read) const noexcept {
+  Raw raw;
+  if (wiring_.cart_channel) raw.cart = read[0];
+  if (wiring_.pendulum_channel) raw.pendulum = read[encoder_count_ - 1];
+  return raw;
+}
+
+hil::Error QuanserCard::read_velocities(RawVelocities& velocities) const noexcept {
   if (encoder_count_ == 0 || hil_.read_other == nullptr) return -hil::not_supported;
   std::array<unsigned, 2> channels = encoders_;
   for (unsigned& channel : channels) channel += hil::first_velocity_channel;
   std::array<double, 2> read{};
   const hil::Error error = hil_.read_other(card_, channels.data(), encoder_count_, read.data());
-  if (error < 0) return error;
-  if (wiring_.cart_channel) counts_per_s.cart = read[0];
-  if (wiring_.pendulum_channel) counts_per_s.pendulum = read[encoder_count_ - 1];
+  if (error >= 0) velocities = by_encoder<RawVelocities>(read);
   return error;
 }
 
 hil::Error QuanserCard::read_counts(RawCounts& counts) const noexcept {
   std::array<std::int32_t, 2> read{};
   const hil::Error error = hil_.read_encoder(card_, encoders_.data(), encoder_count_, read.data());
-  if (error >= 0) counts = counts_of(read);
+  if (error >= 0) counts = by_encoder<RawCounts>(read);
   return error;
-}
-
-RawCounts QuanserCard::counts_of(const std::array<std::int32_t, 2>& read) const noexcept {
-  RawCounts counts;
-  if (wiring_.cart_channel) counts.cart = read[0];
-  if (wiring_.pendulum_channel) counts.pendulum = read[encoder_count_ - 1];
-  return counts;
 }
 
 hil::Task QuanserCard::start_sampling(double rate_hz) const {
@@ -285,7 +285,7 @@ hil::Task QuanserCard::start_sampling(double rate_hz) const {
 hil::Error QuanserCard::wait_for_sample(hil::Task task, RawCounts& counts) const noexcept {
   std::array<std::int32_t, 2> read{};
   const hil::Error came = hil_.task_read_encoder(task, 1, read.data());
-  if (came > 0) counts = counts_of(read);
+  if (came > 0) counts = by_encoder<RawCounts>(read);
   return came;
 }
 

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdint>
+#include <limits>
 #include <string>
 
 #include "hil_library.hpp"
@@ -16,8 +17,10 @@ struct RawCounts {
   std::int32_t cart = 0, pendulum = 0;
 };
 
+/// In counts per second; not a number where another backend counts.
 struct RawVelocities {
-  double cart = 0.0, pendulum = 0.0;
+  double cart = std::numeric_limits<double>::quiet_NaN();
+  double pendulum = std::numeric_limits<double>::quiet_NaN();
 };
 
 class QuanserCard {
@@ -35,8 +38,8 @@ class QuanserCard {
   void clear_counts();
   /// What the card says of itself. A part it does not tell is left out.
   DeviceFacts facts() const;
-  /// Velocities of the encoders in counts per second. A card that measures none returns an error.
-  hil::Error read_velocities(RawVelocities& counts_per_s) const noexcept;
+  /// A card that measures no velocities returns an error.
+  hil::Error read_velocities(RawVelocities& velocities) const noexcept;
 
   hil::Error read_counts(RawCounts& counts) const noexcept;
 
@@ -75,7 +78,8 @@ class QuanserCard {
   hil::Error open_once();
   [[noreturn]] void refuse_opening(hil::Error error) const;
   void require_functions() const;
-  RawCounts counts_of(const std::array<std::int32_t, 2>& read) const noexcept;
+  template <class Raw, class Value>
+  Raw by_encoder(const std::array<Value, 2>& read) const noexcept;
   void set_up_output();
   void set_up_enable();
   void set_up_encoders() const;

@@ -40,14 +40,12 @@ void QuanserTransport::open_card() {
   if (is_new && rig_.calibration.zero_at_start) card_->clear_counts();
   if (!rig_.quanser->is_clock) return;
   sampler_ = std::make_unique<QuanserSampler>(*card_, period_s_, rig_.file.string());
-  sample_read_ = sample_waited_for_ = 0;
+  sample_reader_ = {};
 }
 
 DeviceSample QuanserTransport::wait_next(std::int64_t until_ns) noexcept {
   if (!sampler_) return {};
-  const DeviceSample next = sampler_->samples().wait_for_another(sample_waited_for_, until_ns).when;
-  sample_waited_for_ = next.number;
-  return next;
+  return sample_reader_.wait_next(sampler_->samples(), until_ns);
 }
 
 RigReading QuanserTransport::read() noexcept {
@@ -84,11 +82,10 @@ RigReading QuanserTransport::read_sample() noexcept {
     reading.fault = has_expired() ? RigFault::watchdog_expired : fault_of(sample.trouble);
     return reading;
   }
-  if (sample.when.number == sample_read_) {
+  if (!sample_reader_.is_new(sample)) {
     reading.fault = RigFault::link_timeout;
     return reading;
   }
-  sample_read_ = sample.when.number;
   return fresh(reading, {static_cast<std::int32_t>(sample.cart), static_cast<std::int32_t>(sample.pendulum)});
 }
 
@@ -98,8 +95,8 @@ RigFault QuanserTransport::add_velocities(RigReading& reading) noexcept {
   RawVelocities velocities;
   const hil::Error error = card_->read_velocities(velocities);
   if (error < 0) return fault_of(error);
-  if (rig_.quanser->cart_channel) reading.cart_counts_per_s = velocities.cart;
-  if (rig_.quanser->pendulum_channel) reading.pendulum_counts_per_s = velocities.pendulum;
+  reading.cart_counts_per_s = velocities.cart;
+  reading.pendulum_counts_per_s = velocities.pendulum;
   return RigFault::none;
 }
 

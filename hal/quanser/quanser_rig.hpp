@@ -57,8 +57,8 @@ class QuanserTransport final : public Rig {
   std::unique_ptr<QuanserCard> card_;
   std::unique_ptr<QuanserSampler> sampler_;  // null: the computer is the clock
   std::uint64_t sequence_ = 0;
-  std::uint64_t sample_read_ = 0, sample_waited_for_ = 0;  // their numbers
-  std::int64_t served_ns_ = 0;                             // when the watchdog was last
+  SampleReader sample_reader_;
+  std::int64_t served_ns_ = 0;  // when the watchdog was last
   bool watching_ = false, enabled_ = false, stopped_ = true;
 };
 

@@ -57,7 +57,7 @@ class EventPeriod {
 
   /// One step in every lane that is within a period.
   [[gnu::flatten]] void advance(Steps& steps) const {
-    const LaneMask stay = steps.taken >= Lanes(most_steps);
+    const LaneMask stay = steps.taken >= Lanes(max_steps);
     const Begin begin = begin_of(steps);
     Step step{length_of(steps, begin, stay), {}, {}};
     const auto rate = [&](const State& at, Stage stage) {
@@ -81,7 +81,7 @@ class EventPeriod {
   /// The load grows by some newtons per second: velocities are changed by less than 1e-10 m/s.
   static constexpr double late_breakaway_s = 1e-6;
   /// After so many steps in a period a cart that stops stays at rest until its end: a bound on the work.
-  static constexpr double most_steps = 48.0;
+  static constexpr double max_steps = 48.0;
   /// No step towards a stop is shorter, so that quotients by its length stay finite.
   static constexpr double shortest_s = 1e-12;
   /// A step that is taken again keeps within these parts of its length.

@@ -1,8 +1,9 @@
 #include "coloured_null.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
+
+#include "without_effect.hpp"
 
 namespace upright {
 
@@ -23,19 +24,12 @@ class ColouredNull {
 
   /// What the effect saves beside such a disturbance, after the penalty of its parameters.
   double evidence_of(std::size_t effect) const {
-    Plant plant = with_.train.point.plant;
-    if (const PlantEffect* given = search_.given().find(effect); given != nullptr)
-      plant.set(effect, given->values);
-    else
-      plant.remove(effect);
-    if (!fault_of(plant).empty()) return std::numeric_limits<double>::infinity();
-    std::vector<FreeParameter> others = known_.free;
-    const double parameters = static_cast<double>(
-        std::erase_if(others, [&](const FreeParameter& p) { return p.effect == effect; }));
-    FitPoint point = with_.train.point;
-    convert_initial_states(point.starts, point.plant, plant);
-    point.plant = plant;
-    const FitResult without = fit(all_, point, others, coloured());
+    const FitPoint& with = with_.train.point;
+    if (!fault_of(without_effect(with.plant, effect, search_.given())).empty())
+      return std::numeric_limits<double>::infinity();
+    const FitResult without = fit_without(all_, with, effect, known_.free, search_.given(), coloured());
+    const auto parameters = static_cast<double>(std::count_if(
+        known_.free.begin(), known_.free.end(), [&](const FreeParameter& p) { return p.effect == effect; }));
     const double penalty = search_.policy().acceptance.parameter_penalty * std::max(parameters - 1.0, 0.0);
     return without.objective - with_.train.objective - penalty;
   }

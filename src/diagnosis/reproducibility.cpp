@@ -10,6 +10,7 @@
 #include "belief.hpp"
 #include "estimation/held_out.hpp"
 #include "tails.hpp"
+#include "without_effect.hpp"
 
 namespace upright {
 
@@ -40,13 +41,6 @@ std::vector<Eigen::Index> places_of(std::size_t effect, const std::vector<FreePa
   for (std::size_t j = 0; j < free.size(); ++j)
     if (free[j].effect == effect) places.push_back(static_cast<Eigen::Index>(j));
   return places;
-}
-
-/// The point with another plant and the same motion.
-FitPoint with_plant(FitPoint point, const Plant& plant) {
-  convert_initial_states(point.starts, point.plant, plant);
-  point.plant = plant;
-  return point;
 }
 
 /// The priors of a fit, with what another part says of one effect in the place of its own.
@@ -126,11 +120,12 @@ class Parts {
     result.effect = effect;
     result.transferred_evidence = result.t_value = without_limit;
     result.shows_most.evidence = -without_limit;
-    const std::optional<Plant> absent = without_effect(effect);
-    if (!absent) return result;
+    if (!is_removable(effect)) return result;
     std::size_t contradicts = 0;
     for (std::size_t i = 0; i < parts_.size(); ++i) {
-      const FitResult without = fit_without(parts_[i], effect);
+      const Part& part = parts_[i];
+      const FitResult without =
+          fit_without(part.data, part.with.point, effect, free_, given_, parameters_only());
       note_savings(parts_[i], without, result);
       if (parts_.size() < 2 || !is_excited(parts_[1 - i], effect)) continue;
       const Saving saved = transferred(parts_[1 - i], parts_[i], effect, without);
@@ -146,26 +141,9 @@ class Parts {
   }
 
  private:
-  /// The fitted plant of a part without one effect: with what the plant file says of it instead.
-  Plant absent_of(Plant plant, std::size_t effect) const {
-    const PlantEffect* given = given_.find(effect);
-    if (given != nullptr)
-      plant.set(effect, given->values);
-    else
-      plant.remove(effect);
-    return plant;
-  }
-  /// None where the others cannot be without it.
-  std::optional<Plant> without_effect(std::size_t effect) const {
-    const Plant plant = absent_of(parts_.front().with.point.plant, effect);
-    return fault_of(plant).empty() ? std::optional(plant) : std::nullopt;
-  }
-
-  FitResult fit_without(const Part& part, std::size_t effect) const {
-    std::vector<FreeParameter> others = free_;
-    std::erase_if(others, [&](const FreeParameter& p) { return p.effect == effect; });
-    return fit(part.data, with_plant(part.with.point, absent_of(part.with.point.plant, effect)), others,
-               parameters_only());
+  /// Whether the others can be without it.
+  bool is_removable(std::size_t effect) const {
+    return fault_of(without_effect(parts_.front().with.point.plant, effect, given_)).empty();
   }
 
   bool is_excited(const Part& part, std::size_t effect) const {
@@ -180,7 +158,7 @@ class Parts {
     plant.set(effect, from.with.point.plant.find(effect)->values);
     FitOptions options = parameters_only();
     options.joint_prior = prior_from(from, effect, free_);
-    const FitResult with = fit(to.data, with_plant(to.with.point, plant), free_, options);
+    const FitResult with = fit(to.data, moved_to(to.with.point, plant), free_, options);
     return saved_over(without, with, static_cast<double>(places_of(effect, free_).size()));
   }
 

@@ -11,19 +11,13 @@
 #include "model/dense_algebra.hpp"
 #include "phases.hpp"
 #include "plausibility.hpp"
+#include "without_effect.hpp"
 
 namespace upright {
 
 namespace {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
-
-/// The same motion with another plant, whose sensors may show it otherwise.
-FitPoint moved_to(FitPoint point, const Plant& plant) {
-  convert_initial_states(point.starts, point.plant, plant);
-  point.plant = plant;
-  return point;
-}
 
 std::set<std::size_t> effects_of_both(const Hypothesis& first, const Hypothesis& second) {
   std::set<std::size_t> effects = first.added;
@@ -439,12 +433,7 @@ Hypothesis Search::exchanged(const Hypothesis& base, std::size_t effect,
 Hypothesis Search::without(const Hypothesis& base, std::size_t effect) {
   std::set<std::size_t> added = base.added;
   added.erase(effect);
-  Plant plant = base.train.point.plant;
-  if (const PlantEffect* given = plant_.find(effect)) {
-    plant.set(effect, given->values);
-  } else {
-    plant.remove(effect);
-  }
+  const Plant plant = without_effect(base.train.point.plant, effect, plant_);
   Hypothesis h;
   h.train.objective = infinity;
   if (!fault_of(plant).empty()) return h;

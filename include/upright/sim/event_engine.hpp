@@ -64,8 +64,7 @@ class EventEngine {
       const PlantState<double> plain_next =
           quick ? rk4(plain_, plain_state(state_), value_of(drive_), value_of(step), &plain_begin)
                 : plain_state(next);
-      const FirstRate rate = quick ? FirstRate{plain_begin->cart_mps, plain_begin->theta_radps}
-                                   : FirstRate{value_of(begin->cart_mps), value_of(begin->theta_radps)};
+      const PlantState<double> rate = quick ? *plain_begin : plain_state(*begin);
       const auto along = [&](double t) {
         return rk4(plain_, plain_state(state_), value_of(drive_), t, &plain_begin);
       };
@@ -107,8 +106,7 @@ class EventEngine {
       const double step = even_step(end_s - time_s_, std::min(rate_step(rate), max_step_s));
       const auto along = [&](double t) { return driven_rk4(command, lag, t).end; };
       const DrivenStep driven = driven_rk4(command, lag, step);
-      auto found =
-          first_event(driven.end, {driven.first.cart_mps, driven.first.theta_radps}, step, held, along);
+      auto found = first_event(driven.end, driven.first, step, held, along);
       WatchList corner_list;
       corners_.watch(command(time_s_, state_), corner_list);
       for (const Watch& watch : corner_list) {
@@ -195,12 +193,6 @@ class EventEngine {
   /// The rate at the beginning of a step, once it is known.
   template <class T>
   using BeginRate = std::optional<PlantState<T>>;
-
-  /// Accelerations at the beginning of a step.
-  struct FirstRate {
-    double cart_mps2 = 0.0;
-    double theta_radps2 = 0.0;
-  };
 
   /// Voltage at the motor for constant drive at the nodes of a Runge-Kutta step (beginning, middle, end)
   /// and after the step.
@@ -489,10 +481,11 @@ class EventEngine {
     return dense;
   }
 
-  /// The first event within a step that ends at `end`; `along(t)` is the state at a time within it.
+  /// The first event within a step that ends at `end`; `rate` is that at its beginning, `along(t)` the state
+  /// at a time within it.
   template <class Along>
-  std::optional<Found> first_event(const PlantState<double>& end, const FirstRate& rate, double h, bool held,
-                                   const Along& along) const {
+  std::optional<Found> first_event(const PlantState<double>& end, const PlantState<double>& rate, double h,
+                                   bool held, const Along& along) const {
     const double v = value_of(state_.cart_mps);
     const double omega = value_of(state_.theta_radps);
     const WatchList list = next_events(plain_, v, omega, contacts_, options_, held);
@@ -514,7 +507,7 @@ class EventEngine {
       if (!cart && !pivot) continue;
       // The velocity may change sign twice within the step.
       const double from = watch.sign * (cart ? v : omega);
-      const double slope = watch.sign * (cart ? rate.cart_mps2 : rate.theta_radps2);
+      const double slope = watch.sign * (cart ? rate.cart_mps : rate.theta_radps);
       if (!(from > 0.0 && from + 0.5 * h * slope <= 0.0)) continue;
       const double curvature = (-at_end - from - slope * h) / (h * h);
       const double lowest_s = -slope / (2.0 * curvature);
