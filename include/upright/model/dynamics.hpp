@@ -226,7 +226,8 @@ class Dynamics {
   /// The motion before the cart's dry friction acts, for engines whose lanes differ in the modes of their
   /// contacts.
   struct Balance {
-    S sine, cosine;  ///< of the angle
+    S sine;          ///< of the angle
+    S cosine;        ///< of the angle
     S force;         ///< on the cart, without dry friction [N]
     S torque;        ///< about the pivot, without gravity [N m]
   };
