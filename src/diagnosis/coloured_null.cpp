@@ -28,10 +28,7 @@ class ColouredNull {
     if (!fault_of(without_effect(with.plant, effect, search_.given())).empty())
       return std::numeric_limits<double>::infinity();
     const FitResult without = fit_without(all_, with, effect, known_.free, search_.given(), coloured());
-    const auto parameters = static_cast<double>(std::count_if(
-        known_.free.begin(), known_.free.end(), [&](const FreeParameter& p) { return p.effect == effect; }));
-    const double penalty = search_.policy().acceptance.parameter_penalty * std::max(parameters - 1.0, 0.0);
-    return without.objective - with_.train.objective - penalty;
+    return without.objective - with_.train.objective - search_.penalty_of(known_, effect);
   }
 
   double certainty_of(std::size_t effect) const { return search_.certainty(with_, effect); }

@@ -11,8 +11,8 @@
 #include "adequacy.hpp"
 #include "base/parallel.hpp"
 #include "base_numbers.hpp"
-#include "coloured_null.hpp"
 #include "detectable.hpp"
+#include "disturbance_null.hpp"
 #include "estimation/held_out.hpp"
 #include "estimation/smoother.hpp"
 #include "indistinguishable.hpp"
@@ -261,8 +261,8 @@ class Diagnostician {
           worst = &r;
       if (worst != nullptr) {
         withdraw(worst->effect, worst->where);
-      } else if (const auto outdone = outdone_by_coloured_noise(search_, known_, reproductions_)) {
-        withdraw(*outdone, "a disturbance that varies slowly accounts for these data as well");
+      } else if (const auto outdone = outdone_by_disturbance(search_, known_, reproductions_)) {
+        withdraw(outdone->effect, outdone->where);
       } else {
         options_.tell(0.94, "measuring the gap");
         listing_ = list_effects(search_, final_, all_found());

@@ -253,6 +253,12 @@ double Search::certainty(const Hypothesis& h, std::size_t effect) const {
          std::sqrt(std::max(held, 1.0));
 }
 
+double Search::penalty_of(const Hypothesis& h, std::size_t effect) const {
+  const auto parameters = std::count_if(h.free.begin(), h.free.end(),
+                                        [&](const FreeParameter& p) { return p.effect == effect; });
+  return policy_.acceptance.parameter_penalty * std::max(static_cast<double>(parameters) - 1.0, 0.0);
+}
+
 void Search::predict_held_out(Hypothesis& h) const {
   filter_held_out(h, h.train.point.noise);
   if (std::isfinite(h.train.objective))

@@ -126,6 +126,8 @@ class Search {
   /// How many standard errors the size of an effect is from nothing: from what the plant file says, of a
   /// correction. Its other parameters (a shape, a place) are held: without a size they mean nothing.
   double certainty(const Hypothesis& h, std::size_t effect) const;
+  /// What the free parameters of an effect beyond the first must save [evidence].
+  double penalty_of(const Hypothesis& h, std::size_t effect) const;
 
  private:
   void choose_screening_subset(std::size_t stride);

@@ -90,6 +90,10 @@ struct SearchBudget {
   /// [pitches] The pitches from which fits start. Chosen.
   std::size_t max_pitches = 2;
 
+  /// [nodes] The nodes along the travel of a random force of the track. A force that changes within the
+  /// hundredth part of the travel is still resolved; the work grows with the cube of the number. Chosen.
+  std::size_t track_nodes = 128;
+
   /// [draws] The noise draws for the floor of a plain simulation. The largest draw is the limit of what noise
   /// can cause. Chosen.
   std::size_t floor_draws = 32;

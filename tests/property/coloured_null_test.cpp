@@ -5,8 +5,7 @@
 #include <set>
 
 #include "blind_case.hpp"
-#include "upright/diagnosis/diagnosis.hpp"
-#include "upright/model/registry.hpp"
+#include "named_effects.hpp"
 
 namespace upright {
 namespace {
@@ -37,17 +36,10 @@ std::vector<Measurement> disturbed_runs(Plant plant, unsigned seed) {
   return runs;
 }
 
-/// Effects that are named and are no numbers of the plant file.
-std::set<std::string> named(const std::vector<Measurement>& runs, const Plant& believed = file_plant()) {
-  std::set<std::string> names;
-  for (const FoundEffect& effect : diagnose(believed, runs, {}).effects)
-    if (effect_registry()[effect.effect].enters != Enters::parameter) names.insert(kind_of(effect.effect));
-  return names;
-}
-
 TEST(ColouredNull, ALastingDisturbanceIsNoEffect) {
   for (const unsigned seed : {1, 2, 3, 4, 5, 6})
-    EXPECT_EQ(named(disturbed_runs(file_plant(), seed)), std::set<std::string>{}) << seed;
+    EXPECT_EQ(named_effects(disturbed_runs(file_plant(), seed), file_plant()), std::set<std::string>{})
+        << seed;
 }
 
 /// A rig of a laboratory on which nothing is hidden. With white noise alone a constant force was named.
@@ -57,14 +49,15 @@ TEST(ColouredNull, ADisturbedRigWithoutAnEffectGetsNone) {
   request.size = static_cast<blind::Size>(std::mt19937_64(request.seed)() % 3);
   request.condition = blind::Condition::laboratory;
   const blind::Case blind = make_case(request);
-  EXPECT_EQ(named(measure_all(blind), blind.believed), std::set<std::string>{});
+  EXPECT_EQ(named_effects(measure_all(blind), blind.believed), std::set<std::string>{});
 }
 
 TEST(ColouredNull, AnEffectIsNamedBesideALastingDisturbance) {
   Plant plant = file_plant();
   plant.set("coulomb_friction", {0.6});
   for (const unsigned seed : {1, 2, 3})
-    EXPECT_TRUE(named(disturbed_runs(plant, seed)).contains("coulomb_friction")) << seed;
+    EXPECT_TRUE(named_effects(disturbed_runs(plant, seed), file_plant()).contains("coulomb_friction"))
+        << seed;
 }
 
 }  // namespace

@@ -1,0 +1,23 @@
+// Whether a disturbance that no effect describes accounts for the data as well as an effect that was found.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "reproducibility.hpp"
+
+namespace upright {
+
+/// An effect, and what does as well as it.
+struct OutdoneEffect {
+  std::size_t effect = 0;  ///< number in the registry
+  std::string where;       ///< a sentence for the listing of effects that help here only
+};
+
+/// One of these effects that a disturbance outdoes: one that varies slowly (coloured_null.hpp), or one that
+/// belongs to the place (place_null.hpp). `known`: a fit to all data.
+std::optional<OutdoneEffect> outdone_by_disturbance(const Search& search, const Hypothesis& known,
+                                                    const std::vector<Reproduction>& effects);
+
+}  // namespace upright

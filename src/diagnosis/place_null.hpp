@@ -1,0 +1,22 @@
+// Whether a random force that belongs to the place accounts for the data as well as an effect that was found.
+//
+// Every track is a little rough: its force depends on the place, and is the same whenever the cart passes it.
+// The likelihood counts each pass as new evidence, so an effect that resembles the track's force, such as a
+// cogging force of the best pitch, is found with more evidence the longer the record is. So each effect is
+// tested once more beside a random force of the place, whose values are integrated out. Values of the
+// parameters stay those of the fit without it.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "reproducibility.hpp"
+
+namespace upright {
+
+/// Of these effects, the one that such a force leaves the least evidence, if that is less than an effect
+/// needs. `known`: a fit to all data. Corrections of the plant file's numbers are not tested.
+std::optional<std::size_t> outdone_by_place(const Search& search, const Hypothesis& known,
+                                            const std::vector<Reproduction>& effects);
+
+}  // namespace upright

@@ -1,0 +1,56 @@
+// A track that is a little rough is not taken for an effect, and an effect is still found on it.
+#include <gtest/gtest.h>
+
+#include "blind_run.hpp"
+#include "named_effects.hpp"
+
+namespace upright {
+namespace {
+
+Plant file_plant() {
+  Plant plant;
+  plant.cart_mass_kg = 0.815;
+  plant.motor = {1.7189, 7.682};
+  plant.set("viscous_friction", {3.0});
+  plant.set("coulomb_friction", {0.4});
+  return plant;
+}
+
+/// Runs on a track whose force has a standard deviation of 0.08 N.
+std::vector<Measurement> runs_on_rough_track(const Plant& plant, unsigned seed) {
+  blind::Rig rig{.plant = plant};
+  rig.rough_n = 0.08;
+  rig.rough_length_m = 0.015;
+  rig.track_seed = seed;
+  std::vector<Measurement> runs;
+  for (unsigned r = 0; r < 3; ++r) {
+    blind::Plan plan;
+    plan.experiment = r == 1 ? blind::Experiment::square : blind::Experiment::multisine;
+    plan.rate_hz = 200.0;
+    plan.duration_s = 6.0;
+    plan.seed = 100 * seed + r;
+    runs.push_back(measure(rig, plan, std::string("run").append(std::to_string(r))));
+  }
+  return runs;
+}
+
+TEST(PlaceNull, ARoughTrackIsNoEffect) {
+  for (const unsigned seed : {1, 2, 3, 4, 5, 6})
+    EXPECT_EQ(named_effects(runs_on_rough_track(file_plant(), seed), file_plant()), std::set<std::string>{})
+        << seed;
+}
+
+TEST(PlaceNull, AnEffectIsNamedOnARoughTrack) {
+  Plant cogging = file_plant(), spring = file_plant();
+  cogging.set("cogging_force", {0.25, 0.03, 1.0});
+  spring.set("cable_spring", {8.0, 0.0});
+  for (const unsigned seed : {1, 2, 3}) {
+    EXPECT_TRUE(named_effects(runs_on_rough_track(cogging, seed), file_plant()).contains("cogging_force"))
+        << seed;
+    EXPECT_TRUE(named_effects(runs_on_rough_track(spring, seed), file_plant()).contains("cable_spring"))
+        << seed;
+  }
+}
+
+}  // namespace
+}  // namespace upright
