@@ -254,8 +254,8 @@ double Search::certainty(const Hypothesis& h, std::size_t effect) const {
 }
 
 double Search::penalty_of(const Hypothesis& h, std::size_t effect) const {
-  const auto parameters = std::count_if(h.free.begin(), h.free.end(),
-                                        [&](const FreeParameter& p) { return p.effect == effect; });
+  const auto parameters =
+      std::count_if(h.free.begin(), h.free.end(), [&](const FreeParameter& p) { return p.effect == effect; });
   return policy_.acceptance.parameter_penalty * std::max(static_cast<double>(parameters) - 1.0, 0.0);
 }
 
