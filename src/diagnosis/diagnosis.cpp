@@ -18,6 +18,7 @@
 #include "indistinguishable.hpp"
 #include "listing.hpp"
 #include "next_experiment.hpp"
+#include "place_null.hpp"
 #include "plant_scale.hpp"
 #include "plausibility.hpp"
 #include "reproducibility.hpp"
@@ -329,6 +330,8 @@ class Diagnostician {
     std::stable_sort(result_.candidates.begin(), result_.candidates.end(),
                      [](const auto& a, const auto& b) { return a.evidence > b.evidence; });
     note_doubtful_numbers();
+    if (tests.beyond_sensors)
+      if (const auto left = place_force_left(search_, known_)) result_.notes.push_back(*left);
     opened_ = open_effects(search_, final_, all);
     result_.detectable = detectable_sizes(search_, final_, opened_);
     decide(tests);

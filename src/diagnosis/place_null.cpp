@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <sstream>
 
 #include "estimation/place_force.hpp"
 #include "without_effect.hpp"
@@ -70,8 +71,10 @@ class TrackForce {
 
   /// Whether there is any: a force of zero is not the most likely one.
   bool is_there() const { return variance_ > 0.0; }
-  /// Of the likelihood at the fit that it was estimated at.
+  /// Of minus twice the log likelihood at the fit that it was estimated at.
   double change() const { return change_; }
+  double deviation_n() const { return std::sqrt(variance_); }
+  double length_m() const { return length_m_; }
 
   /// The same at another fit.
   double change_at(const PlaceForceEquations& equations) const {
@@ -117,7 +120,8 @@ class PlaceNull {
     track_.emplace(place_force_equations(all_, known.train.point, nodes_), nodes_);
   }
 
-  bool has_track_force() const { return track_ && track_->is_there(); }
+  /// Null if there is none.
+  const TrackForce* track_force() const { return track_ && track_->is_there() ? &*track_ : nullptr; }
 
   /// What the effect saves beside the force, after the penalty of its parameters.
   double evidence_of(std::size_t effect) const {
@@ -151,13 +155,27 @@ std::optional<std::size_t> outdone_by_place(const Search& search, const Hypothes
   for (const Reproduction& found : effects) {
     if (search.is_nuisance(found.effect)) continue;
     if (!null) null.emplace(search, known);
-    if (!null->has_track_force()) break;
+    if (null->track_force() == nullptr) break;
     const double evidence = null->evidence_of(found.effect);
     if (!(evidence < least)) continue;
     least = evidence;
     worst = found.effect;
   }
   return worst;
+}
+
+std::optional<std::string> place_force_left(const Search& search, const Hypothesis& known) {
+  if (known.train.point.starts.size() != search.all_data().segments.size()) return std::nullopt;
+  const PlaceNull null(search, known);
+  const TrackForce* track = null.track_force();
+  if (track == nullptr || !(-track->change() > search.policy().acceptance.min_evidence)) return std::nullopt;
+  constexpr double mm_per_m = 1000.0;
+  std::ostringstream text;
+  text.precision(2);
+  text << "the residual depends on the place: a random force of the track, with a standard deviation of "
+       << track->deviation_n() << " N and a correlation length of " << mm_per_m * track->length_m()
+       << " mm, accounts for a part of it";
+  return text.str();
 }
 
 }  // namespace upright

@@ -8,6 +8,7 @@
 #pragma once
 
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "reproducibility.hpp"
@@ -18,5 +19,8 @@ namespace upright {
 /// needs. `known`: a fit to all data. Corrections of the plant file's numbers are not tested.
 std::optional<std::size_t> outdone_by_place(const Search& search, const Hypothesis& known,
                                             const std::vector<Reproduction>& effects);
+
+/// A sentence on the random force of the place that is left, if there is one. `known`: a fit to all data.
+std::optional<std::string> place_force_left(const Search& search, const Hypothesis& known);
 
 }  // namespace upright
