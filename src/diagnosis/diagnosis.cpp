@@ -262,7 +262,7 @@ class Diagnostician {
           worst = &r;
       if (worst != nullptr) {
         withdraw(worst->effect, worst->where);
-      } else if (const auto outdone = outdone_by_disturbance(search_, known_, reproductions_)) {
+      } else if (const auto outdone = outdone_by_disturbance(search_, known_, final_, reproductions_)) {
         withdraw(outdone->effect, outdone->where);
       } else {
         options_.tell(0.94, "measuring the gap");

@@ -42,6 +42,10 @@ std::optional<std::size_t> raising_effect(const HeldOutError& error, const std::
 
 }  // namespace
 
+double held_out_error(Search& search, const Hypothesis& judged, const std::vector<std::size_t>& effects) {
+  return HeldOutError(search, judged).of(effects, true);
+}
+
 Listing list_effects(Search& search, const Hypothesis& judged, const std::vector<std::size_t>& effects) {
   const HeldOutError error(search, judged);
   Listing listing;

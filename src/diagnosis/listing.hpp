@@ -27,6 +27,10 @@ struct Listing {
 };
 
 /// Adds these effects in this order.
+/// Root mean square error of a plain simulation of held-out data with these effects [noise standard
+/// deviations].
+double held_out_error(Search& search, const Hypothesis& judged, const std::vector<std::size_t>& effects);
+
 Listing list_effects(Search& search, const Hypothesis& judged, const std::vector<std::size_t>& effects);
 
 }  // namespace upright

@@ -9,6 +9,7 @@
 #include <sstream>
 
 #include "estimation/place_force.hpp"
+#include "listing.hpp"
 #include "without_effect.hpp"
 
 namespace upright {
@@ -144,9 +145,21 @@ class PlaceNull {
   std::optional<TrackForce> track_;
 };
 
+/// Whether a simulation of held-out data without the effect is far worse.
+bool is_needed(Search& search, const Hypothesis& judged, const std::vector<Reproduction>& effects,
+               std::size_t effect) {
+  std::vector<std::size_t> all, others;
+  for (const Reproduction& other : effects) {
+    all.push_back(other.effect);
+    if (other.effect != effect) others.push_back(other.effect);
+  }
+  return held_out_error(search, judged, others) >
+         search.policy().power.clear_gap * held_out_error(search, judged, all);
+}
+
 }  // namespace
 
-std::optional<std::size_t> outdone_by_place(const Search& search, const Hypothesis& known,
+std::optional<std::size_t> outdone_by_place(Search& search, const Hypothesis& known, const Hypothesis& judged,
                                             const std::vector<Reproduction>& effects) {
   std::optional<std::size_t> worst;
   if (known.train.point.starts.size() != search.all_data().segments.size()) return worst;
@@ -157,7 +170,7 @@ std::optional<std::size_t> outdone_by_place(const Search& search, const Hypothes
     if (!null) null.emplace(search, known);
     if (null->track_force() == nullptr) break;
     const double evidence = null->evidence_of(found.effect);
-    if (!(evidence < least)) continue;
+    if (!(evidence < least) || is_needed(search, judged, effects, found.effect)) continue;
     least = evidence;
     worst = found.effect;
   }

@@ -16,8 +16,10 @@
 namespace upright {
 
 /// Of these effects, the one that such a force leaves the least evidence, if that is less than an effect
-/// needs. `known`: a fit to all data. Corrections of the plant file's numbers are not tested.
-std::optional<std::size_t> outdone_by_place(const Search& search, const Hypothesis& known,
+/// needs. An effect without which a simulation of held-out data is far worse stays: as an average of the
+/// track's force the model needs it. `known`: a fit to all data, `judged`: to the training data. Corrections
+/// of the plant file's numbers are not tested.
+std::optional<std::size_t> outdone_by_place(Search& search, const Hypothesis& known, const Hypothesis& judged,
                                             const std::vector<Reproduction>& effects);
 
 /// A sentence on the random force of the place that is left, if there is one. `known`: a fit to all data.

@@ -24,16 +24,7 @@ std::vector<Measurement> disturbed_runs(Plant plant, unsigned seed) {
   blind::Rig rig{.plant = plant};
   rig.coloured.force_n = 0.15;
   rig.coloured.force_time_s = 0.2;
-  std::vector<Measurement> runs;
-  for (unsigned r = 0; r < 3; ++r) {
-    blind::Plan plan;
-    plan.experiment = r == 1 ? blind::Experiment::square : blind::Experiment::multisine;
-    plan.rate_hz = 200.0;
-    plan.duration_s = 4.0;
-    plan.seed = 100 * seed + r;
-    runs.push_back(measure(rig, plan, std::string("run").append(std::to_string(r))));
-  }
-  return runs;
+  return three_runs(rig, 4.0, seed);
 }
 
 TEST(ColouredNull, ALastingDisturbanceIsNoEffect) {

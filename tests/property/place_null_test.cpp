@@ -1,7 +1,6 @@
 // A track that is a little rough is not taken for an effect, and an effect is still found on it.
 #include <gtest/gtest.h>
 
-#include "blind_run.hpp"
 #include "named_effects.hpp"
 
 namespace upright {
@@ -22,16 +21,7 @@ std::vector<Measurement> runs_on_rough_track(const Plant& plant, unsigned seed) 
   rig.rough_n = 0.08;
   rig.rough_length_m = 0.015;
   rig.track_seed = seed;
-  std::vector<Measurement> runs;
-  for (unsigned r = 0; r < 3; ++r) {
-    blind::Plan plan;
-    plan.experiment = r == 1 ? blind::Experiment::square : blind::Experiment::multisine;
-    plan.rate_hz = 200.0;
-    plan.duration_s = 6.0;
-    plan.seed = 100 * seed + r;
-    runs.push_back(measure(rig, plan, std::string("run").append(std::to_string(r))));
-  }
-  return runs;
+  return three_runs(rig, 6.0, seed);
 }
 
 TEST(PlaceNull, ARoughTrackIsNoEffect) {
