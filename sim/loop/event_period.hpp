@@ -15,6 +15,7 @@
 #pragma once
 
 #include "lane_model.hpp"
+#include "upright/sim/loop/loop_run.hpp"
 #include "upright/sim/runge_kutta.hpp"
 
 namespace upright {
@@ -22,7 +23,7 @@ namespace upright {
 template <class Present>
 class EventPeriod {
  public:
-  EventPeriod(const PlantModel<Lanes>& model, const Present& present)
+  EventPeriod(const LoopSetup& /*setup*/, const PlantModel<Lanes>& model, const Present& present)
       : physics_(model, present), sticks_(may_stick<Present> && physics_.cart_can_stick()) {}
 
   using State = PlantState<Lanes>;

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <cmath>
 #include <cstdlib>
 #include <map>
 #include <string_view>
@@ -16,8 +17,8 @@ namespace {
 /// One compilation of the lanes.
 struct LaneBuild {
   std::size_t (*runs_side_by_side)();
-  void (*run)(const LoopSetup& setup, const LaneParts& parts, std::span<const LoopCase> cases,
-              std::span<LoopResult> results);
+  void (*run)(const LoopSetup& setup, const LaneParts& parts, std::span<const PlantModel<double>> plants,
+              std::span<const LoopCase> cases, std::span<LoopResult> results);
 };
 
 constexpr LaneBuild baseline{baseline_lanes::runs_side_by_side, baseline_lanes::run};
@@ -80,6 +81,8 @@ FeedbackPrediction prediction_of(const ModelParts& parts, const Gains& gains, Pl
 
 LaneParts parts_of(const LoopSetup& setup, std::span<const LoopCase> cases) {
   LaneParts made;
+  made.own_pace = lanes_refill(setup);
+  if (!setup.make_parts) return made;
   ControlConfig control = setup.control;
   if (control.has_state_estimator()) {
     const ModelParts parts = setup.make_parts(control);
@@ -97,6 +100,19 @@ LaneParts parts_of(const LoopSetup& setup, std::span<const LoopCase> cases) {
     made.prediction_of.push_back(at->second);
   }
   return made;
+}
+
+/// Whether lanes may have these two plants at once. The input delay is the same in all lanes, and some
+/// effects treat parameters that are whole numbers (an exponent of 2, the kind of a table) specially, if all
+/// lanes have them.
+bool may_mix(const PlantModel<double>& one, const PlantModel<double>& other) {
+  if (Dynamics<double>(one).input_delay_s() != Dynamics<double>(other).input_delay_s()) return false;
+  const auto is_whole = [](double number) { return number == std::round(number); };
+  for (std::size_t i = 0; i < all_parameter_count; ++i) {
+    const double a = one.parameters[i], b = other.parameters[i];
+    if (a != b && (is_whole(a) || is_whole(b))) return false;
+  }
+  return true;
 }
 
 }  // namespace
@@ -117,9 +133,33 @@ std::size_t runs_side_by_side(LaneRegisters registers) {
   return lanes_for(registers).runs_side_by_side();
 }
 
+bool lanes_refill(const LoopSetup& setup) {
+  if (!setup.sampled) return true;
+  const Dynamics<double> physics(setup.model);
+  // Encoder steps let the voltage jump, and the cart reverse, in most periods; so do predictors of long
+  // delays.
+  const bool jumps = setup.cart_resolution_m > 0.0 || setup.angle_resolution_rad > 0.0 ||
+                     setup.control.compensation.kind != CompensationKind::none;
+  const bool reverses = jumps && physics.cart_has_kink() && setup.model.smoothing == 0.0;
+  return physics.cart_can_stick() || reverses;
+}
+
 void run_on_lanes(const LoopSetup& setup, std::span<const LoopCase> cases, std::span<LoopResult> results,
                   LaneRegisters registers) {
-  lanes_for(registers).run(setup, setup.make_parts ? parts_of(setup, cases) : LaneParts{}, cases, results);
+  run_plants_on_lanes(setup, std::span(&setup.model, 1), cases, results, registers);
+}
+
+void run_plants_on_lanes(const LoopSetup& setup, std::span<const PlantModel<double>> plants,
+                         std::span<const LoopCase> cases, std::span<LoopResult> results,
+                         LaneRegisters registers) {
+  if (cases.empty()) return;
+  const LaneParts parts = parts_of(setup, cases);
+  for (std::size_t first = 0, end = 0; first < plants.size(); first = end) {
+    for (end = first + 1; end < plants.size() && may_mix(plants[first], plants[end]);) ++end;
+    const std::size_t count = end - first;
+    lanes_for(registers).run(setup, parts, plants.subspan(first, count), cases,
+                             results.subspan(first * cases.size(), count * cases.size()));
+  }
 }
 
 }  // namespace upright
