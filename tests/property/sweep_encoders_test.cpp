@@ -211,8 +211,10 @@ TEST_P(SweepEncodersApart, RefilledLanesGiveTheSameBitsInAnyOrder) {
   LoopSetup setup = SweepEncoders::setup();
   ASSERT_TRUE(lanes_refill(setup));
   setup.duration_s = 1.5;
+  setup.fell_above_rad = 0.3;
+  setup.amplifier_limit_v = 2.0;
   std::vector<LoopCase> cases = random_cases(60, 0.06, 27);
-  for (std::size_t i = 0; i < cases.size(); i += 2) cases[i] = {0.5 + 0.001 * static_cast<double>(i), 0.2};
+  for (std::size_t i = 0; i < cases.size(); i += 2) cases[i] = {0.28 + 0.0003 * static_cast<double>(i), 0.2};
   const std::vector<LoopCase> reversed(cases.rbegin(), cases.rend());
   for (const LaneRegisters registers : {LaneRegisters::wide, LaneRegisters::baseline}) {
     std::vector<LoopResult> forward(cases.size()), backward(cases.size()), alone(1);
