@@ -103,7 +103,7 @@ class SmoothPeriod {
     advance(steps.state, drive.late_v, drive.late_s);
   }
 
-  SmoothPeriod(const LoopSetup& /*setup*/, const PlantModel<Lanes>& model, const Present& present)
+  SmoothPeriod(const LaneParts& /*parts*/, const PlantModel<Lanes>& model, const Present& present)
       : physics_(model, present) {
     const double smoothing = model.smoothing;
     if (smoothing > 0.0) {
@@ -177,11 +177,12 @@ class SampledRuns {
  public:
   SampledRuns(const LoopSetup& setup, const LaneParts& parts, const Present& present, const LaneRuns& runs)
       : setup_(setup),
+        parts_(parts),
         present_(present),
         runs_(runs),
         model_(on_lanes(runs.plants[0])),
         chain_(model_),
-        period_(setup, model_, present),
+        period_(parts, model_, present),
         observer_(setup, parts),
         delay_(runs.cases, setup.control.period_s()),
         input_(chain_, setup.control.period_s()),
@@ -259,7 +260,7 @@ class SampledRuns {
     plant_of_[lane] = plant;
     put_on_lane(model_, lane, runs_.plants[plant]);
     chain_ = Dynamics<Lanes>(model_);
-    period_ = Period(setup_, model_, present_);
+    period_ = Period(parts_, model_, present_);
   }
 
   /// The controllers of these lanes, of which some may be at the start of their runs.
@@ -286,6 +287,7 @@ class SampledRuns {
   }
 
   const LoopSetup& setup_;
+  const LaneParts& parts_;
   const Present& present_;
   LaneRuns runs_;
   PlantModel<Lanes> model_;

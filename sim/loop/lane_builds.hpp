@@ -29,6 +29,7 @@ struct LaneParts {
   std::vector<std::size_t> prediction_of;  ///< by start
   /// Each lane goes at its own pace from event to event; otherwise all lanes go in step.
   bool own_pace = false;
+  bool stiff_bristles = false;  ///< they relax too fast for the classical method
 };
 
 }  // namespace upright
