@@ -155,13 +155,23 @@ TEST(FastLoop, LeavesToTheEventEngineWhatItCannotDo) {
   setup.model = make_model<double>(plant);
   EXPECT_FALSE(lanes_can_run(setup));
   for (const auto& [kind, values] :
-       {std::pair<const char*, std::vector<double>>{"bristle_friction", {1e5, 70.0}},
+       {std::pair<const char*, std::vector<double>>{"bristle_friction", {1e9, 70.0}},
         {"stribeck_friction", {0.43, 1e-4, 2.0}}}) {
     plant = read_plant_file(source + "/config/plants/exponential.yaml");
     plant.set(effect_number(kind), values);
     setup.model = make_model<double>(plant);
     EXPECT_FALSE(lanes_can_run(setup)) << kind;
   }
+}
+
+TEST(FastLoop, TakesStiffBristlesInSampledLoopsOnly) {
+  Plant plant = read_plant_file(source + "/config/plants/dynamic.yaml");
+  plant.set("bristle_friction", {1e5, 70.0});
+  LoopSetup setup = sampled("dynamic");
+  setup.model = make_model<double>(plant);
+  EXPECT_TRUE(lanes_can_run(setup));
+  setup.sampled = false;
+  EXPECT_FALSE(lanes_can_run(setup));
 }
 
 LoopSetup continuous(const std::string& plant, double smoothing = 0.0) {
