@@ -9,8 +9,8 @@
 namespace upright {
 
 /// Whether `run_on_lanes` supports these runs. It excludes the extended Kalman filter, motor lag, dry
-/// friction of the pivot, a cart alone, stiff bristles and other dynamics much faster than a millisecond, and
-/// estimators in a continuous loop.
+/// friction of the pivot, a cart alone, dynamics much faster than a millisecond but for stiff bristles in
+/// sampled loops, and estimators in a continuous loop.
 bool lanes_can_run(const LoopSetup& setup);
 
 /// The target of the lanes: the registers of this processor, fastest, with last digits that differ

@@ -21,6 +21,31 @@ namespace {
 
 constexpr double bar = 1e-6;
 
+PlantState<double> released(const LoopCase& start) {
+  PlantState<double> state;
+  state.theta_rad = start.theta0_rad;
+  return state;
+}
+
+/// How a sampled loop ends on the event engine.
+PlantState<double> event_engine_end(const LoopSetup& setup, const LoopCase& start,
+                                    const EngineOptions& options) {
+  ControlConfig control = setup.control;
+  control.delay_s = start.delay_s;
+  Controller controller(control, setup.amplifier_limit_v,
+                        setup.make_parts ? setup.make_parts(control) : ModelParts{});
+  SampledLoop<EventEngine<double>> loop(setup.model, control.sample_rate_hz, options);
+  loop.start(released(start));
+  loop.advance_to(setup.duration_s, [&](std::uint64_t tick, const Measured& measured) {
+    ControlInput input;
+    input.tick = tick;
+    input.cart_m = measured[0];
+    input.theta_rad = measured[1];
+    return controller.step(input).voltage_v;
+  });
+  return loop.engine().state();
+}
+
 struct Friction {
   const char* name;
   const char* plant;
@@ -59,20 +84,8 @@ class SweepAccuracy : public testing::TestWithParam<Friction> {
     std::vector<LoopResult> lanes(cases.size());
     run_on_lanes(setup, cases, lanes);
     for (std::size_t i = 0; i < cases.size(); ++i) {
-      ControlConfig control = setup.control;
-      control.delay_s = cases[i].delay_s;
-      Controller controller(control, setup.amplifier_limit_v,
-                            setup.make_parts ? setup.make_parts(control) : ModelParts{});
-      SampledLoop<EventEngine<double>> loop(setup.model, control.sample_rate_hz, tight());
-      loop.start(released(cases[i]));
-      loop.advance_to(setup.duration_s, [&](std::uint64_t tick, const Measured& measured) {
-        ControlInput input;
-        input.tick = tick;
-        input.cart_m = measured[0];
-        input.theta_rad = measured[1];
-        return controller.step(input).voltage_v;
-      });
-      expect_near(lanes[i].end, loop.engine().state(), cases[i]);
+      const PlantState<double> truth = event_engine_end(setup, cases[i], tight());
+      expect_near(lanes[i].end, truth, cases[i]);
     }
   }
 
@@ -80,12 +93,6 @@ class SweepAccuracy : public testing::TestWithParam<Friction> {
     EngineOptions options;
     options.max_step_s = 2e-5;
     return options;
-  }
-
-  static PlantState<double> released(const LoopCase& start) {
-    PlantState<double> state;
-    state.theta_rad = start.theta0_rad;
-    return state;
   }
 
   static void expect_near(const PlantState<double>& lane, const PlantState<double>& truth,
@@ -189,24 +196,11 @@ TEST(SweepAccuracyOfBristles, StiffOnesHoldTheBarOn240RandomRuns) {
     stiff += lanes_refill(setup) ? 1 : 0;
     LoopResult lane[1];
     run_on_lanes(setup, start, lane);
-    ControlConfig control = setup.control;
-    control.delay_s = start[0].delay_s;
-    Controller controller(control, setup.amplifier_limit_v);
     EngineOptions options;
     options.max_step_s = 2e-5;
     options.step_fraction = 0.02;
-    SampledLoop<EventEngine<double>> loop(setup.model, control.sample_rate_hz, options);
-    PlantState<double> released;
-    released.theta_rad = start[0].theta0_rad;
-    loop.start(released);
-    loop.advance_to(setup.duration_s, [&](std::uint64_t tick, const Measured& measured) {
-      ControlInput input;
-      input.tick = tick;
-      input.cart_m = measured[0];
-      input.theta_rad = measured[1];
-      return controller.step(input).voltage_v;
-    });
-    const double error = std::abs(lane[0].end.theta_rad - loop.engine().state().theta_rad);
+    const PlantState<double> truth = event_engine_end(setup, start[0], options);
+    const double error = std::abs(lane[0].end.theta_rad - truth.theta_rad);
     EXPECT_LT(error, bar) << start[0].theta0_rad << " rad, " << start[0].delay_s << " s";
     worst = std::max(worst, error);
   }
