@@ -484,12 +484,6 @@ class ContinuousRuns {
                   value(y_.bristle_m)};
   }
 
-  static void put(Lanes& lanes, std::size_t i, double number) {
-    Values values = lanes.values();
-    values[i] = number;
-    lanes = Lanes::load(values.data());
-  }
-
   /// Gives a lane the next run, or rest.
   void take_next(std::size_t i) {
     const std::uint32_t bit = 1u << i;
@@ -564,11 +558,11 @@ class ContinuousRuns {
 
 }  // namespace
 
-void UPRIGHT_LANES::run_continuous_on_lanes(const LoopSetup& setup, std::span<const LoopCase> cases,
-                                            std::span<LoopResult> results) {
-  const PlantModel<Lanes> model = on_lanes(setup.model);
+void UPRIGHT_LANES::run_continuous_on_lanes(const LoopSetup& setup, const PlantModel<double>& plant,
+                                            std::span<const LoopCase> cases, std::span<LoopResult> results) {
+  const PlantModel<Lanes> model = on_lanes(plant);
   const bool sticks = Dynamics<Lanes>(model).cart_can_stick();
-  with_effects(setup.model.present, [&](const auto& present) {
+  with_effects(plant.present, [&](const auto& present) {
     using Present = std::decay_t<decltype(present)>;
     if constexpr (may_stick<Present>)
       if (sticks) return ContinuousRuns<Present, true>(setup, model, present, cases, results).run();

@@ -7,9 +7,9 @@
 
 namespace upright::UPRIGHT_LANES {
 
-/// Any number of runs, side by side, each with its own time, step and delay; a lane whose run has ended
-/// takes the next run. Results do not depend on the runs in other lanes.
-void run_continuous_on_lanes(const LoopSetup& setup, std::span<const LoopCase> cases,
-                             std::span<LoopResult> results);
+/// Any number of runs of a plant, side by side, each with its own time, step and delay; a lane whose run has
+/// ended takes the next run. Results do not depend on the runs in other lanes.
+void run_continuous_on_lanes(const LoopSetup& setup, const PlantModel<double>& plant,
+                             std::span<const LoopCase> cases, std::span<LoopResult> results);
 
 }  // namespace upright::UPRIGHT_LANES

@@ -14,7 +14,9 @@
 //     whole.
 #pragma once
 
+#include "lane_builds.hpp"
 #include "lane_model.hpp"
+#include "lane_relaxation.hpp"
 #include "upright/sim/runge_kutta.hpp"
 
 namespace upright {
@@ -22,8 +24,10 @@ namespace upright {
 template <class Present>
 class EventPeriod {
  public:
-  EventPeriod(const PlantModel<Lanes>& model, const Present& present)
-      : physics_(model, present), sticks_(may_stick<Present> && physics_.cart_can_stick()) {}
+  EventPeriod(const LaneParts& parts, const PlantModel<Lanes>& model, const Present& present)
+      : physics_(model, present),
+        sticks_(may_stick<Present> && physics_.cart_can_stick()),
+        stiff_(parts.stiff_bristles) {}
 
   using State = PlantState<Lanes>;
   using Mask = LaneMask;
@@ -65,7 +69,10 @@ class EventPeriod {
       if (stage == Stage::end) step.last = found;
       return found.of;
     };
-    step.end = runge_kutta_4(rate, steps.state, begin.rate, step.length_s);
+    if (stiff_)
+      step_on_bristles(steps, begin, step);
+    else
+      step.end = runge_kutta_4(rate, steps.state, begin.rate, step.length_s);
     take(steps, begin, step, stay);
     const LaneMask next = (steps.left_s == Lanes(0.0)) & (steps.late_s > Lanes(0.0));
     if (any(next)) {
@@ -84,6 +91,8 @@ class EventPeriod {
   static constexpr double max_steps = 48.0;
   /// No step towards a stop is shorter, so that quotients by its length stay finite.
   static constexpr double shortest_s = 1e-12;
+  /// No step that stiff bristles shorten is shorter: a bound on the work.
+  static constexpr double shortest_on_bristles_s = 2e-6;
   /// A step that is taken again keeps within these parts of its length.
   static constexpr double shortest_part = 0.02, longest_part = 0.98;
 
@@ -136,6 +145,23 @@ class EventPeriod {
     }
     begin.rate = physics_.derivative_by_direction(at, balance, steps.direction);
     return begin;
+  }
+
+  /// A step, shortened to what stiff bristles need, in which their relaxation is exponential.
+  [[gnu::flatten, gnu::noinline]] void step_on_bristles(const Steps& steps, const Begin& begin,
+                                                        Step& step) const {
+    if constexpr (may_have_bristles<Present>) {
+      const LaneBristles bristles = bristles_of(physics_, steps.state, begin.rate, steps.direction);
+      const Lanes shortest = smaller(step.length_s, Lanes(shortest_on_bristles_s));
+      step.length_s = larger(shortest, smaller(step.length_s, bristles.longest_s));
+      const auto rate = [&](const State& at, Stage stage) {
+        const Rate found = rate_of(at, steps.motor_v, steps.direction);
+        if (stage == Stage::end) step.last = found;
+        return found.of;
+      };
+      const LaneRelaxation relaxation(bristles, step.length_s);
+      step.end = runge_kutta_4(rate, steps.state, begin.rate, step.length_s, &relaxation);
+    }
   }
 
   /// One copy for the stages of a step, as in SmoothPeriod.
@@ -202,7 +228,8 @@ class EventPeriod {
     steps.left_s = select(counts, steps.left_s - h - more, steps.left_s);
     steps.longest_s = select(counts, steps.left_s, met.retry_s);
     steps.settles = met.stops & !stay;
-    steps.taken = steps.taken + one;
+    const Lanes met_one = select(met.beyond | met.stops | met.breaks, one, zero);
+    steps.taken = steps.taken + (stiff_ ? met_one : one);
   }
 
   /// Stops within a step and near its end.
@@ -250,6 +277,7 @@ class EventPeriod {
 
   Dynamics<Lanes, Present> physics_;
   bool sticks_;
+  bool stiff_;  ///< bristles relax too fast for the classical method
 };
 
 }  // namespace upright

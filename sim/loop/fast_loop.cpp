@@ -1,6 +1,7 @@
 #include <algorithm>
+#include <bit>
 #include <cmath>
-#include <optional>
+#include <type_traits>
 
 #include "continuous_lanes.hpp"
 #include "control/whole_periods.hpp"
@@ -23,19 +24,20 @@ namespace {
 template <class Mask>
 class LaneDelay {
  public:
-  LaneDelay(std::span<const LoopCase> cases, double period_s) : ring_(longest_of(cases, period_s) + 1) {
-    std::array<double, lane_count> fraction{};
-    for (std::size_t i = 0; i < lane_count; ++i) {
-      const DelayLine line(cases[std::min(i, cases.size() - 1)].delay_s, period_s);
-      whole_[i] = line.whole_periods();
-      fraction[i] = line.fraction();
-      same_ = same_ && whole_[i] == whole_[0];
-      exact_ = exact_ && line.exact();
-    }
-    fraction_ = Lanes::load(fraction.data());
+  /// For runs with delays up to the longest of `cases`.
+  LaneDelay(std::span<const LoopCase> cases, double period_s)
+      : period_s_(period_s), ring_(longest_of(cases, period_s) + 1) {}
+
+  /// Gives one lane this delay.
+  void take(std::size_t lane, double delay_s) {
+    const DelayLine line(delay_s, period_s_);
+    whole_[lane] = line.whole_periods();
+    put(fraction_, lane, line.fraction());
+    same_ = std::all_of(whole_.begin(), whole_.end(), [this](std::size_t of) { return of == whole_[0]; });
+    exact_ = exact_ && line.exact();
   }
 
-  void start(const Lanes& volts) { ring_.fill(volts); }
+  void start(const Mask& lanes, const Lanes& volts) { ring_.fill(lanes, volts); }
 
   Lanes pass(const Mask& lanes, const Lanes& volts) {
     ring_.push(lanes, volts);
@@ -53,6 +55,7 @@ class LaneDelay {
   }
   Lanes back(std::size_t more) const { return same_ ? ring_.ago(whole_[0] + more) : ring_.ago(whole_, more); }
 
+  double period_s_;
   LaneRing<Mask> ring_;
   std::array<std::size_t, lane_count> whole_{};
   Lanes fraction_;
@@ -66,9 +69,9 @@ class LaneInput {
   LaneInput(const Dynamics<Lanes>& chain, double period_s)
       : delay_(whole_periods(chain.input_delay_s().values()[0], period_s)),
         period_s_(period_s),
-        drives_(delay_.whole + 1) {
-    drives_.fill(chain.actuate(Lanes(0.0)));
-  }
+        drives_(delay_.whole + 1) {}
+
+  void start(const Mask& lanes, const Lanes& resting_v) { drives_.fill(lanes, resting_v); }
 
   LaneDrive pass(const Mask& lanes, const Lanes& drive_v) {
     if (delay_.whole == 0 && delay_.fraction == 0.0) return {drive_v, drive_v, 0.0, period_s_};
@@ -100,9 +103,9 @@ class SmoothPeriod {
     advance(steps.state, drive.late_v, drive.late_s);
   }
 
-  SmoothPeriod(const LoopSetup& setup, const PlantModel<Lanes>& model, const Present& present)
+  SmoothPeriod(const LaneParts& /*parts*/, const PlantModel<Lanes>& model, const Present& present)
       : physics_(model, present) {
-    const double smoothing = setup.model.smoothing;
+    const double smoothing = model.smoothing;
     if (smoothing > 0.0) {
       // tanh(smoothing v) turns within about 3 / smoothing; a step may sweep 0.7 / smoothing of it (errors of
       // 1e-8).
@@ -149,71 +152,172 @@ class SmoothPeriod {
   double turning_mps_ = 0.0, sweep_mps_ = 0.0;
 };
 
-EveryLane narrowed(EveryLane lanes, const LaneMask& /*to*/) {
+[[gnu::always_inline]] inline EveryLane narrowed(EveryLane lanes, const LaneMask& /*to*/) {
   return lanes;
 }
-LaneMask narrowed(const LaneMask& lanes, const LaneMask& to) {
+[[gnu::always_inline]] inline LaneMask narrowed(const LaneMask& lanes, const LaneMask& to) {
   return lanes & to;
 }
 
-/// Lanes in step, or each lane at its own pace: whichever has come to the end of its period is controlled.
-template <class Period>
-void run_sampled(const LoopSetup& setup, const Dynamics<Lanes>& chain, const Period& period,
-                 std::span<const LoopCase> cases, std::span<LoopResult> results,
-                 LaneObserver<typename Period::Mask> observer) {
-  using Mask = typename Period::Mask;
-  const double period_s = setup.control.period_s();
-  LaneDelay<Mask> delay(cases, period_s);
-  LaneInput<Mask> input(chain, period_s);
-  LaneResults seen(setup, cases.size());
-  typename Period::Steps steps;
-  PlantState<Lanes>& state = steps.state;
-  std::array<double, lane_count> theta0;
-  for (std::size_t i = 0; i < lane_count; ++i) theta0[i] = cases[std::min(i, cases.size() - 1)].theta0_rad;
-  state.theta_rad = Lanes::load(theta0.data());
-  const Lanes limit(setup.amplifier_limit_v), one(1.0);
-  const Lanes periods(std::round(setup.duration_s * setup.control.sample_rate_hz));
-  Lanes begun(0.0), command(0.0);
-  for (bool first = true;;) {
-    const Mask arrived = narrowed(Period::arrived(steps), begun <= periods);
-    if (any(arrived)) {
-      seen.take(arrived, begun * Lanes(period_s), state);
-      begun = select(arrived, begun + one, begun);
-      if (seen.all_fell() || !any(begun <= periods)) break;
-      const Mask goes_on = narrowed(arrived, begun <= periods);
-      const Outputs<Lanes> shown = chain.measure(state);
-      const Lanes newest = first ? observer.start(shown) : observer.take(goes_on, shown, command);
-      if (first) delay.start(newest);
-      first = false;
-      const Lanes wanted = observer.command_v(goes_on, delay.pass(goes_on, newest), command);
-      command = select(goes_on, smaller(larger(wanted, -limit), limit), command);
-      const LaneDrive drive = input.pass(goes_on, chain.actuate(command));
-      state.motor_v = drive.late_v;
-      Period::begin(steps, goes_on, drive);
-    }
-    period.advance(steps);
-  }
-  seen.finish(state, results);
-}
+/// Runs of several plants from several starts, numbered by plant and then by start.
+struct LaneRuns {
+  std::span<const PlantModel<double>> plants;
+  std::span<const LoopCase> cases;
+  std::span<LoopResult> results;
 
-/// Runs that fit the lanes, from number `first` on.
-template <class Present>
-void run_with(const LoopSetup& setup, const LaneParts& parts, const Present& present, std::size_t first,
-              std::span<const LoopCase> cases, std::span<LoopResult> results) {
-  const PlantModel<Lanes> model = on_lanes(setup.model);
-  const Dynamics<Lanes> chain(model);
-  if constexpr (may_stick<Present> || may_have_bristles<Present>) {
-    // Encoder steps let the voltage jump, and the cart reverse, in most periods; so do predictors of long
-    // delays.
-    const bool jumps =
-        setup.cart_resolution_m > 0.0 || setup.angle_resolution_rad > 0.0 || !parts.predictions.empty();
-    const bool reverses = jumps && chain.cart_has_kink() && setup.model.smoothing == 0.0;
-    if (chain.cart_can_stick() || reverses)
-      return run_sampled(setup, chain, EventPeriod<Present>(model, present), cases, results,
-                         LaneObserver<LaneMask>(setup, parts, first, cases.size()));
+  std::size_t count() const { return plants.size() * cases.size(); }
+  std::size_t plant_of(std::size_t run) const { return run / cases.size(); }
+  std::size_t case_of(std::size_t run) const { return run % cases.size(); }
+};
+
+/// Sampled loops. Lanes go in step, or each at its own pace: then whichever has come to the end of its period
+/// is controlled, and one whose run has ended takes the next run.
+template <class Present, class Period>
+class SampledRuns {
+ public:
+  SampledRuns(const LoopSetup& setup, const LaneParts& parts, const Present& present, const LaneRuns& runs)
+      : setup_(setup),
+        parts_(parts),
+        present_(present),
+        runs_(runs),
+        model_(on_lanes(runs.plants[0])),
+        chain_(model_),
+        period_(parts, model_, present),
+        observer_(setup, parts),
+        delay_(runs.cases, setup.control.period_s()),
+        input_(chain_, setup.control.period_s()),
+        seen_(setup),
+        periods_(std::round(setup.duration_s * setup.control.sample_rate_hz)),
+        begun_(periods_ + Lanes(1.0)) {}
+
+  void run() {
+    const Lanes one(1.0), period_s(setup_.control.period_s());
+    for (std::size_t lane = 0; lane < lane_count; ++lane) take_next(lane);
+    for (;;) {
+      const Mask arrived = narrowed(Period::arrived(steps_), begun_ <= periods_);
+      if (any(arrived)) {
+        seen_.take(arrived, begun_ * period_s, steps_.state);
+        begun_ = select(arrived, begun_ + one, begun_);
+        if (!end_runs()) return;
+        control(narrowed(arrived, (begun_ > Lanes(0.0)) & (begun_ <= periods_)));
+      }
+      period_.advance(steps_);
+    }
   }
-  run_sampled(setup, chain, SmoothPeriod<Present>(setup, model, present), cases, results,
-              LaneObserver<EveryLane>(setup, parts, first, cases.size()));
+
+ private:
+  using Mask = typename Period::Mask;
+  static constexpr bool in_step = std::is_same_v<Mask, EveryLane>;
+
+  /// Ends the runs that have fallen or gone through all their periods. False: none is left.
+  bool end_runs() {
+    const std::uint32_t late = (begun_ > periods_).bits();
+    if constexpr (in_step) {
+      if (seen_.alive() != 0 && late == 0) return true;
+      for (std::size_t lane = 0; lane < std::min(lane_count, runs_.count()); ++lane) finish(lane);
+      return false;
+    }
+    for (std::uint32_t ended = used_ & (late | ~seen_.alive()); ended != 0; ended &= ended - 1) {
+      const auto lane = static_cast<std::size_t>(std::countr_zero(ended));
+      finish(lane);
+      take_next(lane);
+    }
+    return used_ != 0;
+  }
+
+  [[gnu::noinline]] void finish(std::size_t lane) {
+    runs_.results[run_of_[lane]] = seen_.finish(lane, steps_.state);
+  }
+
+  /// Gives a lane the next run, or rest. In step, lanes without a run go along with the last one.
+  [[gnu::noinline]] void take_next(std::size_t lane) {
+    const std::uint32_t bit = 1u << lane;
+    if (next_ == runs_.count() && !in_step) {
+      used_ &= ~bit;
+      put(begun_, lane, periods_.values()[lane] + 1.0);
+      return;
+    }
+    const bool extra = next_ == runs_.count();
+    const std::size_t run = extra ? next_ - 1 : next_++;
+    const LoopCase& start = runs_.cases[runs_.case_of(run)];
+    const std::size_t plant = runs_.plant_of(run);
+    if (plant != plant_of_[lane]) become(lane, plant);
+    if (!extra) {
+      used_ |= bit;
+      seen_.begin(lane);
+    }
+    run_of_[lane] = run;
+    observer_.take_case(lane, runs_.case_of(run));
+    delay_.take(lane, start.delay_s);
+    PlantState<Lanes>& state = steps_.state;
+    for (Lanes* number : {&state.cart_m, &state.cart_mps, &state.theta_radps, &state.bristle_m, &begun_})
+      put(*number, lane, 0.0);
+    put(state.theta_rad, lane, start.theta0_rad);
+  }
+
+  /// Gives a lane this plant.
+  void become(std::size_t lane, std::size_t plant) {
+    plant_of_[lane] = plant;
+    put_on_lane(model_, lane, runs_.plants[plant]);
+    chain_ = Dynamics<Lanes>(model_);
+    period_ = Period(parts_, model_, present_);
+  }
+
+  /// The controllers of these lanes, of which some may be at the start of their runs.
+  [[gnu::flatten, gnu::noinline]] void control(const Mask& lanes) {
+    const Outputs<Lanes> shown = chain_.measure(steps_.state);
+    const LaneMask first = begun_ == Lanes(1.0);
+    const Mask starting = narrowed(lanes, first), going = narrowed(lanes, !first);
+    const bool some_start = any(lanes & first);
+    Lanes newest;
+    if (any(lanes & !first)) newest = observer_.take(going, shown, command_);
+    if (some_start) {
+      const Lanes held = observer_.start(starting, shown);
+      newest = select(starting, held, newest);
+      delay_.start(starting, held);
+      input_.start(starting, chain_.actuate(Lanes(0.0)));
+      command_ = select(starting, Lanes(0.0), command_);
+    }
+    const Lanes limit(setup_.amplifier_limit_v);
+    const Lanes wanted = observer_.command_v(lanes, delay_.pass(lanes, newest), command_);
+    command_ = select(lanes, smaller(larger(wanted, -limit), limit), command_);
+    const LaneDrive drive = input_.pass(lanes, chain_.actuate(command_));
+    steps_.state.motor_v = drive.late_v;
+    Period::begin(steps_, lanes, drive);
+  }
+
+  const LoopSetup& setup_;
+  const LaneParts& parts_;
+  const Present& present_;
+  LaneRuns runs_;
+  PlantModel<Lanes> model_;
+  Dynamics<Lanes> chain_;
+  Period period_;
+  LaneObserver<Mask> observer_;
+  LaneDelay<Mask> delay_;
+  LaneInput<Mask> input_;
+  LaneResults seen_;
+  typename Period::Steps steps_;
+  Lanes periods_, begun_, command_;
+  std::array<std::size_t, lane_count> run_of_{}, plant_of_{};
+  std::size_t next_ = 0;
+  std::uint32_t used_ = 0;  ///< bit i: lane i has a run
+};
+
+template <class Present>
+void run_with(const LoopSetup& setup, const LaneParts& parts, const Present& present, const LaneRuns& runs) {
+  if constexpr (may_stick<Present> || may_have_bristles<Present>)
+    if (parts.own_pace) return SampledRuns<Present, EventPeriod<Present>>(setup, parts, present, runs).run();
+  // One plant and one group after the other: smooth lanes share their substeps.
+  for (std::size_t plant = 0; plant < runs.plants.size(); ++plant)
+    for (std::size_t first = 0; first < runs.cases.size(); first += lane_count) {
+      const std::size_t count = std::min(lane_count, runs.cases.size() - first);
+      SampledRuns<Present, SmoothPeriod<Present>>(
+          setup, parts, present,
+          {runs.plants.subspan(plant, 1), runs.cases.subspan(first, count),
+           runs.results.subspan(plant * runs.cases.size() + first, count)})
+          .run();
+    }
 }
 
 }  // namespace
@@ -224,15 +328,15 @@ std::size_t runs_side_by_side() {
   return lane_count;
 }
 
-void run(const LoopSetup& setup, const LaneParts& parts, std::span<const LoopCase> cases,
-         std::span<LoopResult> results) {
-  if (!setup.sampled) return run_continuous_on_lanes(setup, cases, results);
-  with_effects(setup.model.present, [&](const auto& present) {
-    for (std::size_t first = 0; first < cases.size(); first += lane_count) {
-      const std::size_t count = std::min(lane_count, cases.size() - first);
-      run_with(setup, parts, present, first, cases.subspan(first, count), results.subspan(first, count));
-    }
-  });
+void run(const LoopSetup& setup, const LaneParts& parts, std::span<const PlantModel<double>> plants,
+         std::span<const LoopCase> cases, std::span<LoopResult> results) {
+  if (setup.sampled)
+    with_effects(plants[0].present, [&](const auto& present) {
+      run_with(setup, parts, present, {plants, cases, results});
+    });
+  else
+    for (std::size_t i = 0; i < plants.size(); ++i)
+      run_continuous_on_lanes(setup, plants[i], cases, results.subspan(i * cases.size(), cases.size()));
 }
 
 }  // namespace UPRIGHT_LANES

@@ -26,16 +26,19 @@ struct LaneParts {
   /// Predictors of different delays, the model of their plant, and which of them each run has.
   std::vector<FeedbackPrediction> predictions;
   PlantModel<double> predicted;
-  std::vector<std::size_t> prediction_of;
+  std::vector<std::size_t> prediction_of;  ///< by start
+  /// Each lane goes at its own pace from event to event; otherwise all lanes go in step.
+  bool own_pace = false;
+  bool stiff_bristles = false;  ///< they relax too fast for the classical method
 };
 
 }  // namespace upright
 
-#define UPRIGHT_DECLARE_LANES(name)                                                         \
-  namespace name {                                                                          \
-  std::size_t runs_side_by_side();                                                          \
-  void run(const LoopSetup& setup, const LaneParts& parts, std::span<const LoopCase> cases, \
-           std::span<LoopResult> results);                                                  \
+#define UPRIGHT_DECLARE_LANES(name)                                                                    \
+  namespace name {                                                                                     \
+  std::size_t runs_side_by_side();                                                                     \
+  void run(const LoopSetup& setup, const LaneParts& parts, std::span<const PlantModel<double>> plants, \
+           std::span<const LoopCase> cases, std::span<LoopResult> results);                            \
   }
 
 namespace upright {

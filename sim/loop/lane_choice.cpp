@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <cmath>
 #include <cstdlib>
 #include <map>
 #include <string_view>
@@ -16,8 +17,8 @@ namespace {
 /// One compilation of the lanes.
 struct LaneBuild {
   std::size_t (*runs_side_by_side)();
-  void (*run)(const LoopSetup& setup, const LaneParts& parts, std::span<const LoopCase> cases,
-              std::span<LoopResult> results);
+  void (*run)(const LoopSetup& setup, const LaneParts& parts, std::span<const PlantModel<double>> plants,
+              std::span<const LoopCase> cases, std::span<LoopResult> results);
 };
 
 constexpr LaneBuild baseline{baseline_lanes::runs_side_by_side, baseline_lanes::run};
@@ -51,15 +52,31 @@ LaneBuild widest() {
 #endif
 
 /// The greatest rate of a plant's motion at realistic speeds [1/s].
-double fastest_rate_radps(const PlantModel<double>& model) {
+double fastest_rate_radps(const PlantModel<double>& model, bool bristles) {
   const Dynamics<double> physics(model);
   double fastest = 0.0;
   for (const double speed : {0.0, 0.01, 0.1, 1.0}) {
     PlantState<double> state;
     state.cart_mps = speed;
-    fastest = std::max(fastest, physics.fastest_rate_radps(state));
+    fastest = std::max(fastest, physics.fastest_rate_radps(state, bristles));
   }
   return fastest;
+}
+
+/// Faster plants than that need steps that the lanes do not take in general.
+constexpr double fastest_radps = 1e3;
+
+/// Whether bristles, and nothing else, are too fast for the steps of a period. Their relaxation may be as
+/// fast as it will. Steps resolve the motion of a resting cart on them, which must leave a bounded number of
+/// steps to a millisecond (50).
+bool has_stiff_bristles(const PlantModel<double>& model) {
+  constexpr double fastest_at_rest_radps = 1e4;
+  const Dynamics<double> physics(model);
+  if (!physics.has_bristle_state() || fastest_rate_radps(model, true) < fastest_radps) return false;
+  const double push = 1.0 / physics.min_cart_inertia();
+  return fastest_rate_radps(model, false) < fastest_radps &&
+         std::sqrt(physics.bristle_stiffness() * push) + physics.bristle_damping() * push <
+             fastest_at_rest_radps;
 }
 
 const LaneBuild& lanes_for(LaneRegisters registers) {
@@ -80,6 +97,7 @@ FeedbackPrediction prediction_of(const ModelParts& parts, const Gains& gains, Pl
 
 LaneParts parts_of(const LoopSetup& setup, std::span<const LoopCase> cases) {
   LaneParts made;
+  if (!setup.make_parts) return made;
   ControlConfig control = setup.control;
   if (control.has_state_estimator()) {
     const ModelParts parts = setup.make_parts(control);
@@ -99,6 +117,21 @@ LaneParts parts_of(const LoopSetup& setup, std::span<const LoopCase> cases) {
   return made;
 }
 
+/// Whether lanes may have these two plants at once. The input delay is the same in all lanes, and some
+/// effects treat parameters that are whole numbers (an exponent of 2, the kind of a table) specially, if all
+/// lanes have them.
+bool may_mix(const PlantModel<double>& one, const PlantModel<double>& other) {
+  if (Dynamics<double>(one).input_delay_s() != Dynamics<double>(other).input_delay_s() ||
+      has_stiff_bristles(one) != has_stiff_bristles(other))
+    return false;
+  const auto is_whole = [](double number) { return number == std::round(number); };
+  for (std::size_t i = 0; i < all_parameter_count; ++i) {
+    const double a = one.parameters[i], b = other.parameters[i];
+    if (a != b && (is_whole(a) || is_whole(b))) return false;
+  }
+  return true;
+}
+
 }  // namespace
 
 bool lanes_can_run(const LoopSetup& setup) {
@@ -108,18 +141,45 @@ bool lanes_can_run(const LoopSetup& setup) {
   if (setup.model.cart_locked || !setup.model.has_pendulum) return false;
   const Dynamics<double> physics(setup.model);
   if (physics.has_motor_lag() || physics.pivot_has_kink()) return false;
-  // Faster plants than that need steps that the lanes do not take.
-  constexpr double fastest_radps = 1e3;
-  return fastest_rate_radps(setup.model) < fastest_radps;
+  return fastest_rate_radps(setup.model, true) < fastest_radps ||
+         (setup.sampled && has_stiff_bristles(setup.model));
 }
 
 std::size_t runs_side_by_side(LaneRegisters registers) {
   return lanes_for(registers).runs_side_by_side();
 }
 
+bool lanes_refill(const LoopSetup& setup) {
+  if (!setup.sampled || has_stiff_bristles(setup.model)) return true;
+  const Dynamics<double> physics(setup.model);
+  // Encoder steps let the voltage jump, and the cart reverse, in most periods; so do predictors of long
+  // delays.
+  const bool jumps = setup.cart_resolution_m > 0.0 || setup.angle_resolution_rad > 0.0 ||
+                     setup.control.compensation.kind != CompensationKind::none;
+  const bool reverses = jumps && physics.cart_has_kink() && setup.model.smoothing == 0.0;
+  return physics.cart_can_stick() || reverses;
+}
+
 void run_on_lanes(const LoopSetup& setup, std::span<const LoopCase> cases, std::span<LoopResult> results,
                   LaneRegisters registers) {
-  lanes_for(registers).run(setup, setup.make_parts ? parts_of(setup, cases) : LaneParts{}, cases, results);
+  run_plants_on_lanes(setup, std::span(&setup.model, 1), cases, results, registers);
+}
+
+void run_plants_on_lanes(const LoopSetup& setup, std::span<const PlantModel<double>> plants,
+                         std::span<const LoopCase> cases, std::span<LoopResult> results,
+                         LaneRegisters registers) {
+  if (cases.empty()) return;
+  LaneParts parts = parts_of(setup, cases);
+  LoopSetup of_plants = setup;
+  for (std::size_t first = 0, end = 0; first < plants.size(); first = end) {
+    for (end = first + 1; end < plants.size() && may_mix(plants[first], plants[end]);) ++end;
+    const std::size_t count = end - first;
+    of_plants.model = plants[first];
+    parts.own_pace = lanes_refill(of_plants);
+    parts.stiff_bristles = setup.sampled && has_stiff_bristles(plants[first]);
+    lanes_for(registers).run(setup, parts, plants.subspan(first, count), cases,
+                             results.subspan(first * cases.size(), count * cases.size()));
+  }
 }
 
 }  // namespace upright

@@ -7,6 +7,18 @@
 
 namespace upright {
 
+/// Gives one lane this plant, which has the effects of the others.
+inline void put_on_lane(PlantModel<Lanes>& lanes, std::size_t lane, const PlantModel<double>& model) {
+  put(lanes.base.cart_mass_kg, lane, model.base.cart_mass_kg);
+  put(lanes.base.pendulum_mass_kg, lane, model.base.pendulum_mass_kg);
+  put(lanes.base.length_to_com_m, lane, model.base.length_to_com_m);
+  put(lanes.base.inertia_about_pivot_kgm2, lane, model.base.inertia_about_pivot_kgm2);
+  put(lanes.base.gravity_mps2, lane, model.base.gravity_mps2);
+  put(lanes.base.force_per_volt_n, lane, model.base.force_per_volt_n);
+  put(lanes.base.back_emf_n_per_mps, lane, model.base.back_emf_n_per_mps);
+  for (std::size_t i = 0; i < all_parameter_count; ++i) put(lanes.parameters[i], lane, model.parameters[i]);
+}
+
 inline PlantModel<Lanes> on_lanes(const PlantModel<double>& model) {
   PlantModel<Lanes> lanes;
   lanes.base = {model.base.cart_mass_kg,      model.base.pendulum_mass_kg,

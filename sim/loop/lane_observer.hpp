@@ -21,7 +21,13 @@ class LaneSensor {
  public:
   LaneSensor(const EstimatorStep& step, double resolution) : step_(step), resolution_(resolution) {}
 
-  void start(const Lanes& value) { position = previous_ = stepped(value); }
+  template <class Mask>
+  void start(const Mask& lanes, const Lanes& value) {
+    position = select(lanes, stepped(value), position);
+    previous_ = select(lanes, position, previous_);
+    velocity = select(lanes, Lanes(0.0), velocity);
+    lag_ = select(lanes, Lanes(0.0), lag_);
+  }
 
   template <class Mask>
   void take(const Mask& lanes, const Lanes& value) {
@@ -55,13 +61,14 @@ class LaneKalmanFilter {
         actuator_(on_lanes(estimator.model)),
         drives_(estimator.step.input_periods + 1) {}
 
-  void start(const LaneSensor& cart, const LaneSensor& pendulum) {
-    state_.fill(Lanes(0.0));
+  void start(const Mask& lanes, const LaneSensor& cart, const LaneSensor& pendulum) {
+    State begin{};
     const Lanes resting = actuator_.actuate(Lanes(0.0));
-    drives_.fill(resting);
-    if (step_.late[filter_motor] != 0.0) state_[filter_motor] = resting;
-    state_[filter_cart] = step_.position_of(0, cart.position);
-    state_[filter_theta] = step_.position_of(1, pendulum.position);
+    drives_.fill(lanes, resting);
+    if (step_.late[filter_motor] != 0.0) begin[filter_motor] = resting;
+    begin[filter_cart] = step_.position_of(0, cart.position);
+    begin[filter_theta] = step_.position_of(1, pendulum.position);
+    for (std::size_t i = 0; i < begin.size(); ++i) state_[i] = select(lanes, begin[i], state_[i]);
   }
 
   void take(const Mask& lanes, const LaneSensor& cart, const LaneSensor& pendulum, const Lanes& applied_v) {
@@ -119,37 +126,39 @@ class LaneKalmanFilter {
 template <class Mask>
 class LaneObserver {
  public:
-  /// `first`: of the runs in these lanes, of which there are `count`.
-  LaneObserver(const LoopSetup& setup, const LaneParts& parts, std::size_t first, std::size_t count)
-      : gains_(setup.control.gains),
+  LaneObserver(const LoopSetup& setup, const LaneParts& parts)
+      : parts_(parts),
+        gains_(setup.control.gains),
         cart_(make_estimator_step(setup.control.estimator, setup.control.period_s()),
               setup.cart_resolution_m),
         pendulum_(make_estimator_step(setup.control.estimator, setup.control.period_s()),
                   setup.angle_resolution_rad) {
     if (parts.estimator) filter_.emplace(*parts.estimator);
-    if (parts.predictions.empty()) return;
-    std::vector<const FeedbackPrediction*> predictions;
-    for (std::size_t i = 0; i < lane_count; ++i)
-      predictions.push_back(&parts.predictions[parts.prediction_of[first + std::min(i, count - 1)]]);
-    predictor_.emplace(parts.predicted, predictions);
+    if (!parts.predictions.empty()) predictor_.emplace(parts.predicted, parts.predictions);
   }
 
-  /// At the start, before the first period. Returns what the delay holds.
-  Lanes start(const Outputs<Lanes>& shown) {
-    cart_.start(shown.cart_m);
-    pendulum_.start(shown.theta_rad);
-    if (filter_) filter_->start(cart_, pendulum_);
-    started_ = false;
+  /// Says which run this lane has next.
+  void take_case(std::size_t lane, std::size_t number) {
+    if (predictor_) predictor_->take(lane, parts_.predictions[parts_.prediction_of[number]]);
+  }
+
+  /// At the start of the runs of these lanes, before their first period. Returns what the delay holds.
+  Lanes start(const Mask& lanes, const Outputs<Lanes>& shown) {
+    cart_.start(lanes, shown.cart_m);
+    pendulum_.start(lanes, shown.theta_rad);
+    if (filter_) filter_->start(lanes, cart_, pendulum_);
+    const LaneMask starting = lanes & every();
+    started_ = started_ & !starting;
     if (!predictor_) return start_feedback();
     const LanePredictor::State held =
         predictor_->shown(cart_.position, pendulum_.position, Lanes(0.0), Lanes(0.0));
-    predictor_->start(held);
+    predictor_->start(starting, held);
     return predictor_->known_v(held);
   }
   /// After a period of these lanes. Returns what goes through the delay. `applied_v`: the voltage commanded
   /// over the period that just ended, after the amplifier's limit.
   Lanes take(const Mask& lanes, const Outputs<Lanes>& shown, const Lanes& applied_v) {
-    started_ = true;
+    started_ = started_ | (lanes & every());
     cart_.take(lanes, shown.cart_m);
     pendulum_.take(lanes, shown.theta_rad);
     if (filter_) filter_->take(lanes, cart_, pendulum_, applied_v);
@@ -162,12 +171,11 @@ class LaneObserver {
   /// The command for what comes out of the delay.
   Lanes command_v(const Mask& lanes, const Lanes& delayed_v, const Lanes& applied_v) {
     Lanes feedback = delayed_v;
-    if (predictor_ && started_) {
-      const LaneMask every = applied_v == applied_v;
-      feedback = predictor_->feedback_v(lanes & every, delayed_v, applied_v);
+    if (predictor_) {
+      const LaneMask begun = lanes & started_ & (applied_v == applied_v);
+      if (any(begun)) feedback = predictor_->feedback_v(begun, delayed_v, applied_v);
       if (filter_) feedback = feedback + filter_->resting_v();
-    } else if (predictor_) {
-      feedback = start_feedback();
+      if (!all(started_)) feedback = select(started_, feedback, start_feedback());
     }
     return filter_ ? filter_->command_v(feedback) : feedback;
   }
@@ -183,11 +191,14 @@ class LaneObserver {
            Lanes(gains_.pendulum_rate_v_per_radps) * pendulum_.velocity;
   }
 
+  static LaneMask every() { return Lanes(0.0) == Lanes(0.0); }
+
+  const LaneParts& parts_;
   Gains gains_;
   LaneSensor cart_, pendulum_;
   std::optional<LaneKalmanFilter<Mask>> filter_;
   std::optional<LanePredictor> predictor_;
-  bool started_ = false;  ///< a period has ended
+  LaneMask started_ = !every();  ///< a period of the run has ended
 };
 
 }  // namespace upright

@@ -19,27 +19,26 @@ namespace upright {
 /// A weighted sum of the last voltages, by lane.
 class LaneWindow {
  public:
-  /// `weights`: by lane, oldest first.
-  explicit LaneWindow(const std::vector<const std::vector<double>*>& weights) {
-    std::size_t longest = 0;
-    for (std::size_t i = 0; i < lane_count; ++i) {
-      // Whole registers, so that the order of the sum depends on this lane alone.
-      length_[i] = (weights[i]->size() + together - 1) / together * together;
-      longest = std::max(longest, length_[i]);
-    }
-    // What `ago` looks back at is one older than the weights, and a lane that waits writes to one more place.
-    slots_ = std::bit_ceil(longest + 2);
-    values_.resize(lane_count * 2 * slots_);
-    for (std::size_t i = 0; i < lane_count; ++i) {
-      weights_[i].assign(length_[i] - weights[i]->size(), 0.0);
-      weights_[i].insert(weights_[i].end(), weights[i]->begin(), weights[i]->end());
-    }
+  /// For up to so many weights. What `ago` looks back at is one older than the weights, and a lane that waits
+  /// writes to one more place.
+  explicit LaneWindow(std::size_t longest)
+      : slots_(std::bit_ceil(whole_registers(longest) + 2)), values_(lane_count * 2 * slots_) {}
+
+  /// The weights of one lane, oldest first.
+  void weigh(std::size_t lane, const std::vector<double>& weights) {
+    // Whole registers, so that the order of the sum depends on this lane alone.
+    length_[lane] = whole_registers(weights.size());
+    weights_[lane].assign(length_[lane] - weights.size(), 0.0);
+    weights_[lane].insert(weights_[lane].end(), weights.begin(), weights.end());
   }
 
-  void fill(const Lanes& value) {
+  /// All values of these lanes (bit i: lane i).
+  void fill(std::uint32_t lanes, const Lanes& value) {
     const auto numbers = value.values();
-    for (std::size_t i = 0; i < lane_count; ++i)
+    for (; lanes != 0; lanes &= lanes - 1) {
+      const auto i = static_cast<std::size_t>(std::countr_zero(lanes));
       std::fill_n(values_.begin() + static_cast<std::ptrdiff_t>(i * 2 * slots_), 2 * slots_, numbers[i]);
+    }
   }
 
   /// Appends a value in these lanes (bit i: lane i). A lane that waits writes to the place of its next value.
@@ -76,12 +75,15 @@ class LaneWindow {
  private:
   static constexpr std::size_t together = Lanes::Batch::size;
 
+  static std::size_t whole_registers(std::size_t weights) {
+    return (weights + together - 1) / together * together;
+  }
   /// Of each value there are two copies, so that `slots_` values before this one are contiguous.
   const double* last(std::size_t lane) const {
     return &values_[lane * 2 * slots_ + slots_ + (newest_[lane] & (slots_ - 1))];
   }
 
-  std::size_t slots_ = 0;
+  std::size_t slots_;
   std::vector<double> values_;
   std::array<std::vector<double>, lane_count> weights_;
   std::array<std::size_t, lane_count> length_{}, newest_{};
@@ -92,28 +94,27 @@ class LanePredictor {
  public:
   using State = std::array<Lanes, predicted_states>;
 
-  /// `predictions`: by lane.
-  LanePredictor(const PlantModel<double>& model, const std::vector<const FeedbackPrediction*>& predictions)
-      : common_(*predictions[0]), actuator_(on_lanes(model)), window_(weights_of(predictions)) {
-    const auto by_lane = [&](const auto& number) {
-      std::array<double, lane_count> numbers;
-      for (std::size_t i = 0; i < lane_count; ++i) numbers[i] = number(*predictions[i]);
-      return Lanes::load(numbers.data());
-    };
-    using Of = const FeedbackPrediction&;
-    for (std::size_t k = 0; k < predicted_states; ++k)
-      known_[k] = by_lane([k](Of of) { return of.known[k]; });
-    constant_v_ = by_lane([](Of of) { return of.constant_v; });
-    now_ = by_lane([](Of of) { return of.now; });
-    next_ = by_lane([](Of of) { return of.next; });
-    motor_ = by_lane([](Of of) { return of.motor; });
-    fraction_ = by_lane([](Of of) { return of.fraction; });
-    free_periods_ = by_lane([](Of of) { return static_cast<double>(of.free_periods); });
-    for (std::size_t i = 0; i < lane_count; ++i) {
-      oldest_[i] = predictions[i]->on_their_way.size() - 1;
-      before_[i] = oldest_[i] + 1;
-    }
-    filters_ = common_.filter.m1 != 0.0 || common_.filter.m0 != 0.0 || any(!(now_ == Lanes(0.0)));
+  /// `predictions`: all that a lane may have, of different delays.
+  LanePredictor(const PlantModel<double>& model, const std::vector<FeedbackPrediction>& predictions)
+      : common_(predictions[0]),
+        actuator_(on_lanes(model)),
+        window_(longest_of(predictions)),
+        filters_(common_.filter.m1 != 0.0 || common_.filter.m0 != 0.0 ||
+                 std::any_of(predictions.begin(), predictions.end(),
+                             [](const FeedbackPrediction& of) { return of.now != 0.0; })) {}
+
+  /// Gives one lane this prediction.
+  void take(std::size_t lane, const FeedbackPrediction& of) {
+    window_.weigh(lane, of.on_their_way);
+    for (std::size_t k = 0; k < predicted_states; ++k) put(known_[k], lane, of.known[k]);
+    put(constant_v_, lane, of.constant_v);
+    put(now_, lane, of.now);
+    put(next_, lane, of.next);
+    put(motor_, lane, of.motor);
+    put(fraction_, lane, of.fraction);
+    put(free_periods_, lane, static_cast<double>(of.free_periods));
+    oldest_[lane] = of.on_their_way.size() - 1;
+    before_[lane] = oldest_[lane] + 1;
   }
 
   /// The true states that sensors and velocity estimates show.
@@ -132,14 +133,17 @@ class LanePredictor {
     return sum;
   }
 
-  void start(const State& held) {
+  void start(const LaneMask& lanes, const State& held) {
     const Lanes resting = actuator_.actuate(Lanes(0.0));
-    window_.fill(resting);
-    filtered_ = common_.filter.started(resting);
-    free_state_ = held;
-    if (common_.lags) free_state_[filter_motor] = resting;
-    common_.lead.propagate(free_state_, resting);
-    periods_ = Lanes(0.0);
+    window_.fill(lanes.bits(), resting);
+    const VoltageFilter::State<Lanes> settled = common_.filter.started(resting);
+    filtered_ = {select(lanes, settled.now, filtered_.now), select(lanes, settled.next, filtered_.next),
+                 select(lanes, settled.motor, filtered_.motor)};
+    State led = held;
+    if (common_.lags) led[filter_motor] = resting;
+    common_.lead.propagate(led, resting);
+    for (std::size_t k = 0; k < predicted_states; ++k) free_state_[k] = select(lanes, led[k], free_state_[k]);
+    periods_ = select(lanes, Lanes(0.0), periods_);
   }
 
   /// The feedback of the predicted state in these lanes. `known`: `known_v` one delay ago; `applied_v`: the
@@ -157,12 +161,10 @@ class LanePredictor {
   }
 
  private:
-  static std::vector<const std::vector<double>*> weights_of(
-      const std::vector<const FeedbackPrediction*>& predictions) {
-    std::vector<const std::vector<double>*> weights;
-    weights.reserve(predictions.size());
-    for (const FeedbackPrediction* prediction : predictions) weights.push_back(&prediction->on_their_way);
-    return weights;
+  static std::size_t longest_of(const std::vector<FeedbackPrediction>& predictions) {
+    std::size_t longest = 0;
+    for (const FeedbackPrediction& of : predictions) longest = std::max(longest, of.on_their_way.size());
+    return longest;
   }
 
   void filter(const LaneMask& lanes) {
@@ -191,7 +193,7 @@ class LanePredictor {
   Lanes constant_v_, now_, next_, motor_, fraction_, free_periods_, periods_;
   VoltageFilter::State<Lanes> filtered_;
   std::array<std::size_t, lane_count> oldest_{}, before_{};
-  bool filters_ = false;
+  bool filters_;
 };
 
 }  // namespace upright

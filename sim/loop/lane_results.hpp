@@ -12,11 +12,16 @@ namespace upright {
 
 class LaneResults {
  public:
-  LaneResults(const LoopSetup& setup, std::size_t used)
-      : fell_above_rad_(setup.fell_above_rad),
-        window_begin_s_(setup.window_begin_s()),
-        alive_((1u << used) - 1u) {
-    fall_time_s_.fill(std::numeric_limits<double>::quiet_NaN());
+  explicit LaneResults(const LoopSetup& setup)
+      : fell_above_rad_(setup.fell_above_rad), window_begin_s_(setup.window_begin_s()) {}
+
+  /// Begins a run in this lane.
+  void begin(std::size_t lane) {
+    alive_ |= 1u << lane;
+    fall_time_s_[lane] = std::numeric_limits<double>::quiet_NaN();
+    for (Lanes* zero : {&previous_theta_, &previous_s_, &cart_max_}) put(*zero, lane, 0.0);
+    for (Lanes* low : {&theta_low_, &cart_low_}) put(*low, lane, infinite);
+    for (Lanes* high : {&theta_high_, &cart_high_}) put(*high, lane, -infinite);
   }
 
   /// Records the motion of these lanes, each at its time. Fallen lanes are reset to rest upright.
@@ -35,20 +40,26 @@ class LaneResults {
     cart_high_ = select(late, larger(cart_high_, state.cart_m), cart_high_);
   }
 
-  bool all_fell() const { return alive_ == 0; }
-  bool alive(std::size_t lane) const { return (alive_ >> lane & 1u) != 0; }
+  /// Bit i: the run of lane i has not fallen.
+  std::uint32_t alive() const { return alive_; }
 
-  void finish(const PlantState<Lanes>& state, std::span<LoopResult> results) const {
-    const auto theta = (theta_high_ - theta_low_).values(), cart = (cart_high_ - cart_low_).values();
-    const auto x = state.cart_m.values(), th = state.theta_rad.values(), v = state.cart_mps.values(),
-               w = state.theta_radps.values(), u = state.motor_v.values(), z = state.bristle_m.values();
-    for (std::size_t i = 0; i < results.size(); ++i) {
-      LoopResult& result = results[i];
-      result.fall_time_s = fall_time_s_[i];
-      result.theta_amplitude_rad = result.fell() ? fell_above_rad_ : 0.5 * theta[i];
-      result.cart_amplitude_m = result.fell() ? fallen_cart_m_[i] : 0.5 * cart[i];
-      result.end = result.fell() ? fallen_[i] : PlantState<double>{x[i], th[i], v[i], w[i], u[i], z[i]};
+  /// Of the run in this lane, which ends in `state` unless it has fallen. The lane has none then.
+  LoopResult finish(std::size_t i, const PlantState<Lanes>& state) {
+    alive_ &= ~(1u << i);
+    LoopResult result;
+    result.fall_time_s = fall_time_s_[i];
+    if (result.fell()) {
+      result.theta_amplitude_rad = fell_above_rad_;
+      result.cart_amplitude_m = fallen_cart_m_[i];
+      result.end = fallen_[i];
+      return result;
     }
+    const auto value = [i](const Lanes& lanes) { return lanes.values()[i]; };
+    result.theta_amplitude_rad = 0.5 * value(theta_high_ - theta_low_);
+    result.cart_amplitude_m = 0.5 * value(cart_high_ - cart_low_);
+    result.end = {value(state.cart_m),      value(state.theta_rad), value(state.cart_mps),
+                  value(state.theta_radps), value(state.motor_v),   value(state.bristle_m)};
+    return result;
   }
 
  private:
@@ -59,7 +70,7 @@ class LaneResults {
                previous_s = previous_s_.values();
     for (; fallen != 0; fallen &= fallen - 1) {
       const auto i = static_cast<std::size_t>(std::countr_zero(fallen));
-      if (alive(i)) {
+      if ((alive_ >> i & 1u) != 0) {
         alive_ &= ~(1u << i);
         const double rise = std::abs(th[i]) - std::abs(before[i]);
         const double part = rise > 0.0 ? (fell_above_rad_ - std::abs(before[i])) / rise : 1.0;
@@ -78,8 +89,8 @@ class LaneResults {
 
   static constexpr double infinite = std::numeric_limits<double>::infinity();
   double fell_above_rad_, window_begin_s_;
-  std::uint32_t alive_;
-  std::array<double, lane_count> fall_time_s_, fallen_cart_m_{};
+  std::uint32_t alive_ = 0;
+  std::array<double, lane_count> fall_time_s_{}, fallen_cart_m_{};
   std::array<PlantState<double>, lane_count> fallen_{};
   Lanes previous_theta_, previous_s_, cart_max_;
   Lanes theta_low_{infinite}, theta_high_{-infinite}, cart_low_{infinite}, cart_high_{-infinite};

@@ -19,8 +19,17 @@ class LaneRing {
   /// Keeps values up to `longest` periods old.
   explicit LaneRing(std::size_t longest) : slots_(std::bit_ceil(longest + 2)), values_(slots_ * lane_count) {}
 
-  void fill(const Lanes& value) {
-    for (std::size_t i = 0; i < values_.size(); i += lane_count) value.store(&values_[i]);
+  /// All values of these lanes.
+  void fill(const Mask& lanes, const Lanes& value) {
+    if constexpr (in_step) {
+      for (std::size_t i = 0; i < values_.size(); i += lane_count) value.store(&values_[i]);
+    } else {
+      const auto numbers = value.values();
+      for (std::uint32_t bits = lanes.bits(); bits != 0; bits &= bits - 1) {
+        const auto lane = static_cast<std::size_t>(std::countr_zero(bits));
+        for (std::size_t i = lane; i < values_.size(); i += lane_count) values_[i] = numbers[lane];
+      }
+    }
   }
 
   /// Appends a value in these lanes.

@@ -203,6 +203,13 @@ class Lanes {
     return numbers;
   }
 
+  /// Changes the number of one lane.
+  friend void put(Lanes& lanes, std::size_t lane, double number) {
+    auto numbers = lanes.values();
+    numbers[lane] = number;
+    lanes = load(numbers.data());
+  }
+
   Lanes& operator+=(const Lanes& b) { return *this = *this + b; }
 
   UPRIGHT_LANES_INLINE friend Lanes operator+(const Lanes& a, const Lanes& b) {

@@ -68,23 +68,17 @@ struct PlantSums {
   std::size_t falls = 0;
 };
 
-PlantSums sums_of(const SweepConfig& config, const RunCost& cost, std::uint32_t plant,
-                  const std::vector<LoopCase>& cases) {
-  const std::size_t size = sweep_group_size(config);
+PlantSums sums_of(std::span<const LoopResult> runs, const RunCost& cost) {
   PlantSums sums;
-  for (std::size_t first = 0; first < cases.size(); first += size) {
-    const auto begin = cases.begin() + static_cast<std::ptrdiff_t>(first);
-    const auto count = static_cast<std::ptrdiff_t>(std::min(size, cases.size() - first));
-    for (const SweepRun& run : run_plant_group(config, plant, {begin, begin + count})) {
-      if (run.outcome(config.stable_below_rad) == Outcome::fell) {
-        ++sums.falls;
-        sums.cost += cost.fall;
-        continue;
-      }
-      sums.cart_m += run.cart_amplitude_m;
-      sums.theta_rad += run.theta_amplitude_rad;
-      sums.cost += cost.cart_per_m * run.cart_amplitude_m + cost.angle_per_rad * run.theta_amplitude_rad;
+  for (const LoopResult& run : runs) {
+    if (run.fell()) {
+      ++sums.falls;
+      sums.cost += cost.fall;
+      continue;
     }
+    sums.cart_m += run.cart_amplitude_m;
+    sums.theta_rad += run.theta_amplitude_rad;
+    sums.cost += cost.cart_per_m * run.cart_amplitude_m + cost.angle_per_rad * run.theta_amplitude_rad;
   }
   return sums;
 }
@@ -151,8 +145,15 @@ bool Optimisation::is_better() const {
 MeanCost mean_cost(const SweepConfig& config, const RunCost& cost) {
   const std::vector<LoopCase> cases = grid_cases(config);
   std::vector<PlantSums> sums(config.uncertainty->samples);
-  parallel_for(sums.size(),
-               [&](std::size_t i) { sums[i] = sums_of(config, cost, static_cast<std::uint32_t>(i), cases); });
+  // As many plants at once as keep the lanes busy.
+  const std::size_t together = (runs_per_call(config) + cases.size() - 1) / cases.size();
+  parallel_for((sums.size() + together - 1) / together, [&](std::size_t block) {
+    const std::size_t first = block * together, count = std::min(together, sums.size() - first);
+    const std::vector<LoopResult> runs =
+        run_plants(config, static_cast<std::uint32_t>(first), static_cast<std::uint32_t>(count), cases);
+    for (std::size_t i = 0; i < count; ++i)
+      sums[first + i] = sums_of(std::span(runs).subspan(i * cases.size(), cases.size()), cost);
+  });
   MeanCost mean;
   const auto runs = static_cast<double>(cases.size());
   double falls = 0.0;

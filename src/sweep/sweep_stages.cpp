@@ -29,6 +29,14 @@ double processor_time_s() {
   return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
 }
 
+/// Size of the groups of so many runs. Where a run does not depend on its group, all are of about the same
+/// size.
+std::size_t even_group(const SweepConfig& config, std::size_t runs) {
+  const std::size_t size = runs_per_call(config);
+  if (size == sweep_group_size(config) || runs == 0) return size;
+  return parts(runs, parts(runs, size));
+}
+
 std::span<const LoopCase> group_of(const std::vector<LoopCase>& cases, std::size_t size, std::size_t number) {
   const std::size_t first = number * size;
   return std::span(cases).subspan(first, std::min(size, cases.size() - first));
@@ -46,15 +54,16 @@ SweepStages::SweepStages(const SweepConfig& config, const SweepOptions& options,
 
 std::vector<SweepRun> SweepStages::run(const std::vector<LoopCase>& cases) {
   std::vector<SweepRun> runs(cases.size());
-  const auto group = [&](std::size_t g) { return group_of(cases, group_size_, g); };
+  const std::size_t size_of_group = even_group(config_, cases.size());
+  const auto group = [&](std::size_t g) { return group_of(cases, size_of_group, g); };
   const auto size = [&](std::size_t g) { return group(g).size(); };
   known_ += cases.size();
-  make({stage_++, parts(cases.size(), group_size_), [&](std::size_t g) { return plain_task(group(g)); }, size,
-        size,
+  make({stage_++, parts(cases.size(), size_of_group), [&](std::size_t g) { return plain_task(group(g)); },
+        size, size,
         [&](std::size_t g, const SweepNumbers& result) {
           const std::vector<SweepRun> made = runs_of(result);
           if (!are_of(made, group(g))) return false;
-          std::copy(made.begin(), made.end(), runs.begin() + static_cast<std::ptrdiff_t>(g * group_size_));
+          std::copy(made.begin(), made.end(), runs.begin() + static_cast<std::ptrdiff_t>(g * size_of_group));
           return true;
         }});
   return interrupted_ ? std::vector<SweepRun>() : runs;

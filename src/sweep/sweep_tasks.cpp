@@ -9,6 +9,9 @@ namespace upright {
 
 namespace {
 
+/// Lanes that go on with the next run when one ends waste less with more runs for each of them.
+constexpr std::size_t refill_of_lanes = 4;
+
 // A task: its first plant, its number of plants (0: the plant of the file), and its starts.
 constexpr std::size_t header_numbers = 2, case_numbers = 2, run_numbers = 5, count_numbers = 2;
 
@@ -33,21 +36,15 @@ SweepNumbers task_of(std::span<const LoopCase> cases, double first_plant, double
   return task;
 }
 
-std::vector<SweepRun> run_group(const SweepConfig& config, const LoopSetup& setup,
-                                const std::vector<LoopCase>& group) {
-  std::vector<LoopResult> results(group.size());
-  if (runs_on_lanes(config, setup)) {
-    run_on_lanes(setup, group, results, registers_of(config));
-  } else {
-    for (std::size_t i = 0; i < group.size(); ++i)
-      results[i] = config.engine == SweepEngine::reference ? run_with_reference(setup, group[i])
-                                                           : run_with_events(setup, group[i]);
-  }
-  std::vector<SweepRun> runs;
-  for (std::size_t i = 0; i < group.size(); ++i)
-    runs.push_back(
-        {group[i], results[i].fall_time_s, results[i].theta_amplitude_rad, results[i].cart_amplitude_m});
-  return runs;
+SweepRun run_of(const LoopCase& start, const LoopResult& result) {
+  return {start, result.fall_time_s, result.theta_amplitude_rad, result.cart_amplitude_m};
+}
+
+void run_alone(const SweepConfig& config, const LoopSetup& setup, std::span<const LoopCase> cases,
+               std::span<LoopResult> results) {
+  for (std::size_t i = 0; i < cases.size(); ++i)
+    results[i] = config.engine == SweepEngine::reference ? run_with_reference(setup, cases[i])
+                                                         : run_with_events(setup, cases[i]);
 }
 
 /// FNV-1a over the numbers' bits, as a whole number that a double holds exactly.
@@ -67,13 +64,12 @@ SweepNumbers count_plants(const SweepConfig& config, const SweepNumbers& task) {
   const std::vector<LoopCase> cases = cases_of(task);
   const auto first = static_cast<std::uint32_t>(task[0]), plants = static_cast<std::uint32_t>(task[1]);
   SweepNumbers result(1 + cases.size() * count_numbers, 0.0);
-  for (std::uint32_t i = 0; i < plants; ++i) {
-    const std::vector<SweepRun> runs = run_plant_group(config, first + i, cases);
-    for (std::size_t k = 0; k < runs.size(); ++k) {
-      const Outcome outcome = runs[k].outcome(config.stable_below_rad);
-      if (outcome == Outcome::fell) result[1 + k * count_numbers] += 1.0;
-      if (outcome == Outcome::oscillating) result[2 + k * count_numbers] += 1.0;
-    }
+  const std::vector<LoopResult> runs = run_plants(config, first, plants, cases);
+  for (std::size_t i = 0; i < runs.size(); ++i) {
+    const std::size_t k = i % cases.size();
+    const Outcome outcome = run_of(cases[k], runs[i]).outcome(config.stable_below_rad);
+    if (outcome == Outcome::fell) result[1 + k * count_numbers] += 1.0;
+    if (outcome == Outcome::oscillating) result[2 + k * count_numbers] += 1.0;
   }
   result[0] = checksum(task, std::span(result).subspan(1));
   return result;
@@ -116,12 +112,32 @@ std::vector<PlantCounts> counts_of(const SweepNumbers& task, const SweepNumbers&
   return counts;
 }
 
-std::vector<SweepRun> run_plant_group(const SweepConfig& config, std::uint32_t plant,
-                                      const std::vector<LoopCase>& group) {
+std::vector<LoopResult> run_plants(const SweepConfig& config, std::uint32_t first, std::uint32_t count,
+                                   std::span<const LoopCase> cases) {
+  std::vector<LoopResult> results(count * cases.size());
+  const auto of_plant = [&](std::size_t i) {
+    return std::span(results).subspan(i * cases.size(), cases.size());
+  };
+  // A drawn plant may be too fast for lanes where the others are not.
+  std::vector<PlantModel<double>> on_lanes;
+  std::vector<std::size_t> numbers;
   LoopSetup setup = config.setup;
-  setup.model = make_model<double>(config.uncertainty->plants->draw(config.uncertainty->seed, plant));
-  setup.model.smoothing = config.setup.model.smoothing;
-  return run_group(config, setup, group);
+  for (std::uint32_t i = 0; i < count; ++i) {
+    setup.model = make_model<double>(config.uncertainty->plants->draw(config.uncertainty->seed, first + i));
+    setup.model.smoothing = config.setup.model.smoothing;
+    if (!runs_on_lanes(config, setup)) {
+      run_alone(config, setup, cases, of_plant(i));
+      continue;
+    }
+    on_lanes.push_back(setup.model);
+    numbers.push_back(i);
+  }
+  std::vector<LoopResult> made(on_lanes.size() * cases.size());
+  run_plants_on_lanes(config.setup, on_lanes, cases, made, registers_of(config));
+  for (std::size_t i = 0; i < numbers.size(); ++i)
+    std::copy_n(made.begin() + static_cast<std::ptrdiff_t>(i * cases.size()), cases.size(),
+                of_plant(numbers[i]).begin());
+  return results;
 }
 
 std::uint32_t plants_per_task(const SweepConfig& config) {
@@ -131,12 +147,24 @@ std::uint32_t plants_per_task(const SweepConfig& config) {
 std::size_t sweep_group_size(const SweepConfig& config) {
   if (!runs_on_lanes(config, config.setup)) return 1;
   const std::size_t together = runs_side_by_side(registers_of(config));
-  // Lanes of continuous loops go on with the next run when they end, so that more of them waste less.
-  return config.setup.sampled ? together : 4 * together;
+  return config.setup.sampled ? together : refill_of_lanes * together;
+}
+
+std::size_t runs_per_call(const SweepConfig& config) {
+  const std::size_t group = sweep_group_size(config);
+  const bool more = config.setup.sampled && runs_on_lanes(config, config.setup) && lanes_refill(config.setup);
+  return more ? refill_of_lanes * group : group;
 }
 
 std::vector<SweepRun> run_sweep_group(const SweepConfig& config, const std::vector<LoopCase>& group) {
-  return run_group(config, config.setup, group);
+  std::vector<LoopResult> results(group.size());
+  if (runs_on_lanes(config, config.setup))
+    run_on_lanes(config.setup, group, results, registers_of(config));
+  else
+    run_alone(config, config.setup, group, results);
+  std::vector<SweepRun> runs;
+  for (std::size_t i = 0; i < group.size(); ++i) runs.push_back(run_of(group[i], results[i]));
+  return runs;
 }
 
 }  // namespace upright

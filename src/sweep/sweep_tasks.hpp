@@ -10,9 +10,13 @@ SweepNumbers plain_task(std::span<const LoopCase> cases);
 /// Runs of the drawn plants `first_plant` and following from these starts, of which only counts are kept.
 SweepNumbers plants_task(std::span<const LoopCase> cases, std::uint32_t first_plant, std::uint32_t plants);
 
-/// The runs of one drawn plant from these starts, at most `sweep_group_size(config)`.
-std::vector<SweepRun> run_plant_group(const SweepConfig& config, std::uint32_t plant,
-                                      const std::vector<LoopCase>& group);
+/// The runs of `count` drawn plants from number `first` on, each from all of these starts: by plant, then
+/// start.
+std::vector<LoopResult> run_plants(const SweepConfig& config, std::uint32_t first, std::uint32_t count,
+                                   std::span<const LoopCase> cases);
+
+/// How many runs one call of the lanes should have, so that few of them are empty.
+std::size_t runs_per_call(const SweepConfig& config);
 
 /// What comes of a task of either kind. Depends on nothing else.
 SweepNumbers compute_task(const SweepConfig& config, const SweepNumbers& task);

@@ -3,6 +3,9 @@
 //
 // Then the continuous loop with delay, on the lanes and on the event engine.
 //
+// Before that, the lanes of each kind of registers that this build and processor have (--registers: these
+// only).
+//
 // 240 runs over starting angle and delay, 10 s each at 1 kHz, gain (7), velocity filter, no encoders (their
 // steps make the loop chaotic, so that trajectories cannot be compared).
 #include "sweep_bench.hpp"
@@ -195,7 +198,9 @@ void cores() {
 
 }  // namespace
 
-int main() {
+int main(int argc, char** argv) {
+  bench_registers();
+  if (argc > 1 && std::string(argv[1]) == "--registers") return 0;
   smooth();
   stick_slip();
   estimating("smooth exponential friction", "exponential", 100.0);

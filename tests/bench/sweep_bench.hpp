@@ -10,6 +10,7 @@
 
 #include "sim/loop/fast_loop.hpp"
 #include "upright/control/controller.hpp"
+#include "upright/control/model_parts.hpp"
 #include "upright/model/plant_file.hpp"
 
 namespace upright {
@@ -28,6 +29,27 @@ inline LoopSetup setup_for(const std::string& plant, double smoothing) {
   setup.control.gains = {70.7107, 304.9273, 143.3152, 61.0833};
   setup.sampled = true;
   setup.duration_s = 10.0;
+  return setup;
+}
+
+/// As the rig is.
+inline LoopSetup rig_loop(const std::string& plant) {
+  LoopSetup setup = setup_for(plant, 0.0);
+  setup.amplifier_limit_v = 15.0;
+  setup.cart_resolution_m = 2.27485e-5;
+  setup.angle_resolution_rad = 1.5339808e-3;
+  return setup;
+}
+
+/// With controllers that know the viscous plant.
+inline LoopSetup with_models(LoopSetup setup, bool estimates, bool predicts) {
+  setup.control.gains = {47.4, 120.0, 41.0, 22.8};
+  if (estimates) setup.control.state_estimator.kind = StateEstimatorKind::kalman;
+  if (predicts) setup.control.compensation.kind = CompensationKind::predictor;
+  const Plant believed = read_plant_file(std::string(UPRIGHT_SOURCE_DIR) + "/config/plants/viscous.yaml");
+  setup.make_parts = [believed](const ControlConfig& asked) {
+    return make_model_parts(asked, believed, believed);
+  };
   return setup;
 }
 
@@ -87,6 +109,10 @@ inline double events_ms(const LoopSetup& setup, const std::vector<LoopCase>& cas
   for (std::size_t i = 0; i < cases.size(); i += 4) run_with_events(setup, cases[i]);
   return 1e3 * (cpu_s() - begin) / static_cast<double>(cases.size() / 4);
 }
+
+/// Each kind of loop on each kind of registers, and lanes that are refilled. To be called before any lanes
+/// have run in this process.
+void bench_registers();
 
 /// The loop as the rig is, beside Boost odeint with events.
 void bench_as_the_rig_is();

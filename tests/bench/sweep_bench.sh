@@ -4,11 +4,11 @@
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 
-scripts/build.sh release sweep_bench
+scripts/build.sh bench sweep_bench
 venv=build/bench-venv
 [ -x $venv/bin/python ] || python3 -m venv $venv
 $venv/bin/python -c 'import numba, scipy' 2>/dev/null || $venv/bin/pip install --quiet numba scipy
 log=$(mktemp)
 trap 'rm -f "$log"' EXIT
-build/release/tests/bench/sweep_bench | tee "$log" | grep -v '_MS '
+build/bench/tests/bench/sweep_bench | tee "$log" | grep -v '_MS '
 $venv/bin/python tests/bench/sweep_bench.py "$(sed -n 's/^LANES_MS //p' "$log")" "$(sed -n 's/^RIG_MS //p' "$log")"

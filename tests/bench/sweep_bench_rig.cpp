@@ -5,7 +5,6 @@
 #include <cstdio>
 
 #include "sweep_bench.hpp"
-#include "upright/control/model_parts.hpp"
 #include "upright/sim/loop/loop_run.hpp"
 
 namespace upright {
@@ -14,25 +13,6 @@ namespace {
 
 namespace odeint = boost::numeric::odeint;
 using State = std::array<double, 4>;
-
-LoopSetup rig_loop(const std::string& plant) {
-  LoopSetup setup = setup_for(plant, 0.0);
-  setup.amplifier_limit_v = 15.0;
-  setup.cart_resolution_m = 2.27485e-5;
-  setup.angle_resolution_rad = 1.5339808e-3;
-  return setup;
-}
-
-LoopSetup with_models(LoopSetup setup, bool estimates, bool predicts) {
-  setup.control.gains = {47.4, 120.0, 41.0, 22.8};
-  if (estimates) setup.control.state_estimator.kind = StateEstimatorKind::kalman;
-  if (predicts) setup.control.compensation.kind = CompensationKind::predictor;
-  const Plant believed = read_plant_file(std::string(UPRIGHT_SOURCE_DIR) + "/config/plants/viscous.yaml");
-  setup.make_parts = [believed](const ControlConfig& asked) {
-    return make_model_parts(asked, believed, believed);
-  };
-  return setup;
-}
 
 /// Dormand and Prince's 5(4) pair with dense output, restarted at each stop and breakaway, which bisection
 /// finds.

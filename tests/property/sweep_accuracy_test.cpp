@@ -3,7 +3,10 @@
 // bristles and a force table.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <cstdio>
+#include <random>
 #include <string>
 #include <vector>
 
@@ -17,6 +20,31 @@ namespace upright {
 namespace {
 
 constexpr double bar = 1e-6;
+
+PlantState<double> released(const LoopCase& start) {
+  PlantState<double> state;
+  state.theta_rad = start.theta0_rad;
+  return state;
+}
+
+/// How a sampled loop ends on the event engine.
+PlantState<double> event_engine_end(const LoopSetup& setup, const LoopCase& start,
+                                    const EngineOptions& options) {
+  ControlConfig control = setup.control;
+  control.delay_s = start.delay_s;
+  Controller controller(control, setup.amplifier_limit_v,
+                        setup.make_parts ? setup.make_parts(control) : ModelParts{});
+  SampledLoop<EventEngine<double>> loop(setup.model, control.sample_rate_hz, options);
+  loop.start(released(start));
+  loop.advance_to(setup.duration_s, [&](std::uint64_t tick, const Measured& measured) {
+    ControlInput input;
+    input.tick = tick;
+    input.cart_m = measured[0];
+    input.theta_rad = measured[1];
+    return controller.step(input).voltage_v;
+  });
+  return loop.engine().state();
+}
 
 struct Friction {
   const char* name;
@@ -56,20 +84,8 @@ class SweepAccuracy : public testing::TestWithParam<Friction> {
     std::vector<LoopResult> lanes(cases.size());
     run_on_lanes(setup, cases, lanes);
     for (std::size_t i = 0; i < cases.size(); ++i) {
-      ControlConfig control = setup.control;
-      control.delay_s = cases[i].delay_s;
-      Controller controller(control, setup.amplifier_limit_v,
-                            setup.make_parts ? setup.make_parts(control) : ModelParts{});
-      SampledLoop<EventEngine<double>> loop(setup.model, control.sample_rate_hz, tight());
-      loop.start(released(cases[i]));
-      loop.advance_to(setup.duration_s, [&](std::uint64_t tick, const Measured& measured) {
-        ControlInput input;
-        input.tick = tick;
-        input.cart_m = measured[0];
-        input.theta_rad = measured[1];
-        return controller.step(input).voltage_v;
-      });
-      expect_near(lanes[i].end, loop.engine().state(), cases[i]);
+      const PlantState<double> truth = event_engine_end(setup, cases[i], tight());
+      expect_near(lanes[i].end, truth, cases[i]);
     }
   }
 
@@ -77,12 +93,6 @@ class SweepAccuracy : public testing::TestWithParam<Friction> {
     EngineOptions options;
     options.max_step_s = 2e-5;
     return options;
-  }
-
-  static PlantState<double> released(const LoopCase& start) {
-    PlantState<double> state;
-    state.theta_rad = start.theta0_rad;
-    return state;
   }
 
   static void expect_near(const PlantState<double>& lane, const PlantState<double>& truth,
@@ -162,6 +172,41 @@ TEST_P(SweepAccuracy, ContinuousLoops) {
     loop.advance_to(setup.duration_s);
     expect_near(lanes[i].end, loop.engine().state(), cases[i]);
   }
+}
+
+/// Bristles from soft to so stiff or so damped that the classical method would need a hundred steps a period.
+TEST(SweepAccuracyOfBristles, StiffOnesHoldTheBarOn240RandomRuns) {
+  std::mt19937_64 random(24);
+  std::uniform_real_distribution<double> part(0.0, 1.0);
+  const auto log_uniform = [&](double low, double high) { return low * std::pow(high / low, part(random)); };
+  int stiff = 0;
+  double worst = 0.0;
+  for (int i = 0; i < 240; ++i) {
+    Plant plant = read_plant_file(std::string(UPRIGHT_SOURCE_DIR) + "/config/plants/dynamic.yaml");
+    plant.set("bristle_friction", {log_uniform(1e3, 3e7), log_uniform(10.0, 2e3)});
+    LoopSetup setup;
+    setup.model = make_model<double>(plant);
+    setup.control.gains = {70.7107, 304.9273, 143.3152, 61.0833};
+    setup.sampled = true;
+    setup.amplifier_limit_v = 15.0;
+    setup.duration_s = 0.5;
+    const LoopCase start[] = {{0.005 + 0.05 * part(random), 0.014 * part(random)}};
+    SCOPED_TRACE(plant_text(plant));
+    ASSERT_TRUE(lanes_can_run(setup));
+    stiff += lanes_refill(setup) ? 1 : 0;
+    LoopResult lane[1];
+    run_on_lanes(setup, start, lane);
+    EngineOptions options;
+    options.max_step_s = 2e-5;
+    options.step_fraction = 0.02;
+    const PlantState<double> truth = event_engine_end(setup, start[0], options);
+    const double error = std::abs(lane[0].end.theta_rad - truth.theta_rad);
+    EXPECT_LT(error, bar) << start[0].theta0_rad << " rad, " << start[0].delay_s << " s";
+    worst = std::max(worst, error);
+  }
+  EXPECT_GT(stiff, 200);
+  RecordProperty("worst_error_rad", std::to_string(worst));
+  std::printf("stiff bristles: worst error %.1e rad\n", worst);
 }
 
 INSTANTIATE_TEST_SUITE_P(Frictions, SweepAccuracy,

@@ -197,6 +197,71 @@ TEST_P(SweepEncodersApart, AResultDoesNotDependOnTheRunsBesideIt) {
   }
 }
 
+void expect_same_bits(const LoopResult& one, const LoopResult& other) {
+  EXPECT_EQ(one.fell() ? one.fall_time_s : -1.0, other.fell() ? other.fall_time_s : -1.0);
+  EXPECT_EQ(one.theta_amplitude_rad, other.theta_amplitude_rad);
+  EXPECT_EQ(one.cart_amplitude_m, other.cart_amplitude_m);
+  EXPECT_EQ(one.end.theta_rad, other.end.theta_rad);
+  EXPECT_EQ(one.end.cart_mps, other.end.cart_mps);
+  EXPECT_EQ(one.end.bristle_m, other.end.bristle_m);
+}
+
+/// Runs that fall at once make room for others; in the other order, other runs share the lanes.
+TEST_P(SweepEncodersApart, RefilledLanesGiveTheSameBitsInAnyOrder) {
+  LoopSetup setup = SweepEncoders::setup();
+  ASSERT_TRUE(lanes_refill(setup));
+  setup.duration_s = 1.5;
+  setup.fell_above_rad = 0.3;
+  setup.amplifier_limit_v = 2.0;
+  std::vector<LoopCase> cases = random_cases(60, 0.06, 27);
+  for (std::size_t i = 0; i < cases.size(); i += 2) cases[i] = {0.28 + 0.0003 * static_cast<double>(i), 0.2};
+  const std::vector<LoopCase> reversed(cases.rbegin(), cases.rend());
+  for (const LaneRegisters registers : {LaneRegisters::wide, LaneRegisters::baseline}) {
+    std::vector<LoopResult> forward(cases.size()), backward(cases.size()), alone(1);
+    run_on_lanes(setup, cases, forward, registers);
+    run_on_lanes(setup, reversed, backward, registers);
+    std::size_t fell = 0;
+    for (std::size_t i = 0; i < cases.size(); ++i) {
+      SCOPED_TRACE(i);
+      expect_same_bits(forward[i], backward[cases.size() - 1 - i]);
+      if (i % 7 == 0) {
+        run_on_lanes(setup, std::span(cases).subspan(i, 1), alone, registers);
+        expect_same_bits(forward[i], alone[0]);
+      }
+      fell += forward[i].fell() ? 1 : 0;
+    }
+    EXPECT_GE(fell, cases.size() / 4);
+    EXPECT_LE(fell, cases.size() * 3 / 4);
+  }
+}
+
+/// Lanes have different plants at once, but for plants whose input delays or whole numbers differ.
+TEST_P(SweepEncodersApart, PlantsSideBySideGiveTheBitsOfOneAtATime) {
+  LoopSetup setup = SweepEncoders::setup();
+  setup.duration_s = 1.0;
+  const std::vector<LoopCase> cases = random_cases(3, 0.05, 28);
+  std::vector<PlantModel<double>> plants;
+  for (int i = 0; i < 12; ++i) {
+    Plant plant = plant_of(GetParam().plant);
+    plant.cart_mass_kg *= 1.0 + 0.01 * i;
+    plant.set("cart_scale", {1.0 + 0.002 * i});
+    plant.set("input_delay", {i < 8 ? 0.0012 : 0.001 + 0.0003 * i});
+    plant.set("stribeck_friction", {0.43, 0.1 + 0.002 * i, i < 4 ? 2.0 : 1.9 + 0.01 * i});
+    plants.push_back(make_model<double>(plant));
+  }
+  setup.model = plants[0];
+  std::vector<LoopResult> together(plants.size() * cases.size()), alone(cases.size());
+  run_plants_on_lanes(setup, plants, cases, together);
+  for (std::size_t i = 0; i < plants.size(); ++i) {
+    setup.model = plants[i];
+    run_on_lanes(setup, cases, alone);
+    for (std::size_t k = 0; k < cases.size(); ++k) {
+      SCOPED_TRACE(std::to_string(i) + " " + std::to_string(k));
+      expect_same_bits(together[i * cases.size() + k], alone[k]);
+    }
+  }
+}
+
 /// Without a voltage limit some of these motions leave all bounds within a period.
 TEST(SweepEncodersDiverging, EveryRunEnds) {
   for (const char* plant : {"dynamic", "exponential"}) {

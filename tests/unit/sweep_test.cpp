@@ -155,13 +155,23 @@ TEST(FastLoop, LeavesToTheEventEngineWhatItCannotDo) {
   setup.model = make_model<double>(plant);
   EXPECT_FALSE(lanes_can_run(setup));
   for (const auto& [kind, values] :
-       {std::pair<const char*, std::vector<double>>{"bristle_friction", {1e5, 70.0}},
+       {std::pair<const char*, std::vector<double>>{"bristle_friction", {1e9, 70.0}},
         {"stribeck_friction", {0.43, 1e-4, 2.0}}}) {
     plant = read_plant_file(source + "/config/plants/exponential.yaml");
     plant.set(effect_number(kind), values);
     setup.model = make_model<double>(plant);
     EXPECT_FALSE(lanes_can_run(setup)) << kind;
   }
+}
+
+TEST(FastLoop, TakesStiffBristlesInSampledLoopsOnly) {
+  Plant plant = read_plant_file(source + "/config/plants/dynamic.yaml");
+  plant.set("bristle_friction", {1e5, 70.0});
+  LoopSetup setup = sampled("dynamic");
+  setup.model = make_model<double>(plant);
+  EXPECT_TRUE(lanes_can_run(setup));
+  setup.sampled = false;
+  EXPECT_FALSE(lanes_can_run(setup));
 }
 
 LoopSetup continuous(const std::string& plant, double smoothing = 0.0) {
@@ -421,6 +431,37 @@ TEST_F(SweepFolder, HasTheSameBytesForAnyThreadsAndAfterAStop) {
     EXPECT_EQ(content(folder_ / "one" / name), content(folder_ / "three" / name)) << name;
     EXPECT_EQ(content(folder_ / "one" / name), content(folder_ / "cut" / name)) << name;
   }
+}
+
+/// Lanes with stick-slip and encoders are refilled: the tasks are other ones for each engine.
+TEST_F(SweepFolder, BisectionOnRefilledLanesHasTheSameBytes) {
+  std::string text = text_with("plant", source + "/config/plants/exponential.yaml");
+  text.replace(text.find("continuous"), 10, "sampled\n  rig: " + source + "/config/rigs/simulated.yaml");
+  text.replace(text.find("[1, 3]"), 6, "{from: 0.5, to: 5, count: 12}");
+  text.replace(text.find("to: 0.03, count: 7"), 18, "to: 0.08, count: 9");
+  const SweepConfig config = read_sweep_file(write(text));
+  ASSERT_TRUE(lanes_refill(config.setup));
+  const auto one = make_thread_executor(config, 1), three = make_thread_executor(config, 3);
+  SweepOptions options;
+  options.transitions_only = true;
+  const SweepResult alone = run_sweep(config, folder_ / "one", options, *one);
+  run_sweep(config, folder_ / "three", options, *three);
+  for (const char* name : {"sweep.csv", "transitions.csv"})
+    EXPECT_EQ(content(folder_ / "one" / name), content(folder_ / "three" / name)) << name;
+  ASSERT_EQ(alone.transitions.size(), 12u);
+  const std::vector<LoopResult> runs = [&] {
+    std::vector<LoopCase> cases;
+    for (const SweepRun& run : alone.runs) cases.push_back(run.start);
+    std::vector<LoopResult> made(cases.size());
+    run_on_lanes(config.setup, cases, made);
+    return made;
+  }();
+  std::size_t fell = 0;
+  for (std::size_t i = 0; i < runs.size(); ++i) {
+    fell += runs[i].fell() ? 1 : 0;
+    EXPECT_EQ(alone.runs[i].theta_amplitude_rad, runs[i].theta_amplitude_rad) << i;
+  }
+  EXPECT_GT(fell, runs.size() / 8);
 }
 
 TEST_F(SweepFolder, OverwritesNothingUnasked) {

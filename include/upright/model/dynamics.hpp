@@ -226,10 +226,10 @@ class Dynamics {
   /// The motion before the cart's dry friction acts, for engines whose lanes differ in the modes of their
   /// contacts.
   struct Balance {
-    S sine;          ///< of the angle
-    S cosine;        ///< of the angle
-    S force;         ///< on the cart, without dry friction [N]
-    S torque;        ///< about the pivot, without gravity [N m]
+    S sine;    ///< of the angle
+    S cosine;  ///< of the angle
+    S force;   ///< on the cart, without dry friction [N]
+    S torque;  ///< about the pivot, without gravity [N m]
   };
   /// For plants with a pendulum whose pivot cannot stick.
   Balance balance(const PlantState<S>& state, const S& motor_v) const {
@@ -329,6 +329,9 @@ class Dynamics {
     return rate;
   }
 
+  /// Lower bound of the level of bristles [N]: where it vanishes, they slip freely without a division by
+  /// zero.
+  static constexpr double smallest_level_n = 1e-6;
   S bristle_stiffness() const { return sum_of_bristles<true>(); }  ///< of the bristles [N/m]
   S bristle_damping() const { return sum_of_bristles<false>(); }   ///< of the bristles [N s/m]
 
@@ -349,9 +352,6 @@ class Dynamics {
     });
     return deflection;
   }
-
-  /// Lower bound of the level: where it vanishes, bristles slip freely without a division by zero.
-  static constexpr double smallest_level_n = 1e-6;
 
   template <class E, class T>
   static constexpr bool has_cart_level = requires(const T* q, const T& x) {

@@ -136,10 +136,10 @@ struct Relaxation {
 enum class Stage : std::uint8_t { middle, end };
 
 /// One step of length h from `s`. `first`: the rate at its beginning; `rate(state, Stage)`: at the other
-/// nodes. `bristles`: their motion, null where no relaxation is fast.
-template <MotorVoltage motor = MotorVoltage::held, class S, class Rate>
+/// nodes. `bristles`: their motion, as Relaxation<S>, null where no relaxation is fast.
+template <MotorVoltage motor = MotorVoltage::held, class S, class Rate, class Motion = Relaxation<S>>
 PlantState<S> runge_kutta_4(const Rate& rate, const PlantState<S>& s, const PlantState<S>& first, const S& h,
-                            const Relaxation<S>* bristles = nullptr) {
+                            const Motion* bristles = nullptr) {
   const S half = S(0.5) * h;
   S begin_smooth{}, middle_smooth{}, again_smooth{}, middle_m{};
   PlantState<S> at = moved<motor>(s, first, half);
