@@ -47,6 +47,12 @@ function(upright_compile_together name)
   endif()
 endfunction()
 
+# upright_compile_alone(SOURCES...): sources of this folder that are translation units of their own. For each typedef of double
+# in a class template g++ looks through all earlier ones, so a unit with many types of Eigen takes longer than its parts do.
+function(upright_compile_alone)
+  set_source_files_properties(${ARGN} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
+endfunction()
+
 # upright_optimise(NAME LEVEL): another level of optimisation than -O2 in a release build.
 function(upright_optimise name level)
   target_compile_options(${name} PRIVATE $<$<CONFIG:Release>:-O${level}>)
