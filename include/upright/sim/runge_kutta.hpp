@@ -136,7 +136,7 @@ struct Relaxation {
 enum class Stage : std::uint8_t { middle, end };
 
 /// One step of length h from `s`. `first`: the rate at its beginning; `rate(state, Stage)`: at the other
-/// nodes. `bristles`: their motion, as Relaxation<S>, null where no relaxation is fast.
+/// nodes. `bristles`: their motion, as `Relaxation` says it, null where no relaxation is fast.
 template <MotorVoltage motor = MotorVoltage::held, class S, class Rate, class Motion = Relaxation<S>>
 PlantState<S> runge_kutta_4(const Rate& rate, const PlantState<S>& s, const PlantState<S>& first, const S& h,
                             const Motion* bristles = nullptr) {
