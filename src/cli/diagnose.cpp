@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "commands.hpp"
+#include "diagnosis/described_curve.hpp"
 #include "diagnosis/diagnosis_json.hpp"
 #include "diagnosis/plain_words.hpp"
 #include "diagnosis/simulated_segments.hpp"
@@ -46,6 +47,19 @@ std::string in_words(const ParameterEstimate& p) {
   std::snprintf(text, sizeof text, "%s = %.5g %s (95%%: %.5g to %.5g)", p.name.c_str(), p.value,
                 p.unit.c_str(), p.low, p.high);
   return text;
+}
+
+/// The parameters of an effect, or the curve that describes a force.
+void print_parameters(const FoundEffect& effect) {
+  const auto curve = described_curve(effect);
+  if (!curve) {
+    for (const ParameterEstimate& p : effect.parameters) std::printf("      %s\n", in_words(p).c_str());
+    return;
+  }
+  std::printf("      over %s:\n", curve->over.c_str());
+  for (std::size_t i = 0; i < curve->at.size(); ++i)
+    std::printf("      %10.4g %-4s %10.4g (95%%: %.4g to %.4g)\n", curve->at[i], curve->unit.c_str(),
+                curve->force_n[i], curve->low_n[i], curve->high_n[i]);
 }
 
 /// In a line, without intervals.
@@ -106,6 +120,10 @@ void print_verdict(const Diagnosis& d) {
       break;
     case Verdict::unexplained:
       std::printf("Unexplained: the model lacks something that no known effect explains.\n");
+      break;
+    case Verdict::described:
+      std::printf(
+          "Described, not explained: no known effect accounts for the data. The missing force is a curve.\n");
       break;
     case Verdict::not_excited:
       std::printf("Not excited: these data could not show what the model may lack.\n");
@@ -195,7 +213,7 @@ void print(const Diagnosis& d, const std::string& out) {
     if (d.examined)
       std::printf(" gap %s -> %s", gap_text(effect.gap_before).c_str(), gap_text(effect.gap_after).c_str());
     std::printf("\n");
-    for (const ParameterEstimate& p : effect.parameters) std::printf("      %s\n", in_words(p).c_str());
+    print_parameters(effect);
     if (!effect.where.empty()) std::printf("      %s\n", in_plain_words(effect.where).c_str());
     if (!effect.indistinguishable_from.empty()) {
       std::string names;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <sstream>
 
 namespace upright {
 
@@ -79,6 +80,16 @@ std::vector<Detectable> may_hide(const std::vector<Detectable>& detectable, cons
     if (everywhere && given.find(d.effect) == nullptr && d.size > d.usual) hidden.push_back(d);
   }
   return hidden;
+}
+
+std::string sentence_on_hidden(const std::vector<Detectable>& hidden) {
+  std::ostringstream text;
+  text.precision(2);
+  for (const Detectable& d : hidden)
+    text << (text.str().empty() ? "" : "; ") << kind_of(d.effect)
+         << " could hide: these data would show it above " << d.size << " "
+         << effect_registry()[d.effect].parameters[0].unit << ", and " << d.usual << " is usual";
+  return text.str();
 }
 
 }  // namespace upright

@@ -1,6 +1,7 @@
 // The power of a diagnosis: the smallest size of each effect that these data would have shown.
 #pragma once
 
+#include <string>
 #include <vector>
 
 #include "indistinguishable.hpp"
@@ -20,5 +21,8 @@ double standard_errors_to_be_shown(std::size_t effect, bool is_correction, const
 /// not have shown at its usual size.
 std::vector<Detectable> may_hide(const std::vector<Detectable>& detectable, const Plant& given,
                                  const PowerPolicy& policy);
+
+/// Which effects these could hide, and below which size. Empty if there are none.
+std::string sentence_on_hidden(const std::vector<Detectable>& hidden);
 
 }  // namespace upright

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numeric>
 #include <set>
 #include <sstream>
 #include <tuple>
@@ -15,6 +14,7 @@
 #include "disturbance_null.hpp"
 #include "estimation/held_out.hpp"
 #include "estimation/smoother.hpp"
+#include "force_description.hpp"
 #include "indistinguishable.hpp"
 #include "listing.hpp"
 #include "next_experiment.hpp"
@@ -61,6 +61,23 @@ class Diagnostician {
     if (!decided_) report_so_far();
     return std::move(result_);
   }
+  /// Looks at the force that what run() found leaves, and adds it to the answer: as a curve if that halves
+  /// the held-out error at least, and else in words.
+  void describe_what_is_left(Diagnosis& diagnosis) {
+    if (!beyond_sensors_) return;
+    options_.tell(0.98, "describing what is left");
+    const auto force = describe_force(search_, final_, known_);
+    const double named = std::min(listing_.numbers_moved.value_or(listing_.after), listing_.after);
+    const double lower = force ? named / force->held_out_error : 1.0;
+    if (lower > policy_.power.clear_gap) {
+      add_curve(*force, named, diagnosis);
+    } else if (lower > std::exp(policy_.acceptance.worse_simulation_by_chance)) {
+      diagnosis.verdict = Verdict::unexplained;
+      diagnosis.residual = force->left_sentence(lower);
+    } else if (const auto left = place_force_left(search_, known_)) {
+      diagnosis.notes.push_back(*left);
+    }
+  }
   /// Whether an effect was found that the plant file lacks, not only numbers of it that are off.
   bool found_missing_effect() const {
     return std::any_of(selection_.found().begin(), selection_.found().end(),
@@ -83,6 +100,34 @@ class Diagnostician {
   const FitData& bounded(FitData& data) {
     data.bound = &bound_;
     return data;
+  }
+
+  /// `named`: the held-out error without the curve.
+  void add_curve(const ForceDescription& force, double named, Diagnosis& diagnosis) const {
+    const double floor = std::min(floor_, force.held_out_error);
+    scale_gaps(diagnosis, floor_ / floor);
+    for (FoundEffect& found : diagnosis.effects)
+      if (force.moved(found.effect)) found.parameters = estimates_of(found.effect, force.known);
+    diagnosis.effects.push_back(force.as_effect(named / floor, force.held_out_error / floor));
+    diagnosis.gap_after = diagnosis.effects.back().gap_after;
+    diagnosis.verdict = Verdict::described;
+    std::vector<std::size_t> listed = all_found();
+    listed.push_back(diagnosis.effects.back().effect);
+    diagnosis.model = model_with(plant_, force.known.train.point.plant, search_.nuisances(), listed);
+    diagnosis.numbers = moved_numbers(plant_, diagnosis.model, search_.range(), policy_.prior);
+    diagnosis.noise = force.known.train.point.noise;
+    diagnosis.residual = examine_fit(search_.all_data(), force.known.train.point, policy_, budget_).sentence;
+    diagnosis.residual_after = smooth_residuals(data_.held, force.judged.held.point, policy_.location.walk);
+  }
+
+  /// Another unit of all gaps.
+  static void scale_gaps(Diagnosis& diagnosis, double factor) {
+    diagnosis.gap_before *= factor;
+    for (FoundEffect& found : diagnosis.effects) {
+      found.gap_before *= factor;
+      found.gap_after *= factor;
+    }
+    for (CandidateScore& candidate : diagnosis.candidates) candidate.gap_after *= factor;
   }
 
   static double samples_of(const DataSplit& data) {
@@ -168,15 +213,11 @@ class Diagnostician {
     if (!left.structured) return left;
     options_.tell(0.945, "estimating a coloured disturbance");
     const FitResult coloured = search_.with_coloured_noise(known_);
-    if (!(likelihood_of(known_.train) - likelihood_of(coloured) > policy_.acceptance.min_evidence))
+    if (!(minus_log_likelihood(known_.train) - minus_log_likelihood(coloured) >
+          policy_.acceptance.min_evidence))
       return left;
     noise_ = coloured.point.noise;
     return tests_of(coloured.point, noise_);
-  }
-
-  /// Minus twice its logarithm, without priors.
-  static double likelihood_of(const FitResult& fitted) {
-    return std::accumulate(fitted.segment_objective.begin(), fitted.segment_objective.end(), 0.0);
   }
 
   /// Which of the corrections that every fit was left room for are really there.
@@ -297,13 +338,13 @@ class Diagnostician {
     const bool numbers_only = all.empty() && listing_.numbers_moved < listing_.before &&
                               listing_.before > policy_.power.clear_gap * usual;
     if (numbers_only) listing_.after = *listing_.numbers_moved;
-    const double floor = std::max(std::min(usual, listing_.after), std::numeric_limits<double>::min());
-    result_.gap_before = listing_.before / floor;
+    floor_ = std::max(std::min(usual, listing_.after), std::numeric_limits<double>::min());
+    result_.gap_before = listing_.before / floor_;
     for (const Listing::Row& row : listing_.rows) {
       FoundEffect found;
       found.effect = row.effect;
-      found.gap_before = row.before / floor;
-      found.gap_after = row.after / floor;
+      found.gap_before = row.before / floor_;
+      found.gap_after = row.after / floor_;
       found.parameters = estimates_of(row.effect, known_);
       found.where = selection_.where(row.effect);
       for (const Reproduction& r : reproductions_)
@@ -313,7 +354,7 @@ class Diagnostician {
         }
       result_.effects.push_back(found);
     }
-    result_.gap_after = listing_.after / floor;
+    result_.gap_after = listing_.after / floor_;
     result_.residual = tests.sentence;
     const Plant& fitted = known_.train.point.plant;
     result_.model =
@@ -324,14 +365,13 @@ class Diagnostician {
       for (auto& [effect, h] : selection_.finalists()) {
         if (effect != candidate.effect) continue;
         candidate.evidence = compare(selection_.given(), h).train;
-        candidate.gap_after = search_.simulate(h).gap / floor;
+        candidate.gap_after = search_.simulate(h).gap / floor_;
       }
     }
     std::stable_sort(result_.candidates.begin(), result_.candidates.end(),
                      [](const auto& a, const auto& b) { return a.evidence > b.evidence; });
     note_doubtful_numbers();
-    if (tests.beyond_sensors)
-      if (const auto left = place_force_left(search_, known_)) result_.notes.push_back(*left);
+    beyond_sensors_ = tests.beyond_sensors;
     opened_ = open_effects(search_, final_, all);
     result_.detectable = detectable_sizes(search_, final_, opened_);
     decide(tests);
@@ -428,10 +468,9 @@ class Diagnostician {
     if (clear_gap)
       text << "the fitted runs leave the numbers of the plant file so open that held-out data are "
            << result_.gap_after << " times as far off as noise: record longer runs";
-    for (const Detectable& d : hidden)
-      text << (text.str().empty() ? "" : "; ") << kind_of(d.effect)
-           << " could hide: these data would show it above " << d.size << " "
-           << effect_registry()[d.effect].parameters[0].unit << ", and " << d.usual << " is usual";
+    const std::string could_hide = sentence_on_hidden(hidden);
+    if (clear_gap && !could_hide.empty()) text << "; ";
+    text << could_hide;
     if (!text.str().empty()) result_.notes.push_back(text.str());
   }
 
@@ -498,7 +537,9 @@ class Diagnostician {
   DataSplit data_;
   const double work_samples_;  ///< of the search at most
   WorkBound bound_;
-  bool decided_ = false;  ///< the verdict stands
+  double floor_ = 1.0;           ///< error of a simulation that noise accounts for [sensor noise]
+  bool decided_ = false;         ///< the verdict stands
+  bool beyond_sensors_ = false;  ///< more is left than noise of the sensors
   Search search_;
   StepwiseSelection selection_;
   Hypothesis final_;  ///< fitted to the training runs, judged on the others
@@ -512,50 +553,6 @@ class Diagnostician {
 };
 
 }  // namespace
-
-std::string kind_of(std::size_t effect) {
-  return std::string(effect_registry()[effect].kind);
-}
-
-std::string_view name_of(Verdict verdict) {
-  switch (verdict) {
-    case Verdict::explained:
-      return "explained";
-    case Verdict::no_discrepancy:
-      return "no_discrepancy";
-    case Verdict::unexplained:
-      return "unexplained";
-    case Verdict::not_excited:
-      return "not_excited";
-  }
-  return "";
-}
-
-double share_of(const RunEvidence& run, const std::vector<RunEvidence>& all) {
-  double sum = 0.0;
-  for (const RunEvidence& of : all) sum += std::max(of.evidence, 0.0);
-  return sum > 0.0 ? std::max(run.evidence, 0.0) / sum : 0.0;
-}
-
-NextBest next_best(const Diagnosis& diagnosis, const FoundEffect& effect) {
-  const double near = SelectionPolicy{}.distinction.next_best_share;
-  const std::size_t max_others = SearchBudget{}.max_next_best;
-  NextBest best;
-  for (const Trial& trial : diagnosis.trials)
-    if (trial.taken && trial.effect == effect.effect) best.taken = &trial;
-  if (best.taken == nullptr) return best;
-  for (const Trial& trial : diagnosis.trials) {
-    const std::vector<std::size_t>& same = effect.indistinguishable_from;
-    const double share = trial.evidence / best.taken->evidence;
-    if (trial.round == best.taken->round && share > near && share < 1.0 &&
-        std::find(same.begin(), same.end(), trial.effect) == same.end())
-      best.others.push_back(&trial);
-  }
-  std::stable_sort(best.others.begin(), best.others.end(),
-                   [](const Trial* a, const Trial* b) { return a->evidence > b->evidence; });
-  if (best.others.size() > max_others) best.others.resize(max_others);
-  return best;
-}
 
 Diagnosis diagnose(const Plant& plant, const std::vector<Measurement>& runs,
                    const DiagnosisOptions& options) {
@@ -576,17 +573,20 @@ Diagnosis diagnose(const Plant& plant, const std::vector<Measurement>& runs,
   const bool unexplained = diagnosis.verdict == Verdict::unexplained;
   try {
     // A weak effect may show too little in the runs that are left once one is held out.
-    if (unexplained ? !first.misses_held_out_excitation() : first.found_missing_effect()) return diagnosis;
-    options.tell(0.02, "repeating the search with other runs held out");
-    Diagnostician second(plant, runs, options, HeldOut::other);
-    Diagnosis other = second.run();
-    if (other.verdict == Verdict::explained && (unexplained || second.found_missing_effect())) {
-      other.notes.emplace_back(
-          "the runs held out at first show what the others alone do not: others were held out instead");
-      return other;
+    if (unexplained ? first.misses_held_out_excitation() : !first.found_missing_effect()) {
+      options.tell(0.02, "repeating the search with other runs held out");
+      Diagnostician second(plant, runs, options, HeldOut::other);
+      Diagnosis other = second.run();
+      if (other.verdict == Verdict::explained && (unexplained || second.found_missing_effect())) {
+        second.describe_what_is_left(other);
+        other.notes.emplace_back(
+            "the runs held out at first show what the others alone do not: others were held out instead");
+        return other;
+      }
+      diagnosis.interrupted = other.interrupted;
+      diagnosis.bound_reached = other.bound_reached;
     }
-    diagnosis.interrupted = other.interrupted;
-    diagnosis.bound_reached = other.bound_reached;
+    if (!diagnosis.interrupted) first.describe_what_is_left(diagnosis);
   } catch (const Interrupted&) {
     diagnosis.interrupted = true;
   } catch (const BoundReached&) {

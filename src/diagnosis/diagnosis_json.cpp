@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "described_curve.hpp"
+
 namespace upright {
 
 namespace {
@@ -131,19 +133,32 @@ json list_json(const std::vector<T>& list, const F& as_json) {
   return items;
 }
 
+json curve_json(const DescribedCurve& curve) {
+  json intervals = json::array();
+  for (std::size_t i = 0; i < curve.at.size(); ++i)
+    intervals.push_back({number(curve.low_n[i]), number(curve.high_n[i])});
+  return {{"over", curve.over},
+          {"unit", curve.unit},
+          {"at", curve.at},
+          {"force_n", curve.force_n},
+          {"ci95", intervals}};
+}
+
 json effect_json(const Diagnosis& diagnosis, const FoundEffect& effect) {
   json confusable = json::array();
   for (const std::size_t other : effect.indistinguishable_from) confusable.push_back(kind_of(other));
-  return {{"kind", kind_of(effect.effect)},
-          {"enters", std::string(name_of(effect_registry()[effect.effect].enters))},
-          {"gap_before", number(effect.gap_before)},
-          {"gap_after", number(effect.gap_after)},
-          {"parameters", parameters_json(effect.parameters)},
-          {"confusable_with", confusable},
-          {"next_best", next_best_json(next_best(diagnosis, effect))},
-          {"where", effect.where},
-          {"shown_on", shown_on_json(diagnosis, effect.shown_on)},
-          {"shows_most", shows_most_json(diagnosis, effect)}};
+  json document = {{"kind", kind_of(effect.effect)},
+                   {"enters", std::string(name_of(effect_registry()[effect.effect].enters))},
+                   {"gap_before", number(effect.gap_before)},
+                   {"gap_after", number(effect.gap_after)},
+                   {"parameters", parameters_json(effect.parameters)},
+                   {"confusable_with", confusable},
+                   {"next_best", next_best_json(next_best(diagnosis, effect))},
+                   {"where", effect.where},
+                   {"shown_on", shown_on_json(diagnosis, effect.shown_on)},
+                   {"shows_most", shows_most_json(diagnosis, effect)}};
+  if (const auto curve = described_curve(effect)) document["curve"] = curve_json(*curve);
+  return document;
 }
 
 }  // namespace

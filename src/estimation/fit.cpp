@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 
 #include "base/parallel.hpp"
 #include "gauss_newton.hpp"
@@ -115,6 +116,10 @@ double whitened_rms(const FitResult& result) {
     count += result.segment_samples[s];
   }
   return std::sqrt(sum / std::max(count, 1e-9));
+}
+
+double minus_log_likelihood(const FitResult& result) {
+  return std::accumulate(result.segment_objective.begin(), result.segment_objective.end(), 0.0);
 }
 
 }  // namespace upright

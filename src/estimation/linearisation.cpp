@@ -362,7 +362,9 @@ void linearise_segment(const FitData& data, std::size_t s, const FitPoint& point
   if (slots <= 8) return with.template operator()<8>();
   if (slots <= 16) return with.template operator()<16>();
   if (slots <= 24) return with.template operator()<24>();
-  return with.template operator()<32>();
+  constexpr int max_slots = 32;
+  static_assert(max_slots == max_free_parameters + state_count);
+  return with.template operator()<max_slots>();
 }
 
 }  // namespace upright

@@ -47,6 +47,8 @@ void add_answer(HtmlPage& page, const json& d, const std::filesystem::path& file
                                   : "Explained: the model lacked the effects listed below"}},
       {"no_discrepancy", {Tone::good, "No discrepancy: the model agrees with the data"}},
       {"unexplained", {Tone::warning, "Unexplained: something is missing that no known effect accounts for"}},
+      {"described",
+       {Tone::warning, "Described, not explained: no known effect accounts for it; the force is a curve"}},
       {"not_excited", {Tone::neutral, "Not excited: these data could not show what the model may lack"}}};
   const auto known = headlines.find(verdict);
   if (known == headlines.end())
@@ -84,21 +86,47 @@ std::string shown_sentence(const json& effect) {
          " s. Share of each run in what shows it: " + runs + ".";
 }
 
+/// The curve that describes a force, with its band.
+void add_curve(HtmlPage& page, const json& curve) {
+  const std::vector<double> at = curve.at("at"), force = curve.at("force_n");
+  std::vector<double> low, high;
+  for (const json& interval : curve.at("ci95")) {
+    low.push_back(number(interval.at(0)));
+    high.push_back(number(interval.at(1)));
+  }
+  const std::string over = curve.at("over"), unit = curve.at("unit");
+  Plot plot;
+  plot.title = "force_table";
+  plot.x.label = (unit == "m/s" ? "cart velocity [" : "cart position [") + unit + "]";
+  plot.y.label = over == "position_and_velocity" ? "N per m/s" : "N";
+  plot.bands.push_back({"95 %", at, low, high});
+  plot.series.push_back({"force", at, force, Series::Style::line, color::after, false});
+  page.figure(plot, "The missing force on the cart as a curve over " + over +
+                        ", with its 95 % band. No known effect has this shape.");
+}
+
 void add_effects(HtmlPage& page, const json& d) {
   if (d.at("effects").empty()) return;
   page.section("Effects found");
   HtmlTable table{{"effect", "parameter", "value", "95 % from", "to", "unit"},
                   {},
                   "Values in model.yaml with 95 % confidence intervals."};
-  for (const json& effect : d.at("effects"))
+  for (const json& effect : d.at("effects")) {
+    if (effect.contains("curve")) continue;
     for (const auto& [name, p] : effect.at("parameters").items()) {
       const double low = number(p.at("ci95").at(0)), high = number(p.at("ci95").at(1));
       table.rows.push_back({effect.at("kind"), name, number_within(number(p.at("value")), low, high),
                             number_within(low, low, high), number_within(high, low, high), p.at("unit")});
     }
-  page.table(table);
+  }
+  if (!table.rows.empty()) page.table(table);
   for (const json& effect : d.at("effects")) {
     const std::string kind = effect.at("kind"), where = effect.at("where");
+    if (effect.contains("curve")) {
+      add_curve(page, effect.at("curve"));
+      page.paragraph("The force: " + where + ".");
+      continue;
+    }
     if (!where.empty())
       page.paragraph("Residual before " + kind + " was added: " + in_plain_words(where) + ".");
     const std::string shown = shown_sentence(effect);

@@ -18,7 +18,7 @@ namespace upright {
 std::string kind_of(std::size_t effect);
 
 /// What the data say about the model.
-enum class Verdict { explained, no_discrepancy, unexplained, not_excited };
+enum class Verdict { explained, no_discrepancy, unexplained, not_excited, described };
 std::string_view name_of(Verdict verdict);  ///< "explained", "no_discrepancy", ..
 
 /// What an effect saves on one run: the fall of minus twice the log likelihood, with the noise of the model

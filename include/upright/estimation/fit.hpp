@@ -83,7 +83,10 @@ struct FitOptions {
   double tolerance = 1e-4;                   ///< stop at this relative reduction of the objective per sample
 };
 
-/// Fits a plant. The objective of a failed fit is infinite. Throws only Interrupted (parallel.hpp), and
+/// The most parameters that a fit can free.
+inline constexpr std::size_t max_free_parameters = 27;
+
+/// Fits a plant. At most `max_free_parameters` are free. The objective of a failed fit is infinite. Throws only Interrupted (parallel.hpp), and
 /// BoundReached if the bound of the data was reached beforehand. A fit that reaches the bound returns its
 /// present point.
 FitResult fit(const FitData& data, const FitPoint& start, const std::vector<FreeParameter>& free,
@@ -102,5 +105,8 @@ std::vector<std::vector<LinearStep>> linearise(const FitData& data, const FitPoi
 
 /// Root mean square of the whitened residuals over all samples [noise standard deviations].
 double whitened_rms(const FitResult& result);
+
+/// Minus twice the log likelihood of a fit, without its priors.
+double minus_log_likelihood(const FitResult& result);
 
 }  // namespace upright

@@ -1,4 +1,4 @@
-#include "place_force.hpp"
+#include "force_curve.hpp"
 
 #include <Eigen/Cholesky>
 #include <algorithm>
@@ -16,14 +16,15 @@ constexpr Eigen::Index total_states = LinearStep::states + LinearStep::disturban
 /// Rows that are multiplied at once.
 constexpr Eigen::Index rows_at_once = 64;
 
-/// Where a force that belongs to a place acts: shares of two neighbouring nodes.
+/// Shares of two neighbouring nodes in the value of a curve.
 struct NodeShares {
   std::size_t lower;
   double of_upper;
 };
 
-NodeShares shares_at(double place_m, const TrackNodes& nodes) {
-  const double at = (place_m - nodes.first_m) / nodes.spacing_m;
+/// Beyond the nodes the curve is constant.
+NodeShares shares_at(double quantity, const CurveNodes& nodes) {
+  const double at = (quantity - nodes.first) / nodes.spacing;
   const double bounded = std::clamp(at, 0.0, static_cast<double>(nodes.count - 1));
   const std::size_t lower = std::min(static_cast<std::size_t>(bounded), nodes.count - 2);
   return {lower, bounded - static_cast<double>(lower)};
@@ -32,11 +33,11 @@ NodeShares shares_at(double place_m, const TrackNodes& nodes) {
 /// The normal equations of one segment: errors of the initial state first, then the nodes that it passes.
 class SegmentEquations {
  public:
-  SegmentEquations(const Measurement& run, const Segment& segment, const TrackNodes& nodes)
-      : run_(run), segment_(segment), nodes_(nodes), first_(nodes.count) {
+  SegmentEquations(const CurveArgument& argument, const CurveNodes& nodes)
+      : argument_(argument), nodes_(nodes), first_(nodes.count) {
     std::size_t last = 0;
-    for (std::size_t k = segment.first; k <= segment.last; ++k) {
-      const std::size_t lower = shares_at(run.cart_m[k], nodes).lower;
+    for (const double quantity : argument.at) {
+      const std::size_t lower = shares_at(quantity, nodes).lower;
       first_ = std::min(first_, lower);
       last = std::max(last, lower + 1);
     }
@@ -50,7 +51,7 @@ class SegmentEquations {
 
   void follow(const std::vector<LinearStep>& steps) {
     for (std::size_t k = 0; k < steps.size(); ++k) {
-      if (k > 0) predict(steps[k], run_.cart_m[segment_.first + k - 1]);
+      if (k > 0) predict(steps[k], k - 1);
       for (int channel = 0; channel < 2; ++channel)
         if (steps[k].weight[channel] > 0.0 && steps[k].variance[channel] > 0.0) update(steps[k], channel);
     }
@@ -58,8 +59,8 @@ class SegmentEquations {
   }
 
   /// Adds its part to the equations of all, without what an error of the initial state may account for.
-  void add_to(PlaceForceEquations& all) const {
-    const Eigen::Index places = columns_ - state_count, first = static_cast<Eigen::Index>(first_);
+  void add_to(CurveEquations& all) const {
+    const Eigen::Index values = columns_ - state_count, first = static_cast<Eigen::Index>(first_);
     Eigen::MatrixXd of_start = information_.topLeftCorner(state_count, state_count);
     // A state that nothing shows, as the deflection of bristles that are not there, stays where it is.
     for (Eigen::Index i = 0; i < state_count; ++i)
@@ -68,27 +69,28 @@ class SegmentEquations {
     of_start = scale.asDiagonal() * of_start * scale.asDiagonal();
     constexpr double smallest_share = 1e-10;  // keeps the factor regular
     of_start.diagonal().array() += smallest_share;
-    const Eigen::MatrixXd coupled = scale.asDiagonal() * information_.topRightCorner(state_count, places);
+    const Eigen::MatrixXd coupled = scale.asDiagonal() * information_.topRightCorner(state_count, values);
     const Eigen::VectorXd score = scale.asDiagonal() * score_.head(state_count);
     const Eigen::LDLT<Eigen::MatrixXd> factor(of_start);
-    all.information.block(first, first, places, places) +=
-        information_.bottomRightCorner(places, places) - coupled.transpose() * factor.solve(coupled);
-    all.score.segment(first, places) += score_.tail(places) - coupled.transpose() * factor.solve(score);
+    all.information.block(first, first, values, values) +=
+        information_.bottomRightCorner(values, values) - coupled.transpose() * factor.solve(coupled);
+    all.score.segment(first, values) += score_.tail(values) - coupled.transpose() * factor.solve(score);
   }
 
  private:
   using RowMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
-  /// The force at the place where a period begins acts over the period.
-  void predict(const LinearStep& step, double place_m) {
-    const NodeShares at = shares_at(place_m, nodes_);
+  /// The force at the sample where a period begins acts over the period.
+  void predict(const LinearStep& step, std::size_t from) {
+    const NodeShares at = shares_at(argument_.at[from], nodes_);
+    const double factor = argument_.factor.empty() ? 1.0 : argument_.factor[from];
     const Eigen::Index lower = state_count + static_cast<Eigen::Index>(at.lower - first_);
     for (Eigen::Index i = 0; i < 2; ++i) {
       for (Eigen::Index d = 0; d < LinearStep::disturbances; ++d)
         if (step.impulse[d][i] != 0.0 && step.keeps > 0.0)
           state_.row(2 + i) += step.impulse[d][i] * state_.row(state_count + d);
-      state_(2 + i, lower) += step.impulse[0][i] * (1.0 - at.of_upper);
-      state_(2 + i, lower + 1) += step.impulse[0][i] * at.of_upper;
+      state_(2 + i, lower) += factor * step.impulse[0][i] * (1.0 - at.of_upper);
+      state_(2 + i, lower + 1) += factor * step.impulse[0][i] * at.of_upper;
     }
     const Eigen::Map<const Eigen::Matrix<double, LinearStep::states, LinearStep::states, Eigen::RowMajor>>
         transition(&step.transition[0][0]);
@@ -111,9 +113,8 @@ class SegmentEquations {
     rows_ = 0;
   }
 
-  const Measurement& run_;
-  const Segment& segment_;
-  const TrackNodes& nodes_;
+  const CurveArgument& argument_;
+  const CurveNodes& nodes_;
   std::size_t first_;  ///< node that the segment passes
   Eigen::Index columns_ = 0, rows_ = 0;
   RowMatrix state_;  ///< change of the state's error with each column
@@ -123,21 +124,32 @@ class SegmentEquations {
 
 }  // namespace
 
-PlaceForceEquations place_force_equations(const FitData& data, const FitPoint& point,
-                                          const TrackNodes& nodes) {
-  const std::vector<std::vector<LinearStep>> steps = linearise(data, point);
+std::vector<CurveArgument> shown_places(const FitData& data) {
+  std::vector<CurveArgument> places(data.segments.size());
+  for (std::size_t s = 0; s < places.size(); ++s) {
+    const Segment& segment = data.segments[s];
+    const Measurement& run = (*data.runs)[segment.run];
+    if (!run.has_cart() || run.cart_locked) continue;
+    const auto first = run.cart_m.begin() + static_cast<std::ptrdiff_t>(segment.first);
+    places[s].at.assign(first, first + static_cast<std::ptrdiff_t>(segment.last - segment.first + 1));
+  }
+  return places;
+}
+
+CurveEquations curve_equations(const std::vector<std::vector<LinearStep>>& steps, const CurveNodes& nodes,
+                               const std::vector<CurveArgument>& arguments) {
   const auto count = static_cast<Eigen::Index>(nodes.count);
-  std::vector<PlaceForceEquations> parts(steps.size());
+  const CurveEquations nothing{Eigen::MatrixXd::Zero(count, count), Eigen::VectorXd::Zero(count)};
+  std::vector<CurveEquations> parts(steps.size());
   parallel_for(steps.size(), [&](std::size_t s) {
-    const Measurement& run = (*data.runs)[data.segments[s].run];
-    if (!run.has_cart() || run.cart_locked) return;
-    parts[s] = {Eigen::MatrixXd::Zero(count, count), Eigen::VectorXd::Zero(count)};
-    SegmentEquations equations(run, data.segments[s], nodes);
+    if (arguments[s].at.empty()) return;
+    parts[s] = nothing;
+    SegmentEquations equations(arguments[s], nodes);
     equations.follow(steps[s]);
     equations.add_to(parts[s]);
   });
-  PlaceForceEquations all{Eigen::MatrixXd::Zero(count, count), Eigen::VectorXd::Zero(count)};
-  for (const PlaceForceEquations& part : parts) {
+  CurveEquations all = nothing;
+  for (const CurveEquations& part : parts) {
     if (part.score.size() == 0) continue;
     all.information += part.information;
     all.score += part.score;

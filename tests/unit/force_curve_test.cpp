@@ -1,5 +1,5 @@
-// What innovations say of a force that belongs to the place.
-#include "estimation/place_force.hpp"
+// What innovations say of a force that is a curve over the place.
+#include "estimation/force_curve.hpp"
 
 #include <gtest/gtest.h>
 
@@ -40,14 +40,19 @@ struct Record {
   }
 
   /// Over the places that the cart was at.
-  TrackNodes nodes(std::size_t count) const {
+  CurveNodes nodes(std::size_t count) const {
     const auto [low, high] = std::minmax_element(runs[0].cart_m.begin(), runs[0].cart_m.end());
     return {*low, (*high - *low) / static_cast<double>(count - 1), count};
+  }
+
+  /// Of a curve over the place.
+  CurveEquations equations(const FitPoint& point, const CurveNodes& over) const {
+    return curve_equations(linearise(data, point), over, shown_places(data));
   }
 };
 
 /// The same force everywhere is the effect `constant_force`, whose derivatives the fit has by itself.
-TEST(PlaceForce, ThatIsTheSameEverywhereIsTheConstantForce) {
+TEST(ForceCurve, ThatIsFlatIsTheConstantForce) {
   Plant plant = cart_and_pendulum();
   const Record record(plant);
   plant.set("constant_force", {0.0});
@@ -55,12 +60,12 @@ TEST(PlaceForce, ThatIsTheSameEverywhereIsTheConstantForce) {
   FitOptions held;
   held.noise_rounds = 0;
   const FitResult fitted = fit(record.data, record.start(plant), free, held);
-  const PlaceForceEquations places = place_force_equations(record.data, fitted.point, record.nodes(20));
+  const CurveEquations places = record.equations(fitted.point, record.nodes(20));
   EXPECT_NEAR(places.information.sum() / fitted.information(0, 0), 1.0, 2e-3);
   EXPECT_NEAR(places.score.sum(), 0.0, 0.05 * std::sqrt(fitted.information(0, 0)));
 }
 
-TEST(PlaceForce, IsRecoveredFromTheInnovations) {
+TEST(ForceCurve, IsRecoveredFromTheInnovations) {
   Plant truth = cart_and_pendulum();
   constexpr double amplitude_n = 0.2, pitch_m = 0.1;
   truth.set("cogging_force", {amplitude_n, pitch_m, 0.0});
@@ -70,13 +75,13 @@ TEST(PlaceForce, IsRecoveredFromTheInnovations) {
   held.noise_rounds = 0;
   const FitResult followed = fit(record.data, without, {}, held);
   constexpr Eigen::Index count = 30;
-  const TrackNodes nodes = record.nodes(count);
-  const PlaceForceEquations places = place_force_equations(record.data, followed.point, nodes);
+  const CurveNodes nodes = record.nodes(count);
+  const CurveEquations places = record.equations(followed.point, nodes);
   const Eigen::MatrixXd prior = Eigen::MatrixXd::Identity(count, count) / (amplitude_n * amplitude_n);
   const Eigen::VectorXd force_n = (places.information + prior).ldlt().solve(places.score);
   double error = 0.0, size = 0.0;
   for (Eigen::Index i = 3; i < count - 3; ++i) {  // the ends were hardly visited
-    const double x_m = nodes.first_m + nodes.spacing_m * static_cast<double>(i);
+    const double x_m = nodes.first + nodes.spacing * static_cast<double>(i);
     const double expected_n = amplitude_n * std::sin(2.0 * M_PI * x_m / pitch_m);
     error += std::pow(force_n[i] - expected_n, 2);
     size += std::pow(expected_n, 2);

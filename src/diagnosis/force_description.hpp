@@ -1,0 +1,33 @@
+// The last resort where no named effect suffices: the force on the cart that is missing, as a curve over the
+// quantity that shows it best (effect `force_table`). It describes the force and does not explain it.
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "search.hpp"
+
+namespace upright {
+
+/// A model with the curve.
+struct ForceDescription {
+  Hypothesis judged;            ///< fitted to the training data, held-out data followed by simulation
+  Hypothesis known;             ///< fitted to all data
+  double held_out_error = 0.0;  ///< of an open-loop simulation of held-out data [sensor noise]
+  std::string where;            ///< over what the force lies, and how clear that is
+
+  /// Whether the fits moved the parameters of this effect too.
+  bool moved(std::size_t effect) const;
+  /// What is left without the curve, which lowers the held-out error by this factor.
+  std::string left_sentence(double factor) const;
+  /// The curve as an effect of the answer, with these gaps.
+  FoundEffect as_effect(double gap_before, double gap_after) const;
+};
+
+/// Empty if the cart does not move, if no data are held out, if the plant file has a table already, or if the
+/// training data show no such force. `judged`: a fit to the training data, `known`: to all data. Whether the
+/// curve helps on held-out data is for the caller to judge. Throws Interrupted and BoundReached.
+std::optional<ForceDescription> describe_force(const Search& search, const Hypothesis& judged,
+                                               const Hypothesis& known);
+
+}  // namespace upright

@@ -1,0 +1,73 @@
+// A force that no effect of the registry is: the diagnosis draws it as a curve, and only where there is one.
+#include <gtest/gtest.h>
+
+#include <Eigen/QR>
+#include <cmath>
+
+#include "diagnosis/described_curve.hpp"
+#include "named_effects.hpp"
+#include "upright/diagnosis/diagnosis.hpp"
+
+namespace upright {
+namespace {
+
+Plant file_plant() {
+  Plant plant;
+  plant.cart_mass_kg = 0.815;
+  plant.motor = {1.7189, 7.682};
+  plant.set("viscous_friction", {3.0});
+  plant.set("coulomb_friction", {0.4});
+  return plant;
+}
+
+std::optional<DescribedCurve> curve_in(const Diagnosis& diagnosis) {
+  for (const FoundEffect& effect : diagnosis.effects)
+    if (const auto curve = described_curve(effect)) return curve;
+  return std::nullopt;
+}
+
+/// Correlation of a curve with sin(2 pi v / period), but for what back-EMF and friction may take of each.
+double likeness(const DescribedCurve& curve, double period) {
+  const auto n = static_cast<Eigen::Index>(curve.at.size());
+  Eigen::MatrixXd taken(n, 3);
+  Eigen::VectorXd drawn(n), ripple(n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const double v = curve.at[static_cast<std::size_t>(i)];
+    taken.row(i) << 1.0, v, v > 0.0 ? 1.0 : -1.0;
+    drawn[i] = curve.force_n[static_cast<std::size_t>(i)];
+    ripple[i] = std::sin(2.0 * M_PI * v / period);
+  }
+  const Eigen::HouseholderQR<Eigen::MatrixXd> factor(taken);
+  drawn -= taken * factor.solve(drawn).eval();
+  ripple -= taken * factor.solve(ripple).eval();
+  return drawn.dot(ripple) / (drawn.norm() * ripple.norm());
+}
+
+TEST(ForceDescription, DrawsARippleOverTheVelocity) {
+  for (const unsigned seed : {1, 2, 3}) {
+    blind::Rig rig{.plant = file_plant(), .unknown = blind::Unknown::velocity_ripple};
+    rig.unknown_size = 0.3;
+    rig.unknown_period = 0.4;
+    const Diagnosis d = diagnose(file_plant(), three_runs(rig, 6.0, seed));
+    EXPECT_EQ(d.verdict, Verdict::described) << seed << ": " << d.residual;
+    EXPECT_LT(3.0 * d.gap_after, d.gap_before) << seed;
+    const auto curve = curve_in(d);
+    ASSERT_TRUE(curve) << seed;
+    EXPECT_EQ(curve->over, "velocity") << seed;
+    EXPECT_NE(d.model.find("force_table"), nullptr);
+    EXPECT_GT(likeness(*curve, rig.unknown_period), 0.9) << seed;
+  }
+}
+
+TEST(ForceDescription, DrawsNothingWhereNothingIsMissing) {
+  for (const unsigned seed : {4, 5, 6}) {
+    blind::Rig rig{.plant = file_plant()};
+    rig.disturbance_n = 0.05;
+    const Diagnosis d = diagnose(file_plant(), three_runs(rig, 6.0, seed));
+    EXPECT_FALSE(curve_in(d)) << seed;
+    EXPECT_NE(d.verdict, Verdict::described) << seed;
+  }
+}
+
+}  // namespace
+}  // namespace upright
