@@ -65,8 +65,8 @@ struct AcceptancePolicy {
   /// [1] The evidence of an effect is about the square of its certainty. If it is this many times larger, the
   /// fit has not converged and is continued. A smaller ratio can come from noise that is not white. Chosen.
   double unconverged_evidence_ratio = 4.0;
-  /// [ln of a ratio] The mean error of simulated held-out segments may grow by this. A tenth is not visible.
-  /// Chosen.
+  /// [ln of a ratio] The mean error of simulated held-out segments may grow by this. A tenth is not visible. A
+  /// curve that lowers the error by more shows that something is missing. Chosen.
   double worse_simulation_by_chance = 0.1;
   /// [ln of a ratio] It may also grow by one standard error of its scatter over the segments, which is taken
   /// to be at least this: while another effect is missing, errors change by half in either direction.
@@ -145,7 +145,8 @@ struct PowerPolicy {
   double share_of_gravity_torque = 0.01;
   /// [noise floors] A larger gap is clearly above the floor: "no discrepancy" would be wrong, and what was
   /// found explains the data only if it closes most of the excess. An effect without which the held-out error
-  /// is so many times larger is needed, even if a force of the place accounts for it. Chosen.
+  /// is so many times larger is needed, even if a force of the place accounts for it. A curve that lowers
+  /// this error by more than this factor becomes part of the model. Chosen.
   double clear_gap = 2.0;
   /// [1] The share of the excess above the floor that it must close then. Less than half explains less than
   /// it leaves.

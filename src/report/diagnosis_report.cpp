@@ -19,6 +19,7 @@
 #include "plot.hpp"
 #include "result_text.hpp"
 #include "upright/base/error.hpp"
+#include "upright/model/effects/force_table.hpp"
 
 namespace upright {
 
@@ -48,7 +49,8 @@ void add_answer(HtmlPage& page, const json& d, const std::filesystem::path& file
       {"no_discrepancy", {Tone::good, "No discrepancy: the model agrees with the data"}},
       {"unexplained", {Tone::warning, "Unexplained: something is missing that no known effect accounts for"}},
       {"described",
-       {Tone::warning, "Described, not explained: no known effect accounts for it; the force is a curve"}},
+       {Tone::warning,
+        "Described, not explained: no known effect accounts for the data; the missing force is drawn below"}},
       {"not_excited", {Tone::neutral, "Not excited: these data could not show what the model may lack"}}};
   const auto known = headlines.find(verdict);
   if (known == headlines.end())
@@ -86,21 +88,41 @@ std::string shown_sentence(const json& effect) {
          " s. Share of each run in what shows it: " + runs + ".";
 }
 
+/// The smooth curve of a force table through these nodes, at some places between its ends.
+std::vector<double> table_curve(const std::vector<double>& nodes, double from, double to,
+                                const std::vector<double>& places) {
+  using Table = effects::ForceTable;
+  std::vector<double> values = {0.0, from, to};
+  values.insert(values.end(), nodes.begin(), nodes.end());
+  std::vector<double> curve;
+  for (const double place : places) curve.push_back(Table::curve(values.data(), place));
+  return curve;
+}
+
 /// The curve that describes a force, with its band.
 void add_curve(HtmlPage& page, const json& curve) {
   const std::vector<double> at = curve.at("at"), force = curve.at("force_n");
-  std::vector<double> low, high;
+  if (at.size() != effects::ForceTable::node_count || force.size() != at.size() ||
+      curve.at("ci95").size() != at.size())
+    throw ConfigError("the curve of the force has not 13 nodes: repeat the diagnosis");
+  std::vector<double> low, high, places;
   for (const json& interval : curve.at("ci95")) {
     low.push_back(number(interval.at(0)));
     high.push_back(number(interval.at(1)));
   }
+  constexpr int drawn = 240;
+  for (int i = 0; i <= drawn; ++i) places.push_back(at.front() + (at.back() - at.front()) * i / drawn);
+  const auto smooth = [&](const std::vector<double>& nodes) {
+    return table_curve(nodes, at.front(), at.back(), places);
+  };
   const std::string over = curve.at("over"), unit = curve.at("unit");
   Plot plot;
   plot.title = "force_table";
   plot.x.label = (unit == "m/s" ? "cart velocity [" : "cart position [") + unit + "]";
   plot.y.label = over == "position_and_velocity" ? "N per m/s" : "N";
-  plot.bands.push_back({"95 %", at, low, high});
-  plot.series.push_back({"force", at, force, Series::Style::line, color::after, false});
+  plot.bands.push_back({"95 %", places, smooth(low), smooth(high)});
+  plot.series.push_back({"force", places, smooth(force), Series::Style::line, color::after, false});
+  plot.series.push_back({"nodes", at, force, Series::Style::points, color::after, false});
   page.figure(plot, "The missing force on the cart as a curve over " + over +
                         ", with its 95 % band. No known effect has this shape.");
 }

@@ -219,6 +219,42 @@ TEST_F(ReportPages, OfADiagnosisAreReadableOnATelephone) {
     EXPECT_NE(html.find(rule), std::string::npos) << "the page does not explain the decision: " << rule;
 }
 
+TEST_F(ReportPages, OfADescribedForceDrawItsCurve) {
+  Json at = Json::array(), force = Json::array(), intervals = Json::array();
+  for (int i = 0; i < 13; ++i) {
+    at.push_back(-0.6 + 0.1 * i);
+    force.push_back(0.2 * std::sin(i));
+    intervals.push_back({0.2 * std::sin(i) - 0.05, 0.2 * std::sin(i) + 0.05});
+  }
+  const Json table = {
+      {"kind", "force_table"},
+      {"gap_before", 6.0},
+      {"gap_after", 1.0},
+      {"parameters", {{"force_01_n", {{"value", 0.0}, {"ci95", {-0.1, 0.1}}, {"unit", "N"}}}}},
+      {"confusable_with", Json::array()},
+      {"where", "a curve over the velocity (evidence 977)"},
+      {"shown_on", Json::array()},
+      {"shows_most", nullptr},
+      {"curve",
+       {{"over", "velocity"}, {"unit", "m/s"}, {"at", at}, {"force_n", force}, {"ci95", intervals}}}};
+  const Json document = {{"verdict", "described"},
+                         {"gap", {{"before", 6.0}, {"after", 1.0}}},
+                         {"effects", {table}},
+                         {"candidates", Json::array()},
+                         {"residual", "what is left is the sensors' own noise"},
+                         {"next_experiment", nullptr},
+                         {"notes", Json::array()}};
+  folder_.write("diagnosis/diagnosis.json", document.dump());
+  folder_.write("diagnosis/model.yaml", "plant: {}\n");
+  const fs::path page = report_of(folder_.path() / "diagnosis");
+  expect_readable(page, "diagnosis");
+  const std::string html = read_text(page);
+  for (const char* part : {"Described, not explained", "as a curve over velocity", "cart velocity [m/s]",
+                           "a curve over the velocity (evidence 977)"})
+    EXPECT_NE(html.find(part), std::string::npos) << "the page does not say: " << part;
+  EXPECT_EQ(html.find(">force_01_n<"), std::string::npos) << "the nodes are in the picture";
+}
+
 TEST_F(ReportPages, OfAnIdentificationAreReadableOnATelephone) {
   Identification id;
   for (const char* name :
