@@ -147,14 +147,20 @@ std::string sentence_of(const std::vector<Curve>& curves) {
 }
 
 /// The curve of a fit as a formula; empty if none fits it.
-std::string formula_of_fit(const FitResult& fitted, const Curve& curve) {
+std::optional<ForceFormula> formula_of_fit(const FitResult& fitted, const Curve& curve) {
   const auto nodes = static_cast<Eigen::Index>(Table::node_count);
   const auto& values = fitted.point.plant.find(effect_index<Table>())->values;
   const Eigen::VectorXd force_n = Eigen::Map<const Eigen::VectorXd>(&values[Table::first_node], nodes);
-  const bool of_velocity = curve.over == Table::velocity;
-  const auto formula = formula_of(curve.nodes, force_n, fitted.covariance.bottomRightCorner(nodes, nodes),
-                                  of_velocity ? "v" : "x", of_velocity ? "m/s" : "m");
-  return formula ? "; within its uncertainty it is " + *formula : "";
+  return formula_of(curve.nodes, force_n, fitted.covariance.bottomRightCorner(nodes, nodes));
+}
+
+/// Whether effects of the registry have this force: a constant force, viscous friction, quadratic drag, a
+/// spring, Coulomb friction and its slope along the track. The search knows them, and did not name them.
+bool is_known(const ForceFormula& formula, Table::Over over) {
+  const Term last = over == Table::velocity                ? Term::square
+                    : over == Table::position_and_velocity ? Term::one
+                                                           : Term::linear;
+  return std::all_of(formula.terms.begin(), formula.terms.end(), [&](Term term) { return term <= last; });
 }
 
 }  // namespace
@@ -204,13 +210,18 @@ std::optional<ForceDescription> describe_force(const Search& search, const Hypot
       fit_with_curve(train, moved_to(judged.train.point, with_table(judged.train.point.plant, curve)),
                      result.judged.free, curve);
   if (!std::isfinite(result.judged.train.objective)) return std::nullopt;
+  const std::optional<ForceFormula> formula = formula_of_fit(result.judged.train, curve);
+  if (formula && is_known(*formula, curve.over)) return std::nullopt;
   search.filter_held_out(result.judged, sensors_only(result.judged.train.point.noise));
   result.held_out_error = search.gap_of(result.judged);
   Plant plant = known.train.point.plant;
   plant.set(effect_index<Table>(), result.judged.train.point.plant.find(effect_index<Table>())->values);
   result.known.train = fit_with_curve(all, moved_to(known.train.point, plant), result.known.free, curve);
   if (!std::isfinite(result.known.train.objective)) return std::nullopt;
-  result.where += formula_of_fit(result.known.train, curve);
+  const bool of_velocity = curve.over == Table::velocity;
+  if (formula)
+    result.where +=
+        "; within its uncertainty it is " + formula->text(of_velocity ? "v" : "x", of_velocity ? "m/s" : "m");
   return result;
 }
 

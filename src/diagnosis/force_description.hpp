@@ -25,8 +25,9 @@ struct ForceDescription {
 };
 
 /// Empty if the cart does not move, if no data are held out, if the plant file has a table already, or if the
-/// training data show no such force. `judged`: a fit to the training data, `known`: to all data. Whether the
-/// curve helps on held-out data is for the caller to judge. Throws Interrupted and BoundReached.
+/// training data show no such force, or one that known effects have. `judged`: a fit to the training data,
+/// `known`: to all data. Whether the curve helps on held-out data is for the caller to judge. Throws
+/// Interrupted and BoundReached.
 std::optional<ForceDescription> describe_force(const Search& search, const Hypothesis& judged,
                                                const Hypothesis& known);
 

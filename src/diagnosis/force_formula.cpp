@@ -1,87 +1,100 @@
 #include "force_formula.hpp"
 
 #include <Eigen/Cholesky>
-#include <array>
 #include <bit>
 #include <cmath>
 #include <sstream>
-#include <vector>
+#include <utility>
 
 namespace upright {
 
 namespace {
 
-constexpr std::size_t term_count = 4;
 /// More terms are no short formula: the curve says as much.
 constexpr int max_terms = 3;
 
-double term(std::size_t number, double q) {
-  const std::array<double, term_count> values = {1.0, q, q * std::abs(q), q * q * q};
-  return values[number];
+double value_of(Term term, double q) {
+  switch (term) {
+    case Term::one:
+      return 1.0;
+    case Term::linear:
+      return q;
+    case Term::square:
+      return q * std::abs(q);
+    case Term::cube:
+      return q * q * q;
+  }
+  return 0.0;
 }
 
-std::string name_of_term(std::size_t number, const std::string& symbol) {
-  const std::array<std::string, term_count> names = {"", " " + symbol, " " + symbol + "|" + symbol + "|",
-                                                     " " + symbol + "^3"};
-  return names[number];
+std::string name_of(Term term, const std::string& symbol) {
+  switch (term) {
+    case Term::one:
+      return "";
+    case Term::linear:
+      return " " + symbol;
+    case Term::square:
+      return " " + symbol + "|" + symbol + "|";
+    case Term::cube:
+      return " " + symbol + "^3";
+  }
+  return "";
 }
 
-/// Terms with their coefficients by weighted least squares, and what they miss.
-struct FittedTerms {
-  std::vector<std::size_t> terms;
-  Eigen::VectorXd coefficients;
-  double chi_square = 0.0;
-};
-
-FittedTerms fit_terms(unsigned subset, const CurveNodes& nodes, const Eigen::VectorXd& force_n,
-                      const Eigen::LDLT<Eigen::MatrixXd>& covariance) {
-  FittedTerms fitted;
-  for (std::size_t t = 0; t < term_count; ++t)
-    if ((subset >> t & 1U) != 0) fitted.terms.push_back(t);
-  Eigen::MatrixXd design(force_n.size(), static_cast<Eigen::Index>(fitted.terms.size()));
+/// Coefficients by weighted least squares.
+ForceFormula fit_terms(std::vector<Term> terms, const CurveNodes& nodes, const Eigen::VectorXd& force_n,
+                       const Eigen::LDLT<Eigen::MatrixXd>& covariance) {
+  Eigen::MatrixXd design(force_n.size(), static_cast<Eigen::Index>(terms.size()));
   for (Eigen::Index i = 0; i < design.rows(); ++i)
     for (Eigen::Index j = 0; j < design.cols(); ++j)
-      design(i, j) = term(fitted.terms[static_cast<std::size_t>(j)],
-                          nodes.first + nodes.spacing * static_cast<double>(i));
+      design(i, j) =
+          value_of(terms[static_cast<std::size_t>(j)], nodes.first + nodes.spacing * static_cast<double>(i));
   const Eigen::MatrixXd weighted = covariance.solve(design);
-  fitted.coefficients = (design.transpose() * weighted).ldlt().solve(weighted.transpose() * force_n);
-  const Eigen::VectorXd missed = force_n - design * fitted.coefficients;
-  fitted.chi_square = missed.dot(covariance.solve(missed));
-  return fitted;
+  ForceFormula formula{std::move(terms),
+                       (design.transpose() * weighted).ldlt().solve(weighted.transpose() * force_n)};
+  const Eigen::VectorXd missed = force_n - design * formula.coefficients;
+  formula.chi_square = missed.dot(covariance.solve(missed));
+  return formula;
 }
 
-std::string text_of(const FittedTerms& fitted, const std::string& symbol, const std::string& unit) {
+/// The terms whose bits are set.
+std::vector<Term> terms_of(unsigned subset) {
+  std::vector<Term> terms;
+  for (std::size_t t = 0; t < all_terms.size(); ++t)
+    if ((subset >> t & 1U) != 0) terms.push_back(all_terms[t]);
+  return terms;
+}
+
+}  // namespace
+
+std::string ForceFormula::text(const std::string& symbol, const std::string& unit) const {
   std::ostringstream text;
   text.precision(3);
-  for (std::size_t j = 0; j < fitted.terms.size(); ++j) {
-    const double c = fitted.coefficients[static_cast<Eigen::Index>(j)];
+  for (std::size_t j = 0; j < terms.size(); ++j) {
+    const double c = coefficients[static_cast<Eigen::Index>(j)];
     if (j == 0)
       text << c;
     else
       text << (c < 0.0 ? " - " : " + ") << std::abs(c);
-    text << name_of_term(fitted.terms[j], symbol);
+    text << name_of(terms[j], symbol);
   }
   text << " [N, " << unit << "]";
   return text.str();
 }
 
-}  // namespace
-
-std::optional<std::string> formula_of(const CurveNodes& nodes, const Eigen::VectorXd& force_n,
-                                      const Eigen::MatrixXd& covariance, const std::string& symbol,
-                                      const std::string& unit) {
+std::optional<ForceFormula> formula_of(const CurveNodes& nodes, const Eigen::VectorXd& force_n,
+                                       const Eigen::MatrixXd& covariance) {
   const Eigen::LDLT<Eigen::MatrixXd> factor(covariance);
   if (!factor.isPositive() || !(factor.vectorD().minCoeff() > 0.0)) return std::nullopt;
-  for (int terms = 1; terms <= max_terms; ++terms) {
-    std::optional<FittedTerms> best;
-    for (unsigned subset = 1; subset < 1U << term_count; ++subset) {
-      if (std::popcount(subset) != terms) continue;
-      FittedTerms fitted = fit_terms(subset, nodes, force_n, factor);
-      if (!best || fitted.chi_square < best->chi_square) best = std::move(fitted);
+  for (int count = 1; count <= max_terms; ++count) {
+    std::optional<ForceFormula> best;
+    for (unsigned subset = 1; subset < 1U << all_terms.size(); ++subset) {
+      if (std::popcount(subset) != count) continue;
+      ForceFormula formula = fit_terms(terms_of(subset), nodes, force_n, factor);
+      if (!best || formula.chi_square < best->chi_square) best = std::move(formula);
     }
-    const double freedom = static_cast<double>(force_n.size()) - terms;
-    if (best && best->chi_square <= freedom + 2.0 * std::sqrt(2.0 * freedom))
-      return text_of(*best, symbol, unit);
+    const double freedom = static_cast<double>(force_n.size()) - count;
+    if (best && best->chi_square <= freedom + 2.0 * std::sqrt(2.0 * freedom)) return best;
   }
   return std::nullopt;
 }

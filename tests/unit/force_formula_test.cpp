@@ -25,19 +25,24 @@ Eigen::MatrixXd uncertainty(double sigma_n) {
 
 TEST(ForceFormula, TakesTheFewestTermsThatFit) {
   const auto line = sampled([](double v) { return -2.0 * v; });
-  EXPECT_EQ(formula_of(nodes, line, uncertainty(0.01), "v", "m/s"), "-2 v [N, m/s]");
+  const auto of_line = formula_of(nodes, line, uncertainty(0.01));
+  ASSERT_TRUE(of_line);
+  EXPECT_EQ(of_line->terms, std::vector<Term>{Term::linear});
+  EXPECT_EQ(of_line->text("v", "m/s"), "-2 v [N, m/s]");
   const auto drag = sampled([](double v) { return 0.25 - 3.0 * v * std::abs(v); });
-  EXPECT_EQ(formula_of(nodes, drag, uncertainty(0.001), "v", "m/s"), "0.25 - 3 v|v| [N, m/s]");
+  const auto of_drag = formula_of(nodes, drag, uncertainty(0.001));
+  ASSERT_TRUE(of_drag);
+  EXPECT_EQ(of_drag->text("v", "m/s"), "0.25 - 3 v|v| [N, m/s]");
 }
 
 TEST(ForceFormula, OfACurveThatNoTermHasIsNone) {
   const auto ripple = sampled([](double v) { return 0.2 * std::sin(20.0 * v); });
-  EXPECT_FALSE(formula_of(nodes, ripple, uncertainty(0.01), "v", "m/s"));
-  EXPECT_TRUE(formula_of(nodes, ripple, uncertainty(1.0), "v", "m/s")) << "a coarse curve is nearly anything";
+  EXPECT_FALSE(formula_of(nodes, ripple, uncertainty(0.01)));
+  EXPECT_TRUE(formula_of(nodes, ripple, uncertainty(1.0))) << "a coarse curve is nearly anything";
 }
 
 TEST(ForceFormula, NeedsAnUncertainty) {
-  EXPECT_FALSE(formula_of(nodes, sampled([](double v) { return v; }), uncertainty(0.0), "v", "m/s"));
+  EXPECT_FALSE(formula_of(nodes, sampled([](double v) { return v; }), uncertainty(0.0)));
 }
 
 }  // namespace
