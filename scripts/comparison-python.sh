@@ -3,6 +3,6 @@
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
-venv=${UPRIGHT_COMPARISON_VENV:-build/comparison-venv}
+venv=${UPRIGHT_COMPARISON_VENV:-$PWD/build/comparison-venv}
 tests/integration/make_venv.sh "$venv" "numpy, scipy, yaml, pysindy" -r studies/comparison/requirements.txt >&2
-echo "$PWD/$venv/bin/python"
+echo "$venv/bin/python"

@@ -12,5 +12,5 @@ shift "$(($# > 1 ? 2 : 1))"
 cd "$(dirname "$0")/.."
 
 python=$(scripts/comparison-python.sh)
-upright=$(scripts/program.sh)
+upright=${UPRIGHT:-$(scripts/program.sh)}
 "$python" studies/comparison/cross_tables.py "$upright" "$data" "$out" "$@"

@@ -9,6 +9,7 @@ makes the environment for it. Prints Markdown.
 """
 import argparse
 import dataclasses
+import itertools
 import pathlib
 import sys
 
@@ -87,7 +88,7 @@ def print_scores(rows, names, channel):
             text = scorer.in_text(value, channel)
             if name in trained:
                 text = f"*{text}*"
-            elif value > plant[name][channel]:
+            elif value > plant[name][channel] and model != "plant file":
                 text = f"**{text}**"
             cells.append(text)
         print(f"| {model} | " + " | ".join(cells) + " |")
@@ -103,7 +104,7 @@ def in_words(effect):
 
 
 def print_named(found):
-    print("| from | verdict | named, with 95 % intervals | numbers of the file, fitted | helps here only | seconds |")
+    print("| from | verdict | named, with 95 % intervals | numbers of the file, fitted | helps here only | CPU seconds |")
     print("|---|---|---|---|---|---|")
     for model, (result, folder) in found.items():
         named = "; ".join(in_words(effect) for effect in result["effects"]) or "nothing"
@@ -114,22 +115,22 @@ def print_named(found):
     print()
 
 
-def print_agreement(found):
-    """Effects that all models name, and those that only some do; intervals that overlap in all pairs."""
+def print_agreement(found, trained_on):
+    """Which models name an effect, and how many pairs of intervals from disjoint data overlap."""
     by_kind = {}
     for model, (result, _) in found.items():
         for effect in result["effects"]:
             by_kind.setdefault(effect["kind"], {})[model] = effect["parameters"]
-    print("| effect | named from | pairs of intervals that overlap |")
+    print("| effect | named from | intervals from disjoint runs that overlap |")
     print("|---|---|---|")
     for kind, models in by_kind.items():
+        pairs = [(a, b) for a, b in itertools.combinations(models, 2)
+                 if not rigs.share_data(trained_on[a], trained_on[b])]
         shares = []
-        for name in next(iter(models.values())):
-            intervals = [parameters[name]["ci95"] for parameters in models.values()]
-            pairs = [(a, b) for i, a in enumerate(intervals) for b in intervals[:i]]
-            overlapping = sum(a[0] <= b[1] and b[0] <= a[1] for a, b in pairs)
-            if pairs:
-                shares.append(f"{name} {overlapping} of {len(pairs)}")
+        for name in next(iter(models.values())) if pairs else []:
+            intervals = [(models[a][name]["ci95"], models[b][name]["ci95"]) for a, b in pairs]
+            overlapping = sum(a[0] <= b[1] and b[0] <= a[1] for a, b in intervals)
+            shares.append(f"{name} {overlapping} of {len(pairs)}")
         where = "all" if len(models) == len(found) else f"{', '.join(models)} ({len(models)} of {len(found)})"
         print(f"| {kind} | {where} | {'; '.join(shares)} |")
     print()
@@ -155,7 +156,7 @@ def print_rig(name, bench):
             if measured:
                 print_scores(rows, measured, channel)
     print_named(found)
-    print_agreement(found)
+    print_agreement(found, bench.rig.trained_on)
 
 
 def main():

@@ -8,7 +8,7 @@ import numpy as np
 import scorer
 
 STEP_S = 2e-3  # no longer steps of Runge-Kutta
-ITERATIONS = 4  # of Gauss-Newton for initial states: the problem is nearly linear
+ITERATIONS = 3  # of Gauss-Newton for initial states: the problem is nearly linear
 
 
 class Equations:

@@ -4,10 +4,11 @@
 // nothing added. The plant is the project's own, so that models differ in what is fitted, not in how they
 // are simulated.
 //
-//   grey_box_fit PLANT --data D... --free NUMBER... --out PLANT [--horizon S]
+//   grey_box_fit PLANT --data D... --free NUMBER... --out PLANT [--horizon S] [--fixed-starts]
 //
 // A NUMBER is cart_mass_kg, pendulum.inertia_about_pivot_kgm2, or KIND.PARAMETER of an effect of the plant
 // file. Its start is the value in the file, which must not be 0. Without a horizon whole records are fitted.
+// With --fixed-starts the initial states are those of local parabolas through the first samples.
 #include <ceres/ceres.h>
 
 #include <CLI/CLI.hpp>
@@ -150,7 +151,7 @@ std::vector<int> unmeasured(const Measurement& run) {
 }
 
 Fitted fit_by_output_error(const Plant& plant, const std::vector<FreeNumber>& numbers,
-                           const std::vector<Measurement>& runs, double longest_s) {
+                           const std::vector<Measurement>& runs, double longest_s, bool fixed_starts) {
   const std::vector<Segment> pieces = cut_segments(runs, longest_s);
   std::vector<double> values;
   for (const FreeNumber& number : numbers) values.push_back(number.start());
@@ -167,8 +168,11 @@ Fitted fit_by_output_error(const Plant& plant, const std::vector<FreeNumber>& nu
     cost->AddParameterBlock(state_size);
     cost->SetNumResiduals(residual->size());
     problem.AddResidualBlock(cost, nullptr, values.data(), states[i].data());
-    if (const std::vector<int> fixed = unmeasured(run); !fixed.empty())
+    if (fixed_starts) {
+      problem.SetParameterBlockConstant(states[i].data());
+    } else if (const std::vector<int> fixed = unmeasured(run); !fixed.empty()) {
       problem.SetManifold(states[i].data(), new ceres::SubsetManifold(state_size, fixed));
+    }
   }
   for (std::size_t i = 0; i < numbers.size(); ++i)
     if (std::isfinite(numbers[i].lower_bound()))
@@ -188,6 +192,7 @@ struct Flags {
   std::string plant, out;
   std::vector<std::string> data, free;
   double horizon_s = std::numeric_limits<double>::infinity();
+  bool fixed_starts = false;
 };
 
 void run(const Flags& flags) {
@@ -196,7 +201,7 @@ void run(const Flags& flags) {
   for (const std::string& data : flags.data) runs.push_back(read_measurement(data));
   std::vector<FreeNumber> numbers;
   for (const std::string& name : flags.free) numbers.emplace_back(name, plant);
-  const Fitted fitted = fit_by_output_error(plant, numbers, runs, flags.horizon_s);
+  const Fitted fitted = fit_by_output_error(plant, numbers, runs, flags.horizon_s, flags.fixed_starts);
   std::printf("%s\n", fitted.summary.BriefReport().c_str());
   if (!fitted.summary.IsSolutionUsable())
     throw ConfigError("the fit failed: start from other values, or choose a shorter --horizon");
@@ -213,6 +218,7 @@ int main(int argc, char** argv) {
   app.add_option("--free", flags.free)->required();
   app.add_option("--out", flags.out)->required();
   app.add_option("--horizon", flags.horizon_s)->check(CLI::PositiveNumber);
+  app.add_flag("--fixed-starts", flags.fixed_starts);
   CLI11_PARSE(app, argc, argv);
   try {
     run(flags);

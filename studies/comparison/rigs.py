@@ -19,6 +19,14 @@ class Rig:
     falls: tuple = ()  # runs with an upright pendulum: it falls in an open-loop simulation of the whole record
 
 
+WHOLE = "whole"  # the record of which other runs are parts
+
+
+def share_data(runs, others):
+    """Whether two lists of runs have samples in common."""
+    return bool(set(runs) & set(others)) or WHOLE in runs or WHOLE in others
+
+
 def from_each(runs, **more):
     return {name: [name] for name in runs} | more
 
@@ -28,7 +36,7 @@ def emps(data):
         return real_data.dataset(data / "emps" / "DATA_EMPS.csv",
                                  {"time_s": "t_s", "cart_m": "qm_m", "voltage_v": "vir_V"}, **stretch)
 
-    runs = {"whole": part(), "first-half": part(to_s=12.42), "second-half": part(from_s=12.42)}
+    runs = {WHOLE: part(), "first-half": part(to_s=12.42), "second-half": part(from_s=12.42)}
     return Rig(real_data.EMPS_PLANT, runs, 2.0, from_each(runs))
 
 

@@ -30,7 +30,7 @@ def score_plant(upright, plant_file, dataset, record, horizon_s=None):
     if horizon_s is not None:
         command += ["--horizon", horizon_s, "--initial-samples", samples_of_piece(horizon_s, record.period_s())]
     try:
-        text, _ = run(command)
+        text = run(command)
     except RuntimeError:
         return {channel: math.inf for channel in channels_of(record)}
     found = json.loads(text)["runs"][0]
