@@ -133,12 +133,12 @@ def run_script(name, *arguments):
 
 
 def make_free_swing(file):
-    """A pendulum with dry friction from 1.2 rad off its rest, 1 kHz, 55 s: what the rig uw measures."""
+    """A pendulum with dry friction from 1.2 rad off its rest, 100 Hz, 55 s: what the rig uw measures, but slower."""
     def swing(q, v, d, u):
         return 64.3 * np.sin(q) - 0.2 * d
 
     equation = equations.Equations(swing, ["theta"], [True])
-    time = np.arange(55000) * 1e-3
+    time = np.arange(5500) * 1e-2
     angle = equation.simulate(np.array([[np.pi - 1.2], [0.0]]), time[:, None], np.zeros((len(time), 1)))[:, 0, 0]
     file.parent.mkdir(parents=True)
     rows = np.column_stack([time, np.round(angle / 1e-4) * 1e-4])
