@@ -126,23 +126,35 @@ def cut(record, horizon_s):
     return [(a, b) for a, b in zip(edges[:-1], edges[1:]) if b - a >= least]
 
 
-def score_equations(equations, record, horizon_s=None):
-    """As scorer.score_plant."""
-    pieces = cut(record, horizon_s)
-    longest = max(end - first for first, end in pieces)
+class Pieces:
+    """Pieces of records side by side; a shorter one repeats its last sample."""
 
-    def side_by_side(values):
-        """[samples, pieces]; a shorter piece repeats its last sample."""
-        return np.stack([values[np.minimum(np.arange(first, first + longest), end - 1)] for first, end in pieces], axis=1)
+    def __init__(self, records, channels, horizon_s):
+        spans = [(record, first, end) for record in records for first, end in cut(record, horizon_s)]
+        longest = max(end - first for _, first, end in spans)
 
-    shown = np.stack([side_by_side(values) for values in measured(record, equations.channels)], axis=1)
-    time, voltage = side_by_side(record.time_s), side_by_side(record.voltage_v)
-    scale = np.array([noise(values) for values in measured(record, equations.channels)])
-    until = scorer.FIRST_SAMPLES if horizon_s is None else longest
-    starts = initial_states(equations, time[:until], voltage[:until], shown[:until], scale)
-    off = equations.simulate(starts, time, voltage) - shown
-    counted = np.array([np.arange(longest) < end - first for first, end in pieces]).T
+        def rows(values_of):
+            return np.stack([values_of(record)[np.minimum(np.arange(first, first + longest), end - 1)]
+                             for record, first, end in spans], axis=1)
+
+        self.time_s = rows(lambda record: record.time_s)
+        self.voltage_v = rows(lambda record: record.voltage_v)
+        self.shown = np.stack([rows(lambda record, i=i: measured(record, channels)[i]) for i in range(len(channels))], axis=1)
+        self.counted = np.array([np.arange(longest) < end - first for _, first, end in spans]).T
+        self.noise = np.mean([[noise(values) for values in measured(record, channels)] for record in records], axis=0)
+
+
+def score_together(equations, records, horizon_s=None):
+    """As scorer.score_plant, over all samples of several records."""
+    pieces = Pieces(records, equations.channels, horizon_s)
+    until = scorer.FIRST_SAMPLES if horizon_s is None else len(pieces.time_s)
+    starts = initial_states(equations, pieces.time_s[:until], pieces.voltage_v[:until], pieces.shown[:until], pieces.noise)
+    off = equations.simulate(starts, pieces.time_s, pieces.voltage_v) - pieces.shown
     with np.errstate(all="ignore"):
-        squares = (np.where(counted[:, None, :], off, 0.0) ** 2).sum(axis=(0, 2)) / counted.sum()
+        squares = (np.where(pieces.counted[:, None, :], off, 0.0) ** 2).sum(axis=(0, 2)) / pieces.counted.sum()
     errors = np.where(np.isfinite(squares), np.sqrt(squares), np.inf)
     return {channel: float(error) for channel, error in zip(equations.channels, errors)}
+
+
+def score_equations(equations, record, horizon_s=None):
+    return score_together(equations, [record], horizon_s)

@@ -163,13 +163,12 @@ def fit(records, horizon_s, whole):
     for method in differentiations(records[0].uniform()):
         for model in models_of(records, method, channels):
             if model.key() not in scored:
-                scores = [equations.score_equations(model.equations(), trial, horizon_s) for trial in trials]
-                scored[model.key()] = (scorer.mean_log(scores), model)
+                score = equations.score_together(model.equations(), trials, horizon_s)
+                scored[model.key()] = (scorer.mean_log([score]), model)
     best = sorted(scored.values(), key=lambda pair: pair[0])[:FINALISTS]
 
     def training_score(model):
         horizons = (horizon_s, None) if whole else (horizon_s,)
-        return scorer.mean_log([equations.score_equations(model.equations(), record, horizon)
-                                for record in records for horizon in horizons])
+        return scorer.mean_log([equations.score_together(model.equations(), records, horizon) for horizon in horizons])
 
     return min((model for _, model in best), key=training_score), len(scored)
