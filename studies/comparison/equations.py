@@ -106,8 +106,9 @@ def initial_states(equations, time_s, voltage_v, shown, scale):
         found = found.reshape(len(time_s), count, size + 1, pieces) / scale[:, None, None]
         for piece in range(pieces):
             base = found[:, :, 0, piece]
-            off = (shown[:, :, piece] / scale - base).ravel()
-            jacobian = np.stack([(found[:, :, i + 1, piece] - base).ravel() for i in range(size)], axis=1)
+            with np.errstate(all="ignore"):  # of models that run away
+                off = (shown[:, :, piece] / scale - base).ravel()
+                jacobian = np.stack([(found[:, :, i + 1, piece] - base).ravel() for i in range(size)], axis=1)
             if not (np.isfinite(jacobian).all() and np.isfinite(off).all()):
                 continue
             starts[:, piece] += step * np.linalg.lstsq(jacobian, off, rcond=None)[0]
