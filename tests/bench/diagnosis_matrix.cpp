@@ -5,7 +5,7 @@
 //                    [--only KIND] [--size weak|typical|strong] [--runs N] [--samples N] [--jobs J]
 //                    [--seconds S] [--timing]
 //   diagnosis_matrix --markdown FILE.md --records FILE.jsonl [--records FILE.jsonl ...]
-//   diagnosis_matrix --case K [--keep DIR] [...]
+//   diagnosis_matrix --case K [--keep DIR [--data-only]] [...]
 //
 // Cases are numbered from 0 and follow from the seed and the number, so that pieces of a matrix can be run
 // anywhere: --first and --count choose them (--cases N: the first N). Each runs in a process of its own and
@@ -16,7 +16,8 @@
 // --markdown writes the tables of all records; a case that is in several files counts once.
 // --timing makes every case six runs of ten seconds at 500 Hz, of a laboratory seven at 1 kHz; with --jobs 1
 // their wall time is the figure of the table. UPRIGHT_THREADS=1 keeps a case on one processor.
-// --case K with --keep DIR writes the plant file, the runs and the truth of one case, for `upright diagnose`.
+// --case K with --keep DIR writes the plant file, the runs and the truth of one case, for `upright diagnose`;
+// with --data-only it is not diagnosed here.
 //
 // The diagnosis works as the command does: the runs are written as CSV and read again, and it sees nothing
 // else. diagnosis_judge.hpp says what "visible" and "distinguishable" mean; tests/blind says how cases are
@@ -72,7 +73,7 @@ struct Flags {
   Condition condition = Condition::quantized;
   int runs = 0, jobs = 1;
   double max_samples = 12000.0;
-  bool timing = false;
+  bool timing = false, data_only = false;
   double max_seconds = 900.0;
 };
 
@@ -313,6 +314,7 @@ void run_case(const Flags& flags, std::size_t number, int to) {
   } else {
     fs::remove_all(folder);
   }
+  if (flags.data_only) return send(to, record, nullptr);
   send(to, record, "judgement of the data");
   const DataJudgement data = judge_data(blind, runs, record);
   send(to, record, "diagnosis");
@@ -430,6 +432,8 @@ Size size_named(const std::string& text) {
 bool is_switch(const std::string& name, Flags& flags) {
   if (name == "--timing") {
     flags.timing = true;
+  } else if (name == "--data-only") {
+    flags.data_only = true;
   } else if (name == "--disturbed") {
     flags.condition = Condition::disturbed;
   } else if (name == "--laboratory") {

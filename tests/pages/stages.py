@@ -148,6 +148,7 @@ ELSEWHERE = (
     (r"upright effects", "reference_test", "scripts/write_reference.py", '"effects", "--json"'),
     (r"scripts/reproduce-paper\.sh", "paper_command_test", "tests/acceptance/paper_command_test.cpp",
      '"/scripts/reproduce-paper.sh"'),
+    (r"scripts/(cross-tables|side-by-side)\.sh DATA", "comparison_test", "studies/comparison/comparison_test.py", r"scripts/\1.sh"),
     (r"scripts/real_data\.py", "diagnosis_pages_test: scripts/real-data.sh", "scripts/real-data.sh", "scripts/real_data.py"),
     (r"upright paper", "paper_command_test", "tests/acceptance/paper_command_test.cpp", '"paper --config "'),
 )
