@@ -61,21 +61,27 @@ class Diagnostician {
     if (!decided_) report_so_far();
     return std::move(result_);
   }
-  /// Looks at the force that what run() found leaves, and adds it to the answer: as a curve if that halves
-  /// the held-out error at least, and else in words.
+  /// Looks for a force on the cart beside what run() found. A curve that more than halves the held-out error
+  /// is added to the answer; one that lowers it by more than chance shows that something is missing.
   void describe_what_is_left(Diagnosis& diagnosis) {
     if (!beyond_sensors_) return;
     options_.tell(0.98, "describing what is left");
-    const auto force = describe_force(search_, final_, known_);
-    const double named = std::min(listing_.numbers_moved.value_or(listing_.after), listing_.after);
-    const double lower = force ? named / force->held_out_error : 1.0;
-    if (lower > policy_.power.clear_gap) {
-      add_curve(*force, named, diagnosis);
-    } else if (lower > std::exp(policy_.acceptance.worse_simulation_by_chance)) {
-      diagnosis.verdict = Verdict::unexplained;
-      diagnosis.residual = force->left_sentence(lower);
-    } else if (const auto left = place_force_left(search_, known_)) {
-      diagnosis.notes.push_back(*left);
+    try {
+      const auto force = describe_force(search_, final_, known_);
+      const double named = std::min(listing_.numbers_moved.value_or(listing_.after), listing_.after);
+      const double lower = force ? named / force->held_out_error : 1.0;
+      if (lower > policy_.power.clear_gap) {
+        add_curve(*force, named, diagnosis);
+      } else if (lower > std::exp(policy_.acceptance.worse_simulation_by_chance)) {
+        diagnosis.verdict = Verdict::unexplained;
+        diagnosis.residual = force->left_sentence(lower);
+      } else if (const auto left = place_force_left(search_, known_)) {
+        diagnosis.notes.push_back(*left);
+      }
+    } catch (const Interrupted&) {
+      diagnosis.interrupted = true;
+    } catch (const BoundReached&) {
+      diagnosis.bound_reached = true;
     }
   }
   /// Whether an effect was found that the plant file lacks, not only numbers of it that are off.
@@ -118,16 +124,6 @@ class Diagnostician {
     diagnosis.noise = force.known.train.point.noise;
     diagnosis.residual = examine_fit(search_.all_data(), force.known.train.point, policy_, budget_).sentence;
     diagnosis.residual_after = smooth_residuals(data_.held, force.judged.held.point, policy_.location.walk);
-  }
-
-  /// Another unit of all gaps.
-  static void scale_gaps(Diagnosis& diagnosis, double factor) {
-    diagnosis.gap_before *= factor;
-    for (FoundEffect& found : diagnosis.effects) {
-      found.gap_before *= factor;
-      found.gap_after *= factor;
-    }
-    for (CandidateScore& candidate : diagnosis.candidates) candidate.gap_after *= factor;
   }
 
   static double samples_of(const DataSplit& data) {

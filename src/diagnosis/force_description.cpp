@@ -195,8 +195,7 @@ std::optional<ForceDescription> describe_force(const Search& search, const Hypot
   if (!search.range().cart_moves || search.held_data().segments.empty()) return std::nullopt;
   if (search.given().find(effect_index<Table>()) != nullptr) return std::nullopt;
   if (known.train.point.starts.size() != all.segments.size()) return std::nullopt;
-  // Training segments come first among all.
-  std::vector<ResidualTrace> traces =
+  const std::vector<ResidualTrace> traces =
       smooth_residuals(train, judged.train.point, search.policy().location.walk);
   const std::vector<Curve> curves = curves_of(train, judged.train.point, traces);
   if (curves.empty() || !(curves.front().evidence > search.policy().acceptance.min_evidence))

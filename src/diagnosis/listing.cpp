@@ -74,4 +74,13 @@ Listing list_effects(Search& search, const Hypothesis& judged, const std::vector
   return listing;
 }
 
+void scale_gaps(Diagnosis& diagnosis, double factor) {
+  diagnosis.gap_before *= factor;
+  for (FoundEffect& found : diagnosis.effects) {
+    found.gap_before *= factor;
+    found.gap_after *= factor;
+  }
+  for (CandidateScore& candidate : diagnosis.candidates) candidate.gap_after *= factor;
+}
+
 }  // namespace upright

@@ -33,4 +33,7 @@ double held_out_error(Search& search, const Hypothesis& judged, const std::vecto
 /// Adds these effects in this order.
 Listing list_effects(Search& search, const Hypothesis& judged, const std::vector<std::size_t>& effects);
 
+/// States the gaps of a diagnosis in another unit: each is multiplied by the factor.
+void scale_gaps(Diagnosis& diagnosis, double factor);
+
 }  // namespace upright

@@ -65,8 +65,8 @@ struct AcceptancePolicy {
   /// [1] The evidence of an effect is about the square of its certainty. If it is this many times larger, the
   /// fit has not converged and is continued. A smaller ratio can come from noise that is not white. Chosen.
   double unconverged_evidence_ratio = 4.0;
-  /// [ln of a ratio] The mean error of simulated held-out segments may grow by this. A tenth is not visible. A
-  /// curve that lowers the error by more shows that something is missing. Chosen.
+  /// [ln of a ratio] The mean error of simulated held-out segments may grow by this. A tenth is not visible.
+  /// A curve that lowers the error by more shows that something is missing. Chosen.
   double worse_simulation_by_chance = 0.1;
   /// [ln of a ratio] It may also grow by one standard error of its scatter over the segments, which is taken
   /// to be at least this: while another effect is missing, errors change by half in either direction.
