@@ -1,19 +1,21 @@
 #!/usr/bin/env python3
-"""Prints a SHA-256 for each output of upright, to compare two builds on one machine.
+"""Prints a SHA-256 for each output of upright, or compares the outputs of builds on one machine.
 
-  output_manifest.py BUILD MATRIX WORK [--cases N] [--threads N] [--data DIR] [--only WORD]
+  output_manifest.py BUILD MATRIX WORK [--against BUILD] [--threads N,M] [--cases N] [--samples N] [--data DIR] [--only WORD]
 
-BUILD is a build folder (build/ci). MATRIX is the build whose diagnosis_matrix makes the cases: use the same one for both
-manifests. WORK is a folder for intermediate files, which may be reused. Prints "SHA256  NAME" lines. Values that always
-differ between calls (times of day, durations, the commit, folders) are removed first.
---cases N    number of cases of the matrix to diagnose (100)
---threads N  threads of each search (UPRIGHT_THREADS)
---data DIR   also diagnose the measurements of other laboratories (../shared/data)
---only WORD  only outputs whose name begins with WORD: design, margin, sweep, run, identify, diagnose, data
-Two builds compute the same results if `diff` finds no difference between their manifests:
-  scripts/output_manifest.py build/before build/before /tmp/m > before.txt
-  scripts/output_manifest.py build/after build/before /tmp/m > after.txt && diff before.txt after.txt
+BUILD is a build folder (build/ci). MATRIX is the build whose diagnosis_matrix makes the cases: use the same one for all
+manifests. WORK is a folder for intermediate files, which may be reused. Values that always differ between calls (times of
+day, durations, the commit, folders) are removed first.
+--against BUILD  the build to compare with
+--threads N,M    threads of each search (UPRIGHT_THREADS); of several numbers, each is compared
+--cases N        number of cases of the matrix to diagnose (100)
+--samples N      samples of each case, all runs together (12000)
+--data DIR       also diagnose the measurements of other laboratories (../shared/data)
+--only WORD      only outputs whose name begins with WORD: design, margin, sweep, run, identify, diagnose, data
+One build with one number of threads prints "SHA256  NAME" lines. Several are compared with the first: how many outputs are
+equal and different, and the names of those that differ (exit code 1). Their manifests are in WORK.
 """
+import collections
 import argparse
 import hashlib
 import os
@@ -36,14 +38,20 @@ BY_NATURE = [
 
 
 class Manifest:
-    def __init__(self, arguments):
-        self.program = arguments.build.resolve() / "src" / "cli" / "upright"
+    def __init__(self, arguments, build, threads):
+        self.program = build.resolve() / "src" / "cli" / "upright"
         self.matrix = arguments.matrix.resolve() / "tests" / "bench" / "diagnosis_matrix"
         self.work = arguments.work.resolve()
         self.only = arguments.only
+        self.cases = arguments.cases
+        self.samples = arguments.samples
+        self.data = arguments.data
         self.environment = dict(os.environ)
-        if arguments.threads:
-            self.environment["UPRIGHT_THREADS"] = str(arguments.threads)
+        self.label = str(build)
+        if threads:
+            self.environment["UPRIGHT_THREADS"] = threads
+            self.label += f", {threads} threads"
+        self.sums = {}
 
     def wants(self, kind):
         return not self.only or kind.startswith(self.only)
@@ -52,7 +60,7 @@ class Manifest:
         data = data.replace(str(self.program).encode(), b"upright").replace(str(self.work).encode(), b"WORK")
         for pattern, instead in BY_NATURE:
             data = pattern.sub(instead, data)
-        print(f"{hashlib.sha256(data).hexdigest()}  {name}", flush=True)
+        self.sums[name] = hashlib.sha256(data).hexdigest()
 
     def call(self, name, *words, keep_output=True):
         done = subprocess.run([self.program, *map(str, words)], capture_output=True, cwd=self.work, env=self.environment)
@@ -115,42 +123,79 @@ class Manifest:
             self.call("report", "report", folder, keep_output=False)
             self.add_files(name, folder)
 
-    def cases(self, count):
-        for number in range(count):
-            made = self.work / "cases" / str(number)
+    def diagnoses(self):
+        for number in range(self.cases):
+            made = self.work / f"cases-{self.samples}" / str(number)
             if not made.exists():
-                subprocess.run([self.matrix, "--case", str(number), "--keep", made, "--cases", "1", "--seed", "20261123", "--out",
-                                self.work / "unused.jsonl"], check=True, capture_output=True)
+                # The matrix diagnoses the case too, which is not needed here: it may take one second.
+                subprocess.run([self.matrix, "--case", str(number), "--keep", made, "--seed", "20261123", "--samples",
+                                str(self.samples), "--seconds", "1"], check=True, capture_output=True)
             self.diagnosis(f"diagnose-{number}", made / "believed.yaml", sorted(made.glob("run*.csv")))
 
-    def measurements(self, data):
+    def measurements(self):
         made = self.work / "data"
         if not made.exists():
-            subprocess.run([sys.executable, ROOT / "scripts" / "real_data.py", "prepare", data, made], check=True, capture_output=True)
+            subprocess.run([sys.executable, ROOT / "scripts" / "real_data.py", "prepare", self.data.resolve(), made], check=True,
+                           capture_output=True)
         for folder in sorted(made.iterdir()):
             self.diagnosis(f"data-{folder.name}", folder / "plant.yaml", sorted(folder.glob("data*.yaml")))
 
+    def make(self):
+        if self.wants("design") or self.wants("margin"):
+            self.designs()
+        for kind, make in (("sweep", self.sweeps), ("run", self.runs), ("identify", self.identifications),
+                           ("diagnose", self.diagnoses)):
+            if self.wants(kind):
+                make()
+        if self.data and self.wants("data"):
+            self.measurements()
 
-def main():
+    def lines(self):
+        return "".join(f"{value}  {name}\n" for name, value in self.sums.items())
+
+
+def compare(first, other):
+    """Prints how many outputs of each kind are equal; returns whether all are."""
+    equal, different = collections.Counter(), collections.Counter()
+    print(f"{first.label} and {other.label}:")
+    for name in sorted(first.sums.keys() | other.sums.keys()):
+        same = first.sums.get(name) == other.sums.get(name)
+        (equal if same else different)[name.split("-")[0]] += 1
+        if not same:
+            print(f"  differs: {name}")
+    for kind in sorted(equal.keys() | different.keys()):
+        print(f"  {kind}: {equal[kind]} equal, {different[kind]} different")
+    print(f"  all: {equal.total()} equal, {different.total()} different", flush=True)
+    return not different
+
+
+def read_arguments():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("build", type=pathlib.Path)
     parser.add_argument("matrix", type=pathlib.Path)
     parser.add_argument("work", type=pathlib.Path)
+    parser.add_argument("--against", type=pathlib.Path)
+    parser.add_argument("--threads", default="")
     parser.add_argument("--cases", type=int, default=100)
-    parser.add_argument("--threads", type=int)
+    parser.add_argument("--samples", type=int, default=12000)
     parser.add_argument("--data", type=pathlib.Path)
     parser.add_argument("--only", default="")
-    arguments = parser.parse_args()
+    return parser.parse_args()
+
+
+def main():
+    arguments = read_arguments()
     arguments.work.mkdir(parents=True, exist_ok=True)
-    manifest = Manifest(arguments)
-    if manifest.wants("design") or manifest.wants("margin"):
-        manifest.designs()
-    for kind, make in (("sweep", manifest.sweeps), ("run", manifest.runs), ("identify", manifest.identifications),
-                       ("diagnose", lambda: manifest.cases(arguments.cases))):
-        if manifest.wants(kind):
-            make()
-    if arguments.data and manifest.wants("data"):
-        manifest.measurements(arguments.data.resolve())
+    builds = [arguments.build, *([arguments.against] if arguments.against else [])]
+    manifests = [Manifest(arguments, build, threads) for build in builds for threads in arguments.threads.split(",")]
+    for number, manifest in enumerate(manifests):
+        manifest.make()
+        (arguments.work / f"manifest-{number}.txt").write_text(manifest.lines())
+    if len(manifests) == 1:
+        print(manifests[0].lines(), end="")
+        return
+    if not all([compare(manifests[0], other) for other in manifests[1:]]):
+        sys.exit(1)
 
 
 if __name__ == "__main__":

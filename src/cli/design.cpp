@@ -269,6 +269,35 @@ void design(const DesignOptions& options) {
   std::fflush(stdout);
 }
 
+/// The delay and the rate of the loop, and the velocity filter.
+void add_loop_options(const Command& command, DesignOptions& options) {
+  command
+      .option("--delay", options.delay_s,
+              "Loop delay to compensate with a predictor [s]; the design is then discrete-time")
+      .in(Range::within(0.0, 10.0));
+  command
+      .option("--for-delay", options.for_delay_s,
+              "Loop delay to tolerate without a predictor [s]: gains, and force noise of the estimator, with "
+              "the largest delay margin within --cost-loss")
+      .in(Range::within(0.0, 10.0));
+  command
+      .option("--cost-loss", options.cost_loss,
+              "With --for-delay: relative excess over the smallest LQR cost that the gains may have "
+              "(default: 0.3)")
+      .in(Range::within(0.0, 100.0));
+  command
+      .option("--rate", options.rate_hz,
+              "Sample rate [Hz] of the gain file and of discrete-time designs (default: 1000)")
+      .in(Range::within(lowest_sample_rate_hz, highest_sample_rate_hz));
+  command
+      .option("--cutoff", options.cutoff_hz,
+              "Velocity filter of the gain file: cutoff frequency [Hz] (default: 50)")
+      .in(Range::positive());
+  command
+      .option("--damping", options.damping, "Velocity filter of the gain file: damping ratio (default: 0.9)")
+      .in(Range::positive());
+}
+
 }  // namespace
 
 void add_design(CommandLine& line) {
@@ -308,31 +337,7 @@ void add_design(CommandLine& line) {
       .option("--smoothing", options->smoothing,
               "To linearize, replace sgn(v) by tanh(SMOOTHING v) (default: 100)")
       .in(Range::positive());
-  command
-      .option("--delay", options->delay_s,
-              "Loop delay to compensate with a predictor [s]; the design is then discrete-time")
-      .in(Range::within(0.0, 10.0));
-  command
-      .option("--for-delay", options->for_delay_s,
-              "Loop delay to tolerate without a predictor [s]: gains, and force noise of the estimator, with "
-              "the largest delay margin within --cost-loss")
-      .in(Range::within(0.0, 10.0));
-  command
-      .option("--cost-loss", options->cost_loss,
-              "With --for-delay: relative excess over the smallest LQR cost that the gains may have "
-              "(default: 0.3)")
-      .in(Range::within(0.0, 100.0));
-  command
-      .option("--rate", options->rate_hz,
-              "Sample rate [Hz] of the gain file and of discrete-time designs (default: 1000)")
-      .in(Range::within(lowest_sample_rate_hz, highest_sample_rate_hz));
-  command
-      .option("--cutoff", options->cutoff_hz,
-              "Velocity filter of the gain file: cutoff frequency [Hz] (default: 50)")
-      .in(Range::positive());
-  command
-      .option("--damping", options->damping, "Velocity filter of the gain file: damping ratio (default: 0.9)")
-      .in(Range::positive());
+  add_loop_options(command, *options);
   command.option("--out", options->out, "Gain file to write");
   command.flag("--force", options->force, "Replace an existing gain file");
   command.flag("--json", options->as_json, "Print one JSON document");

@@ -239,7 +239,7 @@ void print(const TrialResult& r) {
   std::fflush(stdout);
 }
 
-/// Runs the pieces that were planned.
+/// Runs the pieces that were planned. Seven parameters: all that the command has open by then.
 ExperimentResult perform(const ExperimentArguments& arguments, const ExperimentSetup& setup,
                          const std::vector<Piece>& pieces, const fs::path& folder, const SignalFlag& signal,
                          LiveView* view, UdpStream* stream) {

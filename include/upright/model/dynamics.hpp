@@ -416,7 +416,7 @@ class Dynamics {
     accelerate(state, s, c, force, torque, cart_rests, pivot_rests, rate);
   }
 
-  /// The same with a pendulum, whose angle has this sine and cosine.
+  /// The same with a pendulum. Eight parameters: callers know the sine and cosine of its angle already.
   void accelerate(const PlantState<S>& state, const S& s, const S& c, const S& force, const S& torque,
                   bool cart_rests, bool pivot_rests, PlantState<S>& rate) const {
     const S push = force + coupling_ * s * state.theta_radps * state.theta_radps;
