@@ -72,9 +72,9 @@ class Diagnostician {
       const double lower = force ? named / force->held_out_error : 1.0;
       if (lower > policy_.power.clear_gap) {
         add_curve(*force, named, diagnosis);
-      } else if (lower > std::exp(policy_.acceptance.worse_simulation_by_chance)) {
+      } else if (force && shows_more(*force, lower)) {
         diagnosis.verdict = Verdict::unexplained;
-        diagnosis.residual = force->left_sentence(lower);
+        diagnosis.residual = force->left_sentence();
       } else if (const auto left = place_force_left(search_, known_)) {
         diagnosis.notes.push_back(*left);
       }
@@ -106,6 +106,13 @@ class Diagnostician {
   const FitData& bounded(FitData& data) {
     data.bound = &bound_;
     return data;
+  }
+
+  /// Whether a force that no effect has shows on held-out data too. Of the position, the simulation must say
+  /// so: every track is a little rough. `lower`: by which factor the curve lowers the held-out error.
+  bool shows_more(const ForceDescription& force, double lower) const {
+    return lower > std::exp(policy_.acceptance.worse_simulation_by_chance) ||
+           (force.is_of_velocity && force.held_evidence > policy_.acceptance.min_evidence);
   }
 
   /// `named`: the held-out error without the curve.

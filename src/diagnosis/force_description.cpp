@@ -1,5 +1,6 @@
 #include "force_description.hpp"
 
+#include <Eigen/QR>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -39,7 +40,7 @@ CurveArgument argument_along(const ResidualTrace& trace, Table::Over over) {
 }
 
 /// Nodes over all but the most extreme values, which single samples reach.
-CurveNodes table_nodes(const std::vector<CurveArgument>& arguments) {
+CurveNodes nodes_along(const std::vector<CurveArgument>& arguments, std::size_t count) {
   std::vector<double> values;
   for (const CurveArgument& segment : arguments)
     values.insert(values.end(), segment.at.begin(), segment.at.end());
@@ -53,37 +54,86 @@ CurveNodes table_nodes(const std::vector<CurveArgument>& arguments) {
   if (values.empty()) return {};
   const double low = at(beyond), high = at(1.0 - beyond);
   if (!(high > low)) return {};
-  return {low, (high - low) / static_cast<double>(Table::node_count - 1), Table::node_count};
+  return {low, (high - low) / static_cast<double>(count - 1), count};
 }
 
-/// A curve over one quantity, as the innovations of a fit show it.
-struct Curve {
-  Table::Over over = Table::velocity;
-  CurveNodes nodes;
-  double evidence = 0.0;
-  Eigen::VectorXd force_n;            ///< at the nodes
-  Eigen::MatrixXd prior_information;  ///< of the forces at the nodes
+/// What known effects make of a curve at q: a constant force, viscous friction, quadratic drag, Coulomb
+/// friction and the asymmetry of the viscous one; a spring; Coulomb friction and its slope along the track.
+std::vector<double> known_terms(Table::Over over, double q) {
+  if (over == Table::velocity) return {1.0, q, q * std::abs(q), std::abs(q), q > 0.0 ? 1.0 : -1.0};
+  if (over == Table::position_and_velocity) return {1.0};
+  return {1.0, q};
+}
+
+/// The equations without what known effects may account for, which the search did not name: eliminated by the
+/// Schur complement.
+CurveEquations beyond_known(const CurveEquations& equations, const CurveNodes& nodes, Table::Over over) {
+  const auto rows = static_cast<Eigen::Index>(nodes.count);
+  Eigen::MatrixXd terms(rows, static_cast<Eigen::Index>(known_terms(over, 0.0).size()));
+  for (Eigen::Index i = 0; i < rows; ++i) {
+    const std::vector<double> row = known_terms(over, nodes.first + nodes.spacing * static_cast<double>(i));
+    for (Eigen::Index j = 0; j < terms.cols(); ++j) terms(i, j) = row[static_cast<std::size_t>(j)];
+  }
+  const Eigen::MatrixXd coupled = equations.information * terms;
+  const Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> solver(terms.transpose() * coupled);
+  return {equations.information - coupled * solver.solve(coupled.transpose()),
+          equations.score - coupled * solver.solve(terms.transpose() * equations.score)};
+}
+
+/// The data that a curve is found in: the segments of a fit, linearised, and their motion.
+struct Followed {
+  const FitData& data;
+  std::vector<ResidualTrace> traces;
+  std::vector<std::vector<LinearStep>> steps;
+
+  Followed(const FitData& all, const FitPoint& point, const ResidualWalk& walk)
+      : data(all), traces(smooth_residuals(all, point, walk)), steps(linearise(all, point)) {}
+
+  std::vector<CurveArgument> arguments(Table::Over over) const {
+    std::vector<CurveArgument> all;
+    for (const ResidualTrace& trace : traces) {
+      const Measurement& run = (*data.runs)[trace.run];
+      const bool acts = run.has_cart() && !run.cart_locked;
+      all.push_back(acts ? argument_along(trace, over) : CurveArgument{});
+    }
+    return all;
+  }
+
+  CurveEquations equations(const CurveNodes& nodes, Table::Over over) const {
+    return beyond_known(curve_equations(steps, nodes, arguments(over)), nodes, over);
+  }
 };
 
-/// Curves over each quantity, the one with the most evidence first. `traces`: of the training segments.
-std::vector<Curve> curves_of(const FitData& train, const FitPoint& point,
-                             const std::vector<ResidualTrace>& traces) {
-  const std::vector<std::vector<LinearStep>> steps = linearise(train, point);
+/// A curve over one quantity, as the innovations of a fit show it beyond what known effects have.
+struct Curve {
+  Table::Over over = Table::velocity;
+  double evidence = 0.0;              ///< of a curve of many nodes, on training data
+  double held_evidence = 0.0;         ///< what the same curve saves on held-out data
+  CurveNodes nodes;                   ///< of the table
+  Eigen::VectorXd force_n;            ///< at these nodes
+  Eigen::MatrixXd prior_information;  ///< of the forces at these nodes
+};
+
+/// Curves over each quantity, the one with the most evidence first.
+std::vector<Curve> curves_of(const Followed& train, const Followed& held, std::size_t many) {
   std::vector<Curve> curves;
   for (int number = 0; number < Table::over_count; ++number) {
     const auto over = static_cast<Table::Over>(number);
-    std::vector<CurveArgument> arguments;
-    for (const ResidualTrace& trace : traces) {
-      const Measurement& run = (*train.runs)[trace.run];
-      const bool acts = run.has_cart() && !run.cart_locked;
-      arguments.push_back(acts ? argument_along(trace, over) : CurveArgument{});
-    }
-    const CurveNodes nodes = table_nodes(arguments);
-    if (nodes.count == 0) continue;
-    const CurveEquations equations = curve_equations(steps, nodes, arguments);
-    const RandomCurve curve(equations, nodes);
+    const std::vector<CurveArgument> arguments = train.arguments(over);
+    const CurveNodes fine = nodes_along(arguments, many), coarse = nodes_along(arguments, Table::node_count);
+    if (fine.count == 0) continue;
+    const CurveEquations shown = train.equations(fine, over), drawn = train.equations(coarse, over);
+    const RandomCurve curve(shown, fine), table(drawn, coarse);
     if (!curve.is_there()) continue;
-    curves.push_back({over, nodes, -curve.change(), curve.mean(equations), curve.prior_information()});
+    const Eigen::VectorXd force_n = curve.mean(shown);
+    const CurveEquations unseen = held.equations(fine, over);
+    const double held_evidence = 2.0 * force_n.dot(unseen.score) - force_n.dot(unseen.information * force_n);
+    Curve found{over, -curve.change(), held_evidence, coarse, {}, {}};
+    if (table.is_there()) {
+      found.force_n = table.mean(drawn);
+      found.prior_information = table.prior_information();
+    }
+    curves.push_back(found);
   }
   std::stable_sort(curves.begin(), curves.end(),
                    [](const Curve& a, const Curve& b) { return a.evidence > b.evidence; });
@@ -137,9 +187,11 @@ FitResult fit_with_curve(const FitData& data, const FitPoint& start, const std::
 }
 
 std::string sentence_of(const std::vector<Curve>& curves) {
+  const Curve& best = curves.front();
   std::ostringstream text;
   text.precision(3);
-  text << "a curve over " << quantity_names[curves.front().over] << " (evidence " << curves.front().evidence;
+  text << "a curve over " << quantity_names[best.over] << " (evidence " << best.evidence
+       << " on the training data and " << best.held_evidence << " on held-out data";
   if (curves.size() > 1)
     text << "; the next best, over " << quantity_names[curves[1].over] << ", has " << curves[1].evidence;
   text << ")";
@@ -147,20 +199,32 @@ std::string sentence_of(const std::vector<Curve>& curves) {
 }
 
 /// The curve of a fit as a formula; empty if none fits it.
-std::optional<ForceFormula> formula_of_fit(const FitResult& fitted, const Curve& curve) {
+std::string formula_of_fit(const FitResult& fitted, const Curve& curve) {
   const auto nodes = static_cast<Eigen::Index>(Table::node_count);
   const auto& values = fitted.point.plant.find(effect_index<Table>())->values;
   const Eigen::VectorXd force_n = Eigen::Map<const Eigen::VectorXd>(&values[Table::first_node], nodes);
-  return formula_of(curve.nodes, force_n, fitted.covariance.bottomRightCorner(nodes, nodes));
+  const auto formula = formula_of(curve.nodes, force_n, fitted.covariance.bottomRightCorner(nodes, nodes));
+  if (!formula) return "";
+  const bool of_velocity = curve.over == Table::velocity;
+  return "; within its uncertainty it is " +
+         formula->text(of_velocity ? "v" : "x", of_velocity ? "m/s" : "m");
 }
 
-/// Whether effects of the registry have this force: a constant force, viscous friction, quadratic drag, a
-/// spring, Coulomb friction and its slope along the track. The search knows them, and did not name them.
-bool is_known(const ForceFormula& formula, Table::Over over) {
-  const Term last = over == Table::velocity                ? Term::square
-                    : over == Table::position_and_velocity ? Term::one
-                                                           : Term::linear;
-  return std::all_of(formula.terms.begin(), formula.terms.end(), [&](Term term) { return term <= last; });
+/// Fits the table to the training data and to all, and simulates held-out data. The error stays infinite
+/// where a fit fails.
+void fit_table(const Search& search, const Curve& curve, ForceDescription& force) {
+  const FitPoint judged = force.judged.train.point, known = force.known.train.point;
+  force.judged.free = force.known.free = free_beside(search, force.judged, curve);
+  force.judged.train = fit_with_curve(search.train_data(), moved_to(judged, with_table(judged.plant, curve)),
+                                      force.judged.free, curve);
+  if (!std::isfinite(force.judged.train.objective)) return;
+  Plant plant = known.plant;
+  plant.set(effect_index<Table>(), force.judged.train.point.plant.find(effect_index<Table>())->values);
+  force.known.train = fit_with_curve(search.all_data(), moved_to(known, plant), force.known.free, curve);
+  if (!std::isfinite(force.known.train.objective)) return;
+  force.where += formula_of_fit(force.known.train, curve);
+  search.filter_held_out(force.judged, sensors_only(force.judged.train.point.noise));
+  force.held_out_error = search.gap_of(force.judged);
 }
 
 }  // namespace
@@ -170,12 +234,8 @@ bool ForceDescription::moved(std::size_t effect) const {
                      [&](const FreeParameter& p) { return p.effect == effect; });
 }
 
-std::string ForceDescription::left_sentence(double factor) const {
-  std::ostringstream text;
-  text.precision(3);
-  text << "a force is left that no effect describes: with it as " << where
-       << " the error on held-out data is " << factor << " times smaller";
-  return text.str();
+std::string ForceDescription::left_sentence() const {
+  return "a force is left that no effect describes: " + where;
 }
 
 FoundEffect ForceDescription::as_effect(double gap_before, double gap_after) const {
@@ -191,37 +251,22 @@ FoundEffect ForceDescription::as_effect(double gap_before, double gap_after) con
 std::optional<ForceDescription> describe_force(const Search& search, const Hypothesis& judged,
                                                const Hypothesis& known) {
   const FitData& train = search.train_data();
-  const FitData all = search.all_data();
-  if (!search.range().cart_moves || search.held_data().segments.empty()) return std::nullopt;
+  const FitData& held = search.held_data();
+  if (!search.range().cart_moves || held.segments.empty()) return std::nullopt;
   if (search.given().find(effect_index<Table>()) != nullptr) return std::nullopt;
-  if (known.train.point.starts.size() != all.segments.size()) return std::nullopt;
-  const std::vector<ResidualTrace> traces =
-      smooth_residuals(train, judged.train.point, search.policy().location.walk);
-  const std::vector<Curve> curves = curves_of(train, judged.train.point, traces);
+  if (known.train.point.starts.size() != search.all_data().segments.size()) return std::nullopt;
+  const ResidualWalk& walk = search.policy().location.walk;
+  const std::vector<Curve> curves =
+      curves_of(Followed(train, judged.train.point, walk), Followed(held, judged.held.point, walk),
+                search.budget().track_nodes);
   if (curves.empty() || !(curves.front().evidence > search.policy().acceptance.min_evidence))
     return std::nullopt;
   const Curve& curve = curves.front();
-
-  ForceDescription result{judged, known, unbounded, sentence_of(curves)};
-  result.judged.simulation.reset();
-  result.judged.free = result.known.free = free_beside(search, judged, curve);
-  result.judged.train =
-      fit_with_curve(train, moved_to(judged.train.point, with_table(judged.train.point.plant, curve)),
-                     result.judged.free, curve);
-  if (!std::isfinite(result.judged.train.objective)) return std::nullopt;
-  const std::optional<ForceFormula> formula = formula_of_fit(result.judged.train, curve);
-  if (formula && is_known(*formula, curve.over)) return std::nullopt;
-  search.filter_held_out(result.judged, sensors_only(result.judged.train.point.noise));
-  result.held_out_error = search.gap_of(result.judged);
-  Plant plant = known.train.point.plant;
-  plant.set(effect_index<Table>(), result.judged.train.point.plant.find(effect_index<Table>())->values);
-  result.known.train = fit_with_curve(all, moved_to(known.train.point, plant), result.known.free, curve);
-  if (!std::isfinite(result.known.train.objective)) return std::nullopt;
-  const bool of_velocity = curve.over == Table::velocity;
-  if (formula)
-    result.where +=
-        "; within its uncertainty it is " + formula->text(of_velocity ? "v" : "x", of_velocity ? "m/s" : "m");
-  return result;
+  ForceDescription force{
+      judged, known, unbounded, sentence_of(curves), curve.over == Table::velocity, curve.held_evidence};
+  force.judged.simulation.reset();
+  if (curve.force_n.size() > 0) fit_table(search, curve, force);
+  return force;
 }
 
 }  // namespace upright

@@ -15,17 +15,19 @@ struct ForceDescription {
   Hypothesis known;             ///< fitted to all data
   double held_out_error = 0.0;  ///< of an open-loop simulation of held-out data [sensor noise]
   std::string where;            ///< over what the force lies, and how clear that is
+  bool is_of_velocity = false;  ///< else of the position, as the force of a rough track is
+  double held_evidence = 0.0;   ///< what a curve of many nodes saves on held-out data, linearised
 
   /// Whether the fits moved the parameters of this effect too.
   bool moved(std::size_t effect) const;
-  /// What is left without the curve, which lowers the held-out error by this factor.
-  std::string left_sentence(double factor) const;
+  /// What is left without the curve.
+  std::string left_sentence() const;
   /// The curve as an effect of the answer, with these gaps.
   FoundEffect as_effect(double gap_before, double gap_after) const;
 };
 
 /// Empty if the cart does not move, if no data are held out, if the plant file has a table already, or if the
-/// training data show no such force, or one that known effects have. `judged`: a fit to the training data,
+/// training data show no such force beyond what known effects have. `judged`: a fit to the training data,
 /// `known`: to all data. Whether the curve helps on held-out data is for the caller to judge. Throws
 /// Interrupted and BoundReached.
 std::optional<ForceDescription> describe_force(const Search& search, const Hypothesis& judged,
