@@ -189,7 +189,7 @@ void run_sampled(const LoopSetup& setup, const Dynamics<Lanes>& chain, const Per
       command = select(goes_on, smaller(larger(wanted, -limit), limit), command);
       const LaneDrive drive = input.pass(goes_on, chain.actuate(command));
       state.motor_v = drive.late_v;
-      Period::begin(steps, goes_on, drive);
+      period.begin(steps, goes_on, drive);
     }
     period.advance(steps);
   }
@@ -208,7 +208,7 @@ void run_with(const LoopSetup& setup, const LaneParts& parts, const Present& pre
     const bool jumps =
         setup.cart_resolution_m > 0.0 || setup.angle_resolution_rad > 0.0 || !parts.predictions.empty();
     const bool reverses = jumps && chain.cart_has_kink() && setup.model.smoothing == 0.0;
-    if (chain.cart_can_stick() || reverses)
+    if (chain.cart_can_stick() || chain.pivot_can_stick() || reverses)
       return run_sampled(setup, chain, EventPeriod<Present>(model, present), cases, results,
                          LaneObserver<LaneMask>(setup, parts, first, cases.size()));
   }

@@ -107,7 +107,7 @@ bool lanes_can_run(const LoopSetup& setup) {
     return false;
   if (setup.model.cart_locked || !setup.model.has_pendulum) return false;
   const Dynamics<double> physics(setup.model);
-  if (physics.has_motor_lag() || physics.pivot_has_kink()) return false;
+  if (physics.has_motor_lag() || (!setup.sampled && physics.pivot_can_stick())) return false;
   // Faster plants than that need steps that the lanes do not take.
   constexpr double fastest_radps = 1e3;
   return fastest_rate_radps(setup.model) < fastest_radps;

@@ -1,6 +1,7 @@
-// Sweeps of the loop as the rig is: encoder steps, the amplifier's limit, true stick-slip and bristles. One
-// count more or less changes the voltage, so that two engines go apart for good some time after the first
-// count in which they differ. Until then they agree to 1e-6; afterwards in what becomes of the runs.
+// Sweeps of the loop as the rig is: encoder steps, the amplifier's limit, true stick-slip of the cart and of
+// the pivot, and bristles. One count more or less changes the voltage, so that two engines go apart for good
+// some time after the first count in which they differ. Until then they agree to 1e-6; afterwards in what
+// becomes of the runs.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -25,6 +26,7 @@ struct Loop {
   bool estimates = false;       ///< by a Kalman filter
   double longest_stay_s = 0.0;  ///< delays up to this do not fall within the first half second
   bool predicts = false;        ///< the delay is compensated
+  double pivot_nm = 0.0;        ///< dry friction of the pivot
 };
 
 class SweepEncoders : public testing::TestWithParam<Loop> {
@@ -35,7 +37,9 @@ class SweepEncoders : public testing::TestWithParam<Loop> {
 
   static LoopSetup setup() {
     LoopSetup made;
-    made.model = make_model<double>(plant_of(GetParam().plant));
+    Plant plant = plant_of(GetParam().plant);
+    if (GetParam().pivot_nm > 0.0) plant.set("pivot_coulomb_friction", {GetParam().pivot_nm});
+    made.model = make_model<double>(plant);
     made.model.smoothing = GetParam().smoothing;
     made.control.gains = {70.7107, 304.9273, 143.3152, 61.0833};
     made.sampled = true;
@@ -139,6 +143,7 @@ class SweepEncodersFalls : public SweepEncoders {};
 TEST_P(SweepEncodersFalls, FallWhereTheEventEngineFalls) {
   const LoopSetup setup = SweepEncoders::setup();
   const std::vector<LoopCase> cases = random_cases(400, 0.12, 25);
+  ASSERT_TRUE(lanes_can_run(setup));
   std::vector<LoopResult> lanes(cases.size());
   run_on_lanes(setup, cases, lanes);
   std::size_t differ = 0, fell = 0;
@@ -226,16 +231,22 @@ const Loop with_events[] = {{"stick_slip", "exponential", 0.0, false, 0.014},
                             {"stick_slip_estimated", "exponential", 0.0, true, 0.05},
                             {"bristles", "dynamic", 0.0, false, 0.014},
                             {"bristles_estimated", "dynamic", 0.0, true, 0.05}};
+const Loop with_pivot[] = {{"pivot_and_cart", "exponential", 0.0, false, 0.014, false, 0.003},
+                           {"pivot_alone", "viscous", 0.0, true, 0.05, false, 0.003},
+                           {"pivot_and_bristles", "dynamic", 0.0, false, 0.014, false, 0.003}};
 const Loop with_predictor[] = {{"predicted", "exponential", 0.0, false, 0.1, true},
                                {"estimated_and_predicted", "dynamic", 0.0, true, 0.1, true}};
 const Loop smooth[] = {{"smooth", "exponential", 100.0, false, 0.014}};
 
 INSTANTIATE_TEST_SUITE_P(Events, SweepEncoders, testing::ValuesIn(with_events), name_of_loop);
+INSTANTIATE_TEST_SUITE_P(Pivot, SweepEncoders, testing::ValuesIn(with_pivot), name_of_loop);
 INSTANTIATE_TEST_SUITE_P(Predictor, SweepEncoders, testing::ValuesIn(with_predictor), name_of_loop);
 INSTANTIATE_TEST_SUITE_P(Smooth, SweepEncoders, testing::ValuesIn(smooth), name_of_loop);
 INSTANTIATE_TEST_SUITE_P(Events, SweepEncodersFalls, testing::ValuesIn(with_events), name_of_loop);
+INSTANTIATE_TEST_SUITE_P(Pivot, SweepEncodersFalls, testing::ValuesIn(with_pivot), name_of_loop);
 INSTANTIATE_TEST_SUITE_P(Smooth, SweepEncodersFalls, testing::ValuesIn(smooth), name_of_loop);
 INSTANTIATE_TEST_SUITE_P(Events, SweepEncodersApart, testing::ValuesIn(with_events), name_of_loop);
+INSTANTIATE_TEST_SUITE_P(Pivot, SweepEncodersApart, testing::ValuesIn(with_pivot), name_of_loop);
 INSTANTIATE_TEST_SUITE_P(Predictor, SweepEncodersApart, testing::ValuesIn(with_predictor), name_of_loop);
 
 }  // namespace
