@@ -18,6 +18,7 @@
 
 #include "lane_contacts.hpp"
 #include "lane_model.hpp"
+#include "lane_motor.hpp"
 #include "upright/sim/runge_kutta.hpp"
 
 namespace upright {
@@ -27,6 +28,7 @@ class EventPeriod {
  public:
   EventPeriod(const PlantModel<Lanes>& model, const Present& present)
       : physics_(model, present),
+        motor_(model),
         sticks_(may_stick<Present> && physics_.cart_can_stick()),
         pivot_sticks_(physics_.pivot_can_stick()),
         cart_turns_(physics_.cart_has_kink()) {}
@@ -38,7 +40,7 @@ class EventPeriod {
   struct Steps {
     State state{};
     LaneModes modes;     ///< directions of the motions, -1 or 1; 0: at rest
-    Lanes motor_v;       ///< now
+    Lanes drive_v;       ///< now
     Lanes left_s;        ///< until this voltage ends
     Lanes late_v;        ///< the voltage that follows then
     Lanes late_s;        ///< and how long it acts; 0: the period ends
@@ -66,12 +68,26 @@ class EventPeriod {
     const LaneMask stay = steps.taken >= Lanes(max_steps);
     const Begin begin = begin_of(steps);
     Step step{length_of(steps, begin, stay), {}, {}};
+    // The voltages within a step of a lagging motor give it the exact impulse; events are sought by the true
+    // accelerations at its ends.
+    LaggedMotor<Lanes> lagged;
+    State first = begin.rate;
+    if (motor_.lags()) {
+      lagged = motor_.over(steps.state.motor_v, steps.drive_v, step.length_s);
+      first = rate_of(steps.state, lagged.begin_v, steps.modes).of;
+    }
+    const Lanes& middle_v = motor_.lags() ? lagged.middle_v : steps.drive_v;
+    const Lanes& end_v = motor_.lags() ? lagged.end_v : steps.drive_v;
     const auto rate = [&](const State& at, Stage stage) {
-      const Rate found = rate_of(at, steps.motor_v, steps.modes);
+      const Rate found = rate_of(at, stage == Stage::middle ? middle_v : end_v, steps.modes);
       if (stage == Stage::end) step.last = found;
       return found.of;
     };
-    step.end = runge_kutta_4(rate, steps.state, begin.rate, step.length_s);
+    step.end = runge_kutta_4(rate, steps.state, first, step.length_s);
+    if (motor_.lags()) {
+      step.end.motor_v = lagged.after_v;
+      step.last = rate_of(step.end, lagged.after_v, steps.modes);
+    }
     take(steps, begin, step, stay);
     const LaneMask next = (steps.left_s == Lanes(0.0)) & (steps.late_s > Lanes(0.0));
     if (any(next)) {
@@ -110,9 +126,9 @@ class EventPeriod {
   }
 
   /// Holds a voltage in these lanes. The load on contacts at rest changes with it.
-  void hold(Steps& steps, const LaneMask& lanes, const Lanes& motor_v, const Lanes& duration_s) const {
+  void hold(Steps& steps, const LaneMask& lanes, const Lanes& drive_v, const Lanes& duration_s) const {
     const Lanes v = steps.state.cart_mps;
-    steps.motor_v = select(lanes, motor_v, steps.motor_v);
+    steps.drive_v = select(lanes, drive_v, steps.drive_v);
     steps.modes.cart = select(lanes, sign_of(v), steps.modes.cart);
     steps.left_s = select(lanes, duration_s, steps.left_s);
     steps.longest_s = select(lanes, duration_s, steps.longest_s);
@@ -126,6 +142,10 @@ class EventPeriod {
     steps.settles = (lanes & rests) | (steps.settles & !lanes);
   }
 
+  const Lanes& motor_of(const Steps& steps) const {
+    return motor_.lags() ? steps.state.motor_v : steps.drive_v;
+  }
+
   static Lanes excess_of(const Lanes& load, const Lanes& forward, const Lanes& backward) {
     return larger(load - forward, -load - backward);
   }
@@ -133,7 +153,7 @@ class EventPeriod {
   [[gnu::flatten, gnu::noinline]] Begin begin_of(Steps& steps) const {
     Begin begin{};
     const State& at = steps.state;
-    const Lanes& motor_v = steps.motor_v;
+    const Lanes& motor_v = motor_of(steps);
     if (pivot_sticks()) return begin_of_both(steps);
     if (!sticks_) {
       begin.rate = unheld_rate(at, motor_v, steps.modes.cart);
@@ -163,10 +183,10 @@ class EventPeriod {
     LaneModes& modes = steps.modes;
     if (sticks_ && any(at.cart_mps == Lanes(0.0))) find_static_friction(at, begin);
     if (any(steps.settles)) {
-      const auto unheld = physics_.unheld(at, steps.motor_v, modes.cart);
+      const auto unheld = physics_.unheld(at, motor_of(steps), modes.cart);
       settle_contacts(physics_, at, unheld, begin.forward_n, begin.backward_n, steps.settles, modes);
     }
-    const Rate found = rate_of_both(at, steps.motor_v, modes);
+    const Rate found = rate_of_both(at, motor_of(steps), modes);
     begin.rate = found.of;
     begin.excess_n = excess_of(found.load_n, begin.forward_n, begin.backward_n);
     begin.pivot_excess_nm = absolute(found.pivot_load_nm) - physics_.pivot_dry_level();
@@ -206,7 +226,8 @@ class EventPeriod {
 
   /// To the end of the period, or to where a contact that slows down would stop.
   Lanes length_of(const Steps& steps, const Begin& begin, const LaneMask& stay) const {
-    const Lanes longest = smaller(steps.left_s, steps.longest_s);
+    Lanes longest = smaller(steps.left_s, steps.longest_s);
+    if (motor_.lags()) longest = motor_.longest_s(steps.state.motor_v, steps.drive_v, longest);
     const Lanes length = up_to_stop(steps.modes.cart * steps.state.cart_mps,
                                     steps.modes.cart * begin.rate.cart_mps, longest, stay);
     if (!pivot_sticks()) return length;
@@ -262,6 +283,11 @@ class EventPeriod {
     on(&State::cart_mps);
     on(&State::theta_radps);
     if constexpr (may_have_bristles<Present>) on(&State::bristle_m);
+    if (motor_.lags()) {
+      const Lanes end_v = step.end.motor_v;
+      const Lanes stop_v = select(stops, motor_.after(end_v, steps.drive_v, more), end_v);
+      steps.state.motor_v = select(counts, stop_v, steps.state.motor_v);
+    }
     const auto go_on = [&](const LaneMeeting& of, Lanes State::*velocity, Lanes& mode, const Lanes& load) {
       steps.state.*velocity = select(of.stops, zero, steps.state.*velocity);
       // Rounding may have sent a contact off against its acceleration: it rests after all.
@@ -282,6 +308,7 @@ class EventPeriod {
   }
 
   Dynamics<Lanes, Present> physics_;
+  LaneMotor motor_;
   bool sticks_, pivot_sticks_, cart_turns_;
 };
 

@@ -8,9 +8,9 @@
 
 namespace upright {
 
-/// Whether `run_on_lanes` supports these runs. It excludes the extended Kalman filter, motor lag, a cart
-/// alone, stiff bristles and other dynamics much faster than a millisecond, and in a continuous loop
-/// estimators and a pivot that sticks.
+/// Whether `run_on_lanes` supports these runs. It excludes the extended Kalman filter, motor lags shorter
+/// than 0.1 ms, a cart alone, stiff bristles and other dynamics much faster than a millisecond, and in a
+/// continuous loop estimators, motor lag and a pivot that sticks.
 bool lanes_can_run(const LoopSetup& setup);
 
 /// The target of the lanes: the registers of this processor, fastest, with last digits that differ

@@ -107,7 +107,10 @@ bool lanes_can_run(const LoopSetup& setup) {
     return false;
   if (setup.model.cart_locked || !setup.model.has_pendulum) return false;
   const Dynamics<double> physics(setup.model);
-  if (physics.has_motor_lag() || (!setup.sampled && physics.pivot_can_stick())) return false;
+  if (!setup.sampled && (physics.has_motor_lag() || physics.pivot_can_stick())) return false;
+  // A step towards a stop would not show a shorter one.
+  constexpr double shortest_lag_s = 1e-4;
+  if (physics.has_motor_lag() && physics.motor_time_constant_s() < shortest_lag_s) return false;
   // Faster plants than that need steps that the lanes do not take.
   constexpr double fastest_radps = 1e3;
   return fastest_rate_radps(setup.model) < fastest_radps;

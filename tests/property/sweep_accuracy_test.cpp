@@ -1,6 +1,6 @@
 // The bar of the sweep engine: on 240 runs over starting angle and delay the lanes are within 1e-6 of a
 // reference with steps fifty times shorter, sampled and continuous, with smooth friction, true stick-slip of
-// the cart and of the pivot, bristles and a force table.
+// the cart and of the pivot, bristles, a force table and a motor lag.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -175,9 +175,12 @@ const Friction everywhere[] = {{"smooth", "exponential", 100.0},
                                {"stick_slip", "exponential", 0.0},
                                {"bristles", "dynamic", 0.0},
                                {"table", "viscous", 0.0, "force_table", table},
-                               {"pivot_smooth", "exponential", 100.0, "pivot_coulomb_friction", {0.003}},
                                {"pivot_drag", "exponential", 0.0, "pivot_quadratic_drag", {0.003}}};
-const Friction sampled_only[] = {{"pivot_and_cart", "exponential", 0.0, "pivot_coulomb_friction", {0.01}},
+const Friction sampled_only[] = {{"pivot_smooth", "exponential", 100.0, "pivot_coulomb_friction", {0.003}},
+                                 {"lag_smooth", "exponential", 100.0, "motor_lag", {0.001}},
+                                 {"lag_stick_slip", "exponential", 0.0, "motor_lag", {0.0004}},
+                                 {"lag_bristles", "dynamic", 0.0, "motor_lag", {0.001}},
+                                 {"pivot_and_cart", "exponential", 0.0, "pivot_coulomb_friction", {0.01}},
                                  {"pivot_alone", "viscous", 0.0, "pivot_coulomb_friction", {0.003}},
                                  {"pivot_and_bristles", "dynamic", 0.0, "pivot_coulomb_friction", {0.003}}};
 std::string name_of(const testing::TestParamInfo<Friction>& friction) {

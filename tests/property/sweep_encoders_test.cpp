@@ -27,6 +27,7 @@ struct Loop {
   double longest_stay_s = 0.0;  ///< delays up to this do not fall within the first half second
   bool predicts = false;        ///< the delay is compensated
   double pivot_nm = 0.0;        ///< dry friction of the pivot
+  double lag_s = 0.0;           ///< of the motor
 };
 
 class SweepEncoders : public testing::TestWithParam<Loop> {
@@ -39,6 +40,7 @@ class SweepEncoders : public testing::TestWithParam<Loop> {
     LoopSetup made;
     Plant plant = plant_of(GetParam().plant);
     if (GetParam().pivot_nm > 0.0) plant.set("pivot_coulomb_friction", {GetParam().pivot_nm});
+    if (GetParam().lag_s > 0.0) plant.set("motor_lag", {GetParam().lag_s});
     made.model = make_model<double>(plant);
     made.model.smoothing = GetParam().smoothing;
     made.control.gains = {70.7107, 304.9273, 143.3152, 61.0833};
@@ -234,19 +236,25 @@ const Loop with_events[] = {{"stick_slip", "exponential", 0.0, false, 0.014},
 const Loop with_pivot[] = {{"pivot_and_cart", "exponential", 0.0, false, 0.014, false, 0.003},
                            {"pivot_alone", "viscous", 0.0, true, 0.05, false, 0.003},
                            {"pivot_and_bristles", "dynamic", 0.0, false, 0.014, false, 0.003}};
+const Loop with_lag[] = {{"lag", "exponential", 0.0, false, 0.012, false, 0.0, 0.001},
+                         {"lag_and_pivot", "exponential", 0.0, true, 0.04, false, 0.003, 0.002},
+                         {"lag_and_bristles", "dynamic", 0.0, false, 0.012, false, 0.0, 0.0005}};
 const Loop with_predictor[] = {{"predicted", "exponential", 0.0, false, 0.1, true},
                                {"estimated_and_predicted", "dynamic", 0.0, true, 0.1, true}};
 const Loop smooth[] = {{"smooth", "exponential", 100.0, false, 0.014}};
 
 INSTANTIATE_TEST_SUITE_P(Events, SweepEncoders, testing::ValuesIn(with_events), name_of_loop);
 INSTANTIATE_TEST_SUITE_P(Pivot, SweepEncoders, testing::ValuesIn(with_pivot), name_of_loop);
+INSTANTIATE_TEST_SUITE_P(Lag, SweepEncoders, testing::ValuesIn(with_lag), name_of_loop);
 INSTANTIATE_TEST_SUITE_P(Predictor, SweepEncoders, testing::ValuesIn(with_predictor), name_of_loop);
 INSTANTIATE_TEST_SUITE_P(Smooth, SweepEncoders, testing::ValuesIn(smooth), name_of_loop);
 INSTANTIATE_TEST_SUITE_P(Events, SweepEncodersFalls, testing::ValuesIn(with_events), name_of_loop);
 INSTANTIATE_TEST_SUITE_P(Pivot, SweepEncodersFalls, testing::ValuesIn(with_pivot), name_of_loop);
+INSTANTIATE_TEST_SUITE_P(Lag, SweepEncodersFalls, testing::ValuesIn(with_lag), name_of_loop);
 INSTANTIATE_TEST_SUITE_P(Smooth, SweepEncodersFalls, testing::ValuesIn(smooth), name_of_loop);
 INSTANTIATE_TEST_SUITE_P(Events, SweepEncodersApart, testing::ValuesIn(with_events), name_of_loop);
 INSTANTIATE_TEST_SUITE_P(Pivot, SweepEncodersApart, testing::ValuesIn(with_pivot), name_of_loop);
+INSTANTIATE_TEST_SUITE_P(Lag, SweepEncodersApart, testing::ValuesIn(with_lag), name_of_loop);
 INSTANTIATE_TEST_SUITE_P(Predictor, SweepEncodersApart, testing::ValuesIn(with_predictor), name_of_loop);
 
 }  // namespace
