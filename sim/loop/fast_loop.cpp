@@ -8,6 +8,7 @@
 #include "event_period.hpp"
 #include "lane_builds.hpp"
 #include "lane_model.hpp"
+#include "lane_motor.hpp"
 #include "lane_observer.hpp"
 #include "lane_results.hpp"
 #include "lane_ring.hpp"
@@ -104,7 +105,7 @@ class SmoothPeriod {
   }
 
   SmoothPeriod(const LaneParts& /*parts*/, const PlantModel<Lanes>& model, const Present& present)
-      : physics_(model, present) {
+      : physics_(model, present), motor_(model) {
     const double smoothing = model.smoothing;
     if (smoothing > 0.0) {
       // tanh(smoothing v) turns within about 3 / smoothing; a step may sweep 0.7 / smoothing of it (errors of
@@ -118,6 +119,7 @@ class SmoothPeriod {
   }
 
   [[gnu::flatten]] void advance(PlantState<Lanes>& state, const Lanes& motor_v, double period_s) const {
+    if (motor_.lags()) return advance_lagging(state, motor_v, period_s);
     const auto rate = [&](const PlantState<Lanes>& s, Stage) { return rate_of(s, motor_v); };
     const PlantState<Lanes> first = rate(state, Stage::end);
     const int pieces = pieces_for(state, first, period_s);
@@ -132,6 +134,22 @@ class SmoothPeriod {
   [[gnu::flatten, gnu::noinline]] PlantState<Lanes> rate_of(const PlantState<Lanes>& state,
                                                             const Lanes& motor_v) const {
     return physics_.derivative(state, motor_v, {});
+  }
+
+  void advance_lagging(PlantState<Lanes>& state, const Lanes& drive_v, double period_s) const {
+    const LaggedMotor<Lanes> whole = motor_.over(state.motor_v, drive_v, Lanes(period_s));
+    const Lanes mean_v = (whole.begin_v + Lanes(4.0) * whole.middle_v + whole.end_v) * Lanes(1.0 / 6.0);
+    int pieces = pieces_for(state, rate_of(state, mean_v), period_s);
+    while (pieces < max_pieces && any(motor_.time_constant_s() < Lanes(period_s / pieces))) pieces *= 2;
+    const Lanes h(period_s / pieces);
+    for (int i = 0; i < pieces; ++i) {
+      const LaggedMotor<Lanes> lagged = motor_.over(state.motor_v, drive_v, h);
+      const auto rate = [&](const PlantState<Lanes>& s, Stage stage) {
+        return rate_of(s, stage == Stage::middle ? lagged.middle_v : lagged.end_v);
+      };
+      state = runge_kutta_4(rate, state, rate_of(state, lagged.begin_v), h);
+      state.motor_v = lagged.after_v;
+    }
   }
 
   static constexpr double kink_sweep_mps = 1e-3;
@@ -149,6 +167,7 @@ class SmoothPeriod {
   }
 
   Dynamics<Lanes, Present> physics_;
+  LaneMotor motor_;
   double turning_mps_ = 0.0, sweep_mps_ = 0.0;
 };
 
@@ -250,7 +269,8 @@ class SampledRuns {
     observer_.take_case(lane, runs_.case_of(run));
     delay_.take(lane, start.delay_s);
     PlantState<Lanes>& state = steps_.state;
-    for (Lanes* number : {&state.cart_m, &state.cart_mps, &state.theta_radps, &state.bristle_m, &begun_})
+    for (Lanes* number :
+         {&state.cart_m, &state.cart_mps, &state.theta_radps, &state.motor_v, &state.bristle_m, &begun_})
       put(*number, lane, 0.0);
     put(state.theta_rad, lane, start.theta0_rad);
   }
@@ -282,8 +302,8 @@ class SampledRuns {
     const Lanes wanted = observer_.command_v(lanes, delay_.pass(lanes, newest), command_);
     command_ = select(lanes, smaller(larger(wanted, -limit), limit), command_);
     const LaneDrive drive = input_.pass(lanes, chain_.actuate(command_));
-    steps_.state.motor_v = drive.late_v;
-    Period::begin(steps_, lanes, drive);
+    if (!chain_.has_motor_lag()) steps_.state.motor_v = drive.late_v;
+    period_.begin(steps_, lanes, drive);
   }
 
   const LoopSetup& setup_;
