@@ -183,6 +183,7 @@ struct LaneRuns {
   std::span<const PlantModel<double>> plants;
   std::span<const LoopCase> cases;
   std::span<LoopResult> results;
+  std::size_t first_case = 0;  ///< number of the first of these cases among all of the call
 
   std::size_t count() const { return plants.size() * cases.size(); }
   std::size_t plant_of(std::size_t run) const { return run / cases.size(); }
@@ -266,7 +267,7 @@ class SampledRuns {
       seen_.begin(lane);
     }
     run_of_[lane] = run;
-    observer_.take_case(lane, runs_.case_of(run));
+    observer_.take_case(lane, runs_.first_case + runs_.case_of(run));
     delay_.take(lane, start.delay_s);
     PlantState<Lanes>& state = steps_.state;
     for (Lanes* number :
@@ -335,7 +336,7 @@ void run_with(const LoopSetup& setup, const LaneParts& parts, const Present& pre
       SampledRuns<Present, SmoothPeriod<Present>>(
           setup, parts, present,
           {runs.plants.subspan(plant, 1), runs.cases.subspan(first, count),
-           runs.results.subspan(plant * runs.cases.size() + first, count)})
+           runs.results.subspan(plant * runs.cases.size() + first, count), first})
           .run();
     }
 }

@@ -25,8 +25,7 @@ class ColouredNull {
   /// What the effect saves beside such a disturbance, after the penalty of its parameters.
   double evidence_of(std::size_t effect) const {
     const FitPoint& with = with_.train.point;
-    if (!fault_of(without_effect(with.plant, effect, search_.given())).empty())
-      return std::numeric_limits<double>::infinity();
+    if (!is_removable(with.plant, effect, search_.given())) return std::numeric_limits<double>::infinity();
     const FitResult without = fit_without(all_, with, effect, known_.free, search_.given(), coloured());
     return without.objective - with_.train.objective - search_.penalty_of(known_, effect);
   }

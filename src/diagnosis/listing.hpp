@@ -26,11 +26,11 @@ struct Listing {
   std::optional<std::size_t> raises;
 };
 
-/// Adds these effects in this order.
 /// Root mean square error of a plain simulation of held-out data with these effects [noise standard
 /// deviations].
 double held_out_error(Search& search, const Hypothesis& judged, const std::vector<std::size_t>& effects);
 
+/// Adds these effects in this order.
 Listing list_effects(Search& search, const Hypothesis& judged, const std::vector<std::size_t>& effects);
 
 }  // namespace upright

@@ -127,8 +127,7 @@ class PlaceNull {
   /// What the effect saves beside the force, after the penalty of its parameters.
   double evidence_of(std::size_t effect) const {
     const FitPoint& with = known_.train.point;
-    if (!fault_of(without_effect(with.plant, effect, search_.given())).empty())
-      return std::numeric_limits<double>::infinity();
+    if (!is_removable(with.plant, effect, search_.given())) return std::numeric_limits<double>::infinity();
     FitOptions same_noise;
     same_noise.noise_rounds = 0;
     const FitResult without = fit_without(all_, with, effect, known_.free, search_.given(), same_noise);

@@ -120,7 +120,7 @@ class Parts {
     result.effect = effect;
     result.transferred_evidence = result.t_value = without_limit;
     result.shows_most.evidence = -without_limit;
-    if (!is_removable(effect)) return result;
+    if (!is_removable(parts_.front().with.point.plant, effect, given_)) return result;
     std::size_t contradicts = 0;
     for (std::size_t i = 0; i < parts_.size(); ++i) {
       const Part& part = parts_[i];
@@ -141,11 +141,6 @@ class Parts {
   }
 
  private:
-  /// Whether the others can be without it.
-  bool is_removable(std::size_t effect) const {
-    return fault_of(without_effect(parts_.front().with.point.plant, effect, given_)).empty();
-  }
-
   bool is_excited(const Part& part, std::size_t effect) const {
     const std::vector<Eigen::Index> own = places_of(effect, free_);
     return !own.empty() && std::isfinite(part.with.objective) &&

@@ -16,6 +16,10 @@ Plant without_effect(Plant plant, std::size_t effect, const Plant& given) {
   return plant;
 }
 
+bool is_removable(const Plant& plant, std::size_t effect, const Plant& given) {
+  return fault_of(without_effect(plant, effect, given)).empty();
+}
+
 FitResult fit_without(const FitData& data, const FitPoint& with, std::size_t effect,
                       std::vector<FreeParameter> free, const Plant& given, const FitOptions& options) {
   std::erase_if(free, [&](const FreeParameter& p) { return p.effect == effect; });
