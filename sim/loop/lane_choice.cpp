@@ -183,6 +183,8 @@ void run_plants_on_lanes(const LoopSetup& setup, std::span<const PlantModel<doub
     const std::size_t count = end - first;
     of_plants.model = plants[first];
     parts.own_pace = lanes_refill(of_plants);
+    const Dynamics<double> physics(of_plants.model);
+    parts.pivot_or_lag = parts.own_pace && (physics.pivot_can_stick() || physics.has_motor_lag());
     parts.stiff_bristles = setup.sampled && has_stiff_bristles(plants[first]);
     lanes_for(registers).run(setup, parts, plants.subspan(first, count), cases,
                              results.subspan(first * cases.size(), count * cases.size()));

@@ -8,10 +8,8 @@ namespace upright {
 
 /// One contact before and after a step. Velocities and accelerations count along the direction of its motion.
 struct LaneContact {
-  Lanes direction;              ///< of the motion, -1 or 1; 0: at rest
   Lanes speed, growth;          ///< at the beginning
   Lanes end_speed, end_growth;  ///< at the end
-  Lanes excess, end_excess;     ///< of the load over what friction holds, where it is at rest
 };
 
 /// What a contact met within a step.
@@ -58,12 +56,13 @@ inline LaneMeeting stops_of(const LaneContact& contact, const Lanes& length_s, c
   return met;
 }
 
-/// Contacts at rest whose load passes the static friction within a step.
-inline void find_breakaways(const LaneContact& contact, const Lanes& length_s, const LaneMask& active,
-                            LaneMeeting& met) {
-  const Lanes zero(0.0), excess = contact.end_excess;
-  const LaneMask over = active & (contact.direction == zero) & (excess > zero);
-  const Lanes late_s = excess * length_s / select(over, excess - smaller(contact.excess, zero), Lanes(1.0));
+/// Contacts at rest whose load passes the static friction within a step. `excess`: of the load over what
+/// friction holds, at its beginning and its end.
+inline void find_breakaways(const LaneMask& resting, const Lanes& excess, const Lanes& end_excess,
+                            const Lanes& length_s, LaneMeeting& met) {
+  const Lanes zero(0.0);
+  const LaneMask over = resting & (end_excess > zero);
+  const Lanes late_s = end_excess * length_s / select(over, end_excess - smaller(excess, zero), Lanes(1.0));
   met.breaks = over & (late_s <= Lanes(2.0 * LaneMeeting::late_breakaway_s));
   const LaneMask too_late = over & !met.breaks;
   met.beyond = met.beyond | too_late;

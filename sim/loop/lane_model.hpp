@@ -75,12 +75,6 @@ inline constexpr bool may_have_bristles<EffectSet> = true;
 template <>
 inline constexpr bool may_have_bristles<StaticEffectSet<dynamic_set>> = true;
 
-/// Whether the pivot may have dry friction.
-template <class Present>
-constexpr bool may_have_dry_pivot = false;
-template <>
-inline constexpr bool may_have_dry_pivot<EffectSet> = true;
-
 /// Calls `run` with the plant's effects: common sets at compile time, all others at run time.
 template <class Run>
 void with_effects(const EffectSet& present, const Run& run) {

@@ -7,6 +7,13 @@
 
 namespace upright {
 
+/// A motor without lag.
+struct PromptMotor {
+  explicit PromptMotor(const PlantModel<Lanes>& /*model*/) {}
+  static constexpr bool lags() { return false; }
+};
+
+/// A motor that may lag.
 class LaneMotor {
  public:
   explicit LaneMotor(const PlantModel<Lanes>& model)

@@ -74,6 +74,8 @@ class Dynamics {
   const BaseParameters<S>& base() const { return base_; }
   /// Whether dry friction can hold the cart.
   bool cart_can_stick() const { return cart_dry_ && !bristles_ && model_.smoothing == 0.0; }
+  /// Whether the pivot has dry friction, true or smoothed.
+  bool pivot_is_dry() const { return pivot_dry_; }
   /// Whether dry friction can hold the pendulum.
   bool pivot_can_stick() const { return pivot_dry_ && model_.smoothing == 0.0; }
   /// The force has a kink at zero velocity: engines should not step across it.
