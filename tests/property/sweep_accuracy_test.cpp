@@ -221,7 +221,7 @@ const Friction everywhere[] = {{"smooth", "exponential", 100.0},
                                {"bristles", "dynamic", 0.0},
                                {"table", "viscous", 0.0, "force_table", table},
                                {"pivot_drag", "exponential", 0.0, "pivot_quadratic_drag", {0.003}}};
-const Friction sampled_only[] = {{"pivot_smooth", "exponential", 100.0, "pivot_coulomb_friction", {0.003}},
+const Friction sampled_only[] = {{"pivot_smooth", "exponential", 100.0, "pivot_coulomb_friction", {0.01}},
                                  {"lag_smooth", "exponential", 100.0, "motor_lag", {0.001}},
                                  {"lag_stick_slip", "exponential", 0.0, "motor_lag", {0.0004}},
                                  {"lag_bristles", "dynamic", 0.0, "motor_lag", {0.001}},
