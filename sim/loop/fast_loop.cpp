@@ -8,6 +8,7 @@
 #include "event_period.hpp"
 #include "lane_builds.hpp"
 #include "lane_model.hpp"
+#include "lane_motor.hpp"
 #include "lane_observer.hpp"
 #include "lane_results.hpp"
 #include "lane_ring.hpp"
@@ -91,6 +92,7 @@ template <class Present>
 class SmoothPeriod {
  public:
   using Mask = EveryLane;
+  static constexpr bool may_lag = true;
   struct Steps {
     PlantState<Lanes> state{};
     LaneDrive drive;
@@ -104,20 +106,22 @@ class SmoothPeriod {
   }
 
   SmoothPeriod(const LaneParts& /*parts*/, const PlantModel<Lanes>& model, const Present& present)
-      : physics_(model, present) {
+      : physics_(model, present), motor_(model) {
     const double smoothing = model.smoothing;
     if (smoothing > 0.0) {
       // tanh(smoothing v) turns within about 3 / smoothing; a step may sweep 0.7 / smoothing of it (errors of
       // 1e-8).
-      turning_mps_ = 3.0 / smoothing;
-      sweep_mps_ = 0.7 / smoothing;
+      turning_ = 3.0 / smoothing;
+      sweep_ = 0.7 / smoothing;
+      pivot_turns_ = physics_.pivot_is_dry();
     } else if (physics_.cart_has_kink()) {
-      turning_mps_ = 0.0;
-      sweep_mps_ = kink_sweep_mps;
+      turning_ = 0.0;
+      sweep_ = kink_sweep_mps;
     }
   }
 
   [[gnu::flatten]] void advance(PlantState<Lanes>& state, const Lanes& motor_v, double period_s) const {
+    if (motor_.lags()) return advance_lagging(state, motor_v, period_s);
     const auto rate = [&](const PlantState<Lanes>& s, Stage) { return rate_of(s, motor_v); };
     const PlantState<Lanes> first = rate(state, Stage::end);
     const int pieces = pieces_for(state, first, period_s);
@@ -134,22 +138,43 @@ class SmoothPeriod {
     return physics_.derivative(state, motor_v, {});
   }
 
+  void advance_lagging(PlantState<Lanes>& state, const Lanes& drive_v, double period_s) const {
+    const Lanes after_v = motor_.after(state.motor_v, drive_v, Lanes(period_s));
+    int pieces = std::max(pieces_for(state, rate_of(state, state.motor_v), period_s),
+                          pieces_for(state, rate_of(state, after_v), period_s));
+    while (pieces < max_pieces && any(motor_.time_constant_s() < Lanes(period_s / pieces))) pieces *= 2;
+    const Lanes h(period_s / pieces);
+    for (int i = 0; i < pieces; ++i) {
+      const LaggedMotor<Lanes> lagged = motor_.over(state.motor_v, drive_v, h);
+      const auto rate = [&](const PlantState<Lanes>& s, Stage stage) {
+        return rate_of(s, stage == Stage::middle ? lagged.middle_v : lagged.end_v);
+      };
+      state = runge_kutta_4(rate, state, rate_of(state, lagged.begin_v), h);
+      state.motor_v = lagged.after_v;
+    }
+  }
+
   static constexpr double kink_sweep_mps = 1e-3;
   static constexpr int max_pieces = 16;
 
-  /// How many steps this period needs: more where the velocity sweeps over the turn of the friction.
+  /// How many steps this period needs: more where a velocity sweeps over the turn of its friction.
   int pieces_for(const PlantState<Lanes>& state, const PlantState<Lanes>& first, double period_s) const {
-    if (!(sweep_mps_ > 0.0)) return 1;
-    const Lanes reach = absolute(first.cart_mps) * Lanes(period_s);
-    const LaneMask near = absolute(state.cart_mps) - reach < Lanes(turning_mps_);
-    const Lanes swept = select(near, reach, Lanes(0.0));
+    if (!(sweep_ > 0.0)) return 1;
+    Lanes swept = swept_of(state.cart_mps, first.cart_mps, period_s);
+    if (pivot_turns_) swept = larger(swept, swept_of(state.theta_radps, first.theta_radps, period_s));
     int pieces = 1;
-    while (pieces < max_pieces && any(swept > Lanes(pieces * sweep_mps_))) pieces *= 2;
+    while (pieces < max_pieces && any(swept > Lanes(pieces * sweep_))) pieces *= 2;
     return pieces;
+  }
+  Lanes swept_of(const Lanes& velocity, const Lanes& rate, double period_s) const {
+    const Lanes reach = absolute(rate) * Lanes(period_s);
+    return select(absolute(velocity) - reach < Lanes(turning_), reach, Lanes(0.0));
   }
 
   Dynamics<Lanes, Present> physics_;
-  double turning_mps_ = 0.0, sweep_mps_ = 0.0;
+  LaneMotor motor_;
+  double turning_ = 0.0, sweep_ = 0.0;  ///< [m/s] of the cart, [rad/s] of the pendulum
+  bool pivot_turns_ = false;
 };
 
 [[gnu::always_inline]] inline EveryLane narrowed(EveryLane lanes, const LaneMask& /*to*/) {
@@ -251,7 +276,8 @@ class SampledRuns {
     observer_.take_case(lane, runs_.first_case + runs_.case_of(run));
     delay_.take(lane, start.delay_s);
     PlantState<Lanes>& state = steps_.state;
-    for (Lanes* number : {&state.cart_m, &state.cart_mps, &state.theta_radps, &state.bristle_m, &begun_})
+    for (Lanes* number :
+         {&state.cart_m, &state.cart_mps, &state.theta_radps, &state.motor_v, &state.bristle_m, &begun_})
       put(*number, lane, 0.0);
     put(state.theta_rad, lane, start.theta0_rad);
   }
@@ -283,8 +309,8 @@ class SampledRuns {
     const Lanes wanted = observer_.command_v(lanes, delay_.pass(lanes, newest), command_);
     command_ = select(lanes, smaller(larger(wanted, -limit), limit), command_);
     const LaneDrive drive = input_.pass(lanes, chain_.actuate(command_));
-    steps_.state.motor_v = drive.late_v;
-    Period::begin(steps_, lanes, drive);
+    if (!Period::may_lag || !chain_.has_motor_lag()) steps_.state.motor_v = drive.late_v;
+    period_.begin(steps_, lanes, drive);
   }
 
   const LoopSetup& setup_;
@@ -308,7 +334,8 @@ class SampledRuns {
 template <class Present>
 void run_with(const LoopSetup& setup, const LaneParts& parts, const Present& present, const LaneRuns& runs) {
   if constexpr (may_stick<Present> || may_have_bristles<Present>)
-    if (parts.own_pace) return SampledRuns<Present, EventPeriod<Present>>(setup, parts, present, runs).run();
+    if (parts.own_pace)
+      return SampledRuns<Present, EventPeriod<Present, false>>(setup, parts, present, runs).run();
   // One plant and one group after the other: smooth lanes share their substeps.
   for (std::size_t plant = 0; plant < runs.plants.size(); ++plant)
     for (std::size_t first = 0; first < runs.cases.size(); first += lane_count) {
@@ -331,10 +358,11 @@ std::size_t runs_side_by_side() {
 
 void run(const LoopSetup& setup, const LaneParts& parts, std::span<const PlantModel<double>> plants,
          std::span<const LoopCase> cases, std::span<LoopResult> results) {
-  if (setup.sampled)
-    with_effects(plants[0].present, [&](const auto& present) {
-      run_with(setup, parts, present, {plants, cases, results});
-    });
+  const LaneRuns runs{plants, cases, results};
+  if (setup.sampled && parts.pivot_or_lag)
+    SampledRuns<EffectSet, EventPeriod<EffectSet, true>>(setup, parts, plants[0].present, runs).run();
+  else if (setup.sampled)
+    with_effects(plants[0].present, [&](const auto& present) { run_with(setup, parts, present, runs); });
   else
     for (std::size_t i = 0; i < plants.size(); ++i)
       run_continuous_on_lanes(setup, plants[i], cases, results.subspan(i * cases.size(), cases.size()));

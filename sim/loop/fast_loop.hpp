@@ -8,9 +8,10 @@
 
 namespace upright {
 
-/// Whether `run_on_lanes` supports these runs. It excludes the extended Kalman filter, motor lag, dry
-/// friction of the pivot, a cart alone, dynamics much faster than a millisecond but for stiff bristles in
-/// sampled loops, and estimators in a continuous loop.
+/// Whether `run_on_lanes` supports these runs. It excludes the extended Kalman filter, motor lags shorter
+/// than 0.1 ms, a cart alone, and dynamics much faster than a millisecond. Stiff bristles are excluded in a
+/// continuous loop, and beside motor lag or a pivot whose torque is not smooth at rest. In a continuous loop,
+/// estimators, motor lag and a pivot that sticks are excluded too.
 bool lanes_can_run(const LoopSetup& setup);
 
 /// The target of the lanes: the registers of this processor, fastest, with last digits that differ

@@ -119,9 +119,11 @@ LaneParts parts_of(const LoopSetup& setup, std::span<const LoopCase> cases) {
 
 /// Whether lanes may have these two plants at once. The input delay is the same in all lanes, and some
 /// effects treat parameters that are whole numbers (an exponent of 2, the kind of a table) specially, if all
-/// lanes have them.
+/// lanes have them. The effects, which all plants share, and the smoothing say whether a motor lags and a
+/// contact sticks; by lane are the constant of the lag and the levels of the friction.
 bool may_mix(const PlantModel<double>& one, const PlantModel<double>& other) {
-  if (Dynamics<double>(one).input_delay_s() != Dynamics<double>(other).input_delay_s() ||
+  if (one.smoothing != other.smoothing ||
+      Dynamics<double>(one).input_delay_s() != Dynamics<double>(other).input_delay_s() ||
       has_stiff_bristles(one) != has_stiff_bristles(other))
     return false;
   const auto is_whole = [](double number) { return number == std::round(number); };
@@ -140,9 +142,14 @@ bool lanes_can_run(const LoopSetup& setup) {
     return false;
   if (setup.model.cart_locked || !setup.model.has_pendulum) return false;
   const Dynamics<double> physics(setup.model);
-  if (physics.has_motor_lag() || physics.pivot_has_kink()) return false;
-  return fastest_rate_radps(setup.model, true) < fastest_radps ||
-         (setup.sampled && has_stiff_bristles(setup.model));
+  if (!setup.sampled && (physics.has_motor_lag() || physics.pivot_can_stick())) return false;
+  // A step towards a stop would not show a shorter one.
+  constexpr double shortest_lag_s = 1e-4;
+  if (physics.has_motor_lag() && physics.motor_time_constant_s() < shortest_lag_s) return false;
+  if (fastest_rate_radps(setup.model, true) < fastest_radps) return true;
+  // The exponential steps of stiff bristles need a held voltage, and an acceleration without jumps.
+  return setup.sampled && has_stiff_bristles(setup.model) && !physics.has_motor_lag() &&
+         !physics.pivot_has_kink();
 }
 
 std::size_t runs_side_by_side(LaneRegisters registers) {
@@ -157,7 +164,7 @@ bool lanes_refill(const LoopSetup& setup) {
   const bool jumps = setup.cart_resolution_m > 0.0 || setup.angle_resolution_rad > 0.0 ||
                      setup.control.compensation.kind != CompensationKind::none;
   const bool reverses = jumps && physics.cart_has_kink() && setup.model.smoothing == 0.0;
-  return physics.cart_can_stick() || reverses;
+  return physics.cart_can_stick() || physics.pivot_can_stick() || reverses;
 }
 
 void run_on_lanes(const LoopSetup& setup, std::span<const LoopCase> cases, std::span<LoopResult> results,
@@ -176,6 +183,8 @@ void run_plants_on_lanes(const LoopSetup& setup, std::span<const PlantModel<doub
     const std::size_t count = end - first;
     of_plants.model = plants[first];
     parts.own_pace = lanes_refill(of_plants);
+    const Dynamics<double> physics(of_plants.model);
+    parts.pivot_or_lag = parts.own_pace && (physics.pivot_can_stick() || physics.has_motor_lag());
     parts.stiff_bristles = setup.sampled && has_stiff_bristles(plants[first]);
     lanes_for(registers).run(setup, parts, plants.subspan(first, count), cases,
                              results.subspan(first * cases.size(), count * cases.size()));

@@ -143,12 +143,30 @@ void rig_rows(const char* name, const std::string& plant, double smooth_ms) {
   if (plant == "exponential") std::printf("RIG_MS %.6f\n", lanes);
 }
 
+/// With one more effect, which takes more of a period: a second contact, or a lagging motor.
+void effect_rows(const std::string& plant, const char* effect, double number, double smooth_ms) {
+  LoopSetup setup = rig_loop(plant);
+  const double without = lanes_ms(setup, cases_240());
+  Plant more = read_plant_file(std::string(UPRIGHT_SOURCE_DIR) + "/config/plants/" + plant + ".yaml");
+  more.set(effect, {number});
+  setup.model = make_model<double>(more);
+  const double lanes = lanes_ms(setup, cases_240());
+  std::printf("as the rig is, %s with %s\n", plant.c_str(), effect);
+  row("lanes", lanes, smooth_ms, "the smooth loop");
+  row("lanes", lanes, without, "without this effect");
+  row("event engine", events_ms(setup, cases_240()), lanes);
+}
+
 }  // namespace
 
 void bench_as_the_rig_is() {
   const double smooth_ms = lanes_ms(setup_for("exponential", 100.0), cases_240());
   rig_rows("exponential friction, true stick-slip", "exponential", smooth_ms);
   rig_rows("bristles", "dynamic", smooth_ms);
+  for (const char* plant : {"exponential", "dynamic"}) {
+    effect_rows(plant, "pivot_coulomb_friction", 0.003, smooth_ms);
+    effect_rows(plant, "motor_lag", 0.001, smooth_ms);
+  }
 }
 
 }  // namespace upright

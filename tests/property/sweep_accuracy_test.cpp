@@ -1,6 +1,6 @@
 // The bar of the sweep engine: on 240 runs over starting angle and delay the lanes are within 1e-6 of a
-// reference with steps fifty times shorter, sampled and continuous, with smooth friction, true stick-slip,
-// bristles and a force table.
+// reference with steps fifty times shorter, sampled and continuous, with smooth friction, true stick-slip of
+// the cart and of the pivot, bristles, a force table and a motor lag.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -50,7 +50,8 @@ struct Friction {
   const char* name;
   const char* plant;
   double smoothing;
-  bool table = false;  ///< with a force table beside it
+  const char* effect = nullptr;  ///< beside those of the plant
+  std::vector<double> numbers = {};
 };
 
 class SweepAccuracy : public testing::TestWithParam<Friction> {
@@ -59,9 +60,7 @@ class SweepAccuracy : public testing::TestWithParam<Friction> {
     LoopSetup made;
     Plant plant =
         read_plant_file(std::string(UPRIGHT_SOURCE_DIR) + "/config/plants/" + GetParam().plant + ".yaml");
-    if (GetParam().table)
-      plant.set("force_table",
-                {0.0, -0.6, 0.6, 0.3, 0.1, -0.2, 0.1, 0.3, 0.2, 0.0, -0.2, -0.3, -0.1, 0.2, -0.1, -0.3});
+    if (GetParam().effect != nullptr) plant.set(effect_number(GetParam().effect), GetParam().numbers);
     if (input_delay_s > 0.0) plant.set("input_delay", {input_delay_s});
     made.model = make_model<double>(plant);
     made.model.smoothing = GetParam().smoothing;
@@ -104,7 +103,9 @@ class SweepAccuracy : public testing::TestWithParam<Friction> {
 };
 
 TEST_P(SweepAccuracy, SampledLoops) {
-  expect_sampled_loops_agree(SweepAccuracy::setup(true));
+  const LoopSetup setup = SweepAccuracy::setup(true);
+  ASSERT_TRUE(lanes_can_run(setup));
+  expect_sampled_loops_agree(setup);
 }
 
 TEST_P(SweepAccuracy, SampledLoopsWithAKalmanFilter) {
@@ -157,8 +158,12 @@ TEST_P(SweepAccuracy, SampledLoopsOfAPlantWithAnInputDelay) {
   }
 }
 
-TEST_P(SweepAccuracy, ContinuousLoops) {
+/// Loops that lanes take with a continuous delay too.
+class SweepAccuracyContinuous : public SweepAccuracy {};
+
+TEST_P(SweepAccuracyContinuous, ContinuousLoops) {
   const LoopSetup setup = SweepAccuracy::setup(false);
+  ASSERT_TRUE(lanes_can_run(setup));
   const Gains& g = setup.control.gains;
   const std::vector<LoopCase> cases = cases_240();
   std::vector<LoopResult> lanes(cases.size());
@@ -209,12 +214,27 @@ TEST(SweepAccuracyOfBristles, StiffOnesHoldTheBarOn240RandomRuns) {
   std::printf("stiff bristles: worst error %.1e rad\n", worst);
 }
 
-INSTANTIATE_TEST_SUITE_P(Frictions, SweepAccuracy,
-                         testing::Values(Friction{"smooth", "exponential", 100.0},
-                                         Friction{"stick_slip", "exponential", 0.0},
-                                         Friction{"bristles", "dynamic", 0.0},
-                                         Friction{"table", "viscous", 0.0, true}),
-                         [](const auto& friction) { return std::string(friction.param.name); });
+const std::vector<double> table = {0.0, -0.6, 0.6,  0.3,  0.1,  -0.2, 0.1,  0.3,
+                                   0.2, 0.0,  -0.2, -0.3, -0.1, 0.2,  -0.1, -0.3};
+const Friction everywhere[] = {{"smooth", "exponential", 100.0},
+                               {"stick_slip", "exponential", 0.0},
+                               {"bristles", "dynamic", 0.0},
+                               {"table", "viscous", 0.0, "force_table", table},
+                               {"pivot_drag", "exponential", 0.0, "pivot_quadratic_drag", {0.003}}};
+const Friction sampled_only[] = {{"pivot_smooth", "exponential", 100.0, "pivot_coulomb_friction", {0.01}},
+                                 {"lag_smooth", "exponential", 100.0, "motor_lag", {0.001}},
+                                 {"lag_stick_slip", "exponential", 0.0, "motor_lag", {0.0004}},
+                                 {"lag_bristles", "dynamic", 0.0, "motor_lag", {0.001}},
+                                 {"pivot_and_cart", "exponential", 0.0, "pivot_coulomb_friction", {0.01}},
+                                 {"pivot_alone", "viscous", 0.0, "pivot_coulomb_friction", {0.003}},
+                                 {"pivot_and_bristles", "dynamic", 0.0, "pivot_coulomb_friction", {0.003}}};
+std::string name_of(const testing::TestParamInfo<Friction>& friction) {
+  return friction.param.name;
+}
+
+INSTANTIATE_TEST_SUITE_P(Frictions, SweepAccuracy, testing::ValuesIn(everywhere), name_of);
+INSTANTIATE_TEST_SUITE_P(Sampled, SweepAccuracy, testing::ValuesIn(sampled_only), name_of);
+INSTANTIATE_TEST_SUITE_P(Frictions, SweepAccuracyContinuous, testing::ValuesIn(everywhere), name_of);
 
 }  // namespace
 }  // namespace upright

@@ -1,6 +1,7 @@
-// Sweeps of the loop as the rig is: encoder steps, the amplifier's limit, true stick-slip and bristles. One
-// count more or less changes the voltage, so that two engines go apart for good some time after the first
-// count in which they differ. Until then they agree to 1e-6; afterwards in what becomes of the runs.
+// Sweeps of the loop as the rig is: encoder steps, the amplifier's limit, true stick-slip of the cart and of
+// the pivot, and bristles. One count more or less changes the voltage, so that two engines go apart for good
+// some time after the first count in which they differ. Until then they agree to 1e-6; afterwards in what
+// becomes of the runs.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -25,6 +26,8 @@ struct Loop {
   bool estimates = false;       ///< by a Kalman filter
   double longest_stay_s = 0.0;  ///< delays up to this do not fall within the first half second
   bool predicts = false;        ///< the delay is compensated
+  double pivot_nm = 0.0;        ///< dry friction of the pivot
+  double lag_s = 0.0;           ///< of the motor
 };
 
 class SweepEncoders : public testing::TestWithParam<Loop> {
@@ -33,9 +36,17 @@ class SweepEncoders : public testing::TestWithParam<Loop> {
     return read_plant_file(std::string(UPRIGHT_SOURCE_DIR) + "/config/plants/" + name + ".yaml");
   }
 
+  /// `times`: how many times the pivot's friction and the motor's lag.
+  static Plant plant_with_effects(double times = 1.0) {
+    Plant plant = plant_of(GetParam().plant);
+    if (GetParam().pivot_nm > 0.0) plant.set("pivot_coulomb_friction", {times * GetParam().pivot_nm});
+    if (GetParam().lag_s > 0.0) plant.set("motor_lag", {times * GetParam().lag_s});
+    return plant;
+  }
+
   static LoopSetup setup() {
     LoopSetup made;
-    made.model = make_model<double>(plant_of(GetParam().plant));
+    made.model = make_model<double>(plant_with_effects());
     made.model.smoothing = GetParam().smoothing;
     made.control.gains = {70.7107, 304.9273, 143.3152, 61.0833};
     made.sampled = true;
@@ -139,6 +150,7 @@ class SweepEncodersFalls : public SweepEncoders {};
 TEST_P(SweepEncodersFalls, FallWhereTheEventEngineFalls) {
   const LoopSetup setup = SweepEncoders::setup();
   const std::vector<LoopCase> cases = random_cases(400, 0.12, 25);
+  ASSERT_TRUE(lanes_can_run(setup));
   std::vector<LoopResult> lanes(cases.size());
   run_on_lanes(setup, cases, lanes);
   std::size_t differ = 0, fell = 0;
@@ -204,6 +216,8 @@ void expect_same_bits(const LoopResult& one, const LoopResult& other) {
   EXPECT_EQ(one.end.theta_rad, other.end.theta_rad);
   EXPECT_EQ(one.end.cart_mps, other.end.cart_mps);
   EXPECT_EQ(one.end.bristle_m, other.end.bristle_m);
+  EXPECT_EQ(one.end.theta_radps, other.end.theta_radps);
+  EXPECT_EQ(one.end.motor_v, other.end.motor_v);
 }
 
 /// Runs that fall at once make room for others; in the other order, other runs share the lanes.
@@ -235,14 +249,15 @@ TEST_P(SweepEncodersApart, RefilledLanesGiveTheSameBitsInAnyOrder) {
   }
 }
 
-/// Lanes have different plants at once, but for plants whose input delays or whole numbers differ.
+/// Lanes have different plants at once, also different lags and pivots, but for plants whose input delays or
+/// whole numbers differ.
 TEST_P(SweepEncodersApart, PlantsSideBySideGiveTheBitsOfOneAtATime) {
   LoopSetup setup = SweepEncoders::setup();
   setup.duration_s = 1.0;
   const std::vector<LoopCase> cases = random_cases(3, 0.05, 28);
   std::vector<PlantModel<double>> plants;
   for (int i = 0; i < 12; ++i) {
-    Plant plant = plant_of(GetParam().plant);
+    Plant plant = plant_with_effects(1.0 + 0.03 * i);
     plant.cart_mass_kg *= 1.0 + 0.01 * i;
     plant.set("cart_scale", {1.0 + 0.002 * i});
     plant.set("input_delay", {i < 8 ? 0.0012 : 0.001 + 0.0003 * i});
@@ -291,16 +306,28 @@ const Loop with_events[] = {{"stick_slip", "exponential", 0.0, false, 0.014},
                             {"stick_slip_estimated", "exponential", 0.0, true, 0.05},
                             {"bristles", "dynamic", 0.0, false, 0.014},
                             {"bristles_estimated", "dynamic", 0.0, true, 0.05}};
+const Loop with_pivot[] = {{"pivot_and_cart", "exponential", 0.0, false, 0.014, false, 0.003},
+                           {"pivot_alone", "viscous", 0.0, true, 0.05, false, 0.003},
+                           {"pivot_and_bristles", "dynamic", 0.0, false, 0.014, false, 0.003}};
+const Loop with_lag[] = {{"lag", "exponential", 0.0, false, 0.012, false, 0.0, 0.001},
+                         {"lag_and_pivot", "exponential", 0.0, true, 0.04, false, 0.003, 0.002},
+                         {"lag_and_bristles", "dynamic", 0.0, false, 0.012, false, 0.0, 0.0005}};
 const Loop with_predictor[] = {{"predicted", "exponential", 0.0, false, 0.1, true},
                                {"estimated_and_predicted", "dynamic", 0.0, true, 0.1, true}};
 const Loop smooth[] = {{"smooth", "exponential", 100.0, false, 0.014}};
 
 INSTANTIATE_TEST_SUITE_P(Events, SweepEncoders, testing::ValuesIn(with_events), name_of_loop);
+INSTANTIATE_TEST_SUITE_P(Pivot, SweepEncoders, testing::ValuesIn(with_pivot), name_of_loop);
+INSTANTIATE_TEST_SUITE_P(Lag, SweepEncoders, testing::ValuesIn(with_lag), name_of_loop);
 INSTANTIATE_TEST_SUITE_P(Predictor, SweepEncoders, testing::ValuesIn(with_predictor), name_of_loop);
 INSTANTIATE_TEST_SUITE_P(Smooth, SweepEncoders, testing::ValuesIn(smooth), name_of_loop);
 INSTANTIATE_TEST_SUITE_P(Events, SweepEncodersFalls, testing::ValuesIn(with_events), name_of_loop);
+INSTANTIATE_TEST_SUITE_P(Pivot, SweepEncodersFalls, testing::ValuesIn(with_pivot), name_of_loop);
+INSTANTIATE_TEST_SUITE_P(Lag, SweepEncodersFalls, testing::ValuesIn(with_lag), name_of_loop);
 INSTANTIATE_TEST_SUITE_P(Smooth, SweepEncodersFalls, testing::ValuesIn(smooth), name_of_loop);
 INSTANTIATE_TEST_SUITE_P(Events, SweepEncodersApart, testing::ValuesIn(with_events), name_of_loop);
+INSTANTIATE_TEST_SUITE_P(Pivot, SweepEncodersApart, testing::ValuesIn(with_pivot), name_of_loop);
+INSTANTIATE_TEST_SUITE_P(Lag, SweepEncodersApart, testing::ValuesIn(with_lag), name_of_loop);
 INSTANTIATE_TEST_SUITE_P(Predictor, SweepEncodersApart, testing::ValuesIn(with_predictor), name_of_loop);
 
 }  // namespace

@@ -147,13 +147,20 @@ TEST(FastLoop, LeavesToTheEventEngineWhatItCannotDo) {
   EXPECT_FALSE(lanes_can_run(estimating("viscous", StateEstimatorKind::extended_kalman)));
   Plant plant = read_plant_file(source + "/config/plants/viscous.yaml");
   LoopSetup setup = sampled("viscous");
-  plant.set("motor_lag", {0.002});
+  plant.set("motor_lag", {5e-5});
   setup.model = make_model<double>(plant);
   EXPECT_FALSE(lanes_can_run(setup));
-  plant.remove(effect_number("motor_lag"));
-  plant.set("pivot_coulomb_friction", {0.001});
-  setup.model = make_model<double>(plant);
-  EXPECT_FALSE(lanes_can_run(setup));
+  for (const auto& [kind, value] :
+       {std::pair<const char*, double>{"motor_lag", 0.002}, {"pivot_coulomb_friction", 0.001}}) {
+    plant = read_plant_file(source + "/config/plants/viscous.yaml");
+    plant.set(kind, {value});
+    setup.model = make_model<double>(plant);
+    setup.sampled = true;
+    EXPECT_TRUE(lanes_can_run(setup)) << kind;
+    setup.sampled = false;
+    EXPECT_FALSE(lanes_can_run(setup)) << kind;
+  }
+  setup.sampled = true;
   for (const auto& [kind, values] :
        {std::pair<const char*, std::vector<double>>{"bristle_friction", {1e9, 70.0}},
         {"stribeck_friction", {0.43, 1e-4, 2.0}}}) {
@@ -172,6 +179,21 @@ TEST(FastLoop, TakesStiffBristlesInSampledLoopsOnly) {
   EXPECT_TRUE(lanes_can_run(setup));
   setup.sampled = false;
   EXPECT_FALSE(lanes_can_run(setup));
+}
+
+TEST(FastLoop, LeavesStiffBristlesBesideLagOrPivotAlone) {
+  for (const auto& [kind, value] : {std::pair<const char*, double>{"motor_lag", 0.002},
+                                    {"pivot_coulomb_friction", 0.001},
+                                    {"pivot_quadratic_drag", 0.001}}) {
+    Plant plant = read_plant_file(source + "/config/plants/dynamic.yaml");
+    LoopSetup setup = sampled("dynamic");
+    plant.set(kind, {value});
+    setup.model = make_model<double>(plant);
+    EXPECT_TRUE(lanes_can_run(setup)) << kind;
+    plant.set("bristle_friction", {1e5, 70.0});
+    setup.model = make_model<double>(plant);
+    EXPECT_FALSE(lanes_can_run(setup)) << kind;
+  }
 }
 
 LoopSetup continuous(const std::string& plant, double smoothing = 0.0) {

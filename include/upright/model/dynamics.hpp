@@ -74,6 +74,8 @@ class Dynamics {
   const BaseParameters<S>& base() const { return base_; }
   /// Whether dry friction can hold the cart.
   bool cart_can_stick() const { return cart_dry_ && !bristles_ && model_.smoothing == 0.0; }
+  /// Whether the pivot has dry friction, true or smoothed.
+  bool pivot_is_dry() const { return pivot_dry_; }
   /// Whether dry friction can hold the pendulum.
   bool pivot_can_stick() const { return pivot_dry_ && model_.smoothing == 0.0; }
   /// The force has a kink at zero velocity: engines should not step across it.
@@ -231,7 +233,7 @@ class Dynamics {
     S force;   ///< on the cart, without dry friction [N]
     S torque;  ///< about the pivot, without gravity [N m]
   };
-  /// For plants with a pendulum whose pivot cannot stick.
+  /// For plants with a pendulum.
   Balance balance(const PlantState<S>& state, const S& motor_v) const {
     const auto [s, c] = elementary::sine_and_cosine(state.theta_rad);
     return {s, c, cart_smooth_force(state, motor_v), pivot_smooth_torque(state.theta_radps)};
@@ -276,6 +278,56 @@ class Dynamics {
     accelerate(state, at.sine, at.cosine, force, at.torque, false, false, rate);
     rate.cart_m = state.cart_mps;
     rate.theta_rad = state.theta_radps;
+    return rate;
+  }
+
+  /// The motion before the dry friction of cart and pivot acts, for engines whose lanes differ in the modes
+  /// of both contacts. Modes are numbers: -1 or 1 slides in that direction, 0 sticks.
+  struct Unheld {
+    S push;         ///< on the cart [N]
+    S turn;         ///< about the pivot [N m]
+    S coupling;     ///< between both, m l cos(th) [kg m]
+    S bristle_mps;  ///< rate of the bristles
+  };
+  /// For plants with a pendulum. `cart`: the direction of its motion, for bristles.
+  Unheld unheld(const PlantState<S>& state, const S& motor_v, const S& cart) const {
+    const Balance at = balance(state, motor_v);
+    Unheld all{at.force, gravity_torque_ * at.sine + at.torque, coupling_ * at.cosine, S(0.0)};
+    if (bristles_) {
+      all.bristle_mps = bristle_rate(state, S(cart * state.cart_mps), cart);
+      all.push = all.push - bristle_stiffness() * state.bristle_m - bristle_damping() * all.bristle_mps;
+    }
+    all.push = all.push + coupling_ * at.sine * state.theta_radps * state.theta_radps;
+    return all;
+  }
+  /// The force that holds a resting cart, with the pivot in this mode.
+  S cart_load(const Unheld& at, const S& pivot) const {
+    const S turn = (at.turn - pivot_dry_level() * pivot) / base_.inertia_about_pivot_kgm2;
+    return at.push - at.coupling * select(pivot == S(0.0), S(0.0), turn);
+  }
+  /// The torque that holds a resting pendulum, with the cart in this mode, at this level of its friction.
+  S pivot_load(const Unheld& at, const S& cart, const S& level) const {
+    const S push = (at.push - level * cart) / total_mass_;
+    if (!cart_can_stick()) return at.turn - at.coupling * push;
+    return at.turn - at.coupling * select(cart == S(0.0), S(0.0), push);
+  }
+  /// As `derivative`. `level`: of the cart's friction, 0 where nothing holds it.
+  PlantState<S> derivative_by_directions(const PlantState<S>& state, const Unheld& at, const S& cart,
+                                         const S& level, const S& pivot) const {
+    const S push = at.push - level * cart, turn = at.turn - pivot_dry_level() * pivot;
+    const S& inertia = base_.inertia_about_pivot_kgm2;
+    const S inverse = S(1.0) / (total_mass_ * inertia - at.coupling * at.coupling);
+    const auto pivot_rests = pivot == S(0.0);
+    PlantState<S> rate{};
+    rate.cart_m = state.cart_mps;
+    rate.theta_rad = state.theta_radps;
+    rate.bristle_m = at.bristle_mps;
+    rate.cart_mps = select(pivot_rests, push / total_mass_, (inertia * push - at.coupling * turn) * inverse);
+    rate.theta_radps = select(pivot_rests, S(0.0), S((total_mass_ * turn - at.coupling * push) * inverse));
+    if (!cart_can_stick()) return rate;
+    const auto cart_rests = cart == S(0.0);
+    rate.cart_mps = select(cart_rests, S(0.0), rate.cart_mps);
+    rate.theta_radps = select(cart_rests, select(pivot_rests, S(0.0), S(turn / inertia)), rate.theta_radps);
     return rate;
   }
 

@@ -13,6 +13,7 @@
 #include "upright/model/dynamics.hpp"
 #include "upright/model/elementary.hpp"
 #include "upright/sim/contacts.hpp"
+#include "upright/sim/motor_lag.hpp"
 #include "upright/sim/runge_kutta.hpp"
 
 namespace upright {
@@ -194,13 +195,6 @@ class EventEngine {
   template <class T>
   using BeginRate = std::optional<PlantState<T>>;
 
-  /// Voltage at the motor for constant drive at the nodes of a Runge-Kutta step (beginning, middle, end)
-  /// and after the step.
-  template <class T>
-  struct LaggedMotor {
-    T begin_v, middle_v, end_v, after_v;
-  };
-
   static PlantState<double> plain_state(const PlantState<S>& s) {
     return {value_of(s.cart_m),      value_of(s.theta_rad), value_of(s.cart_mps),
             value_of(s.theta_radps), value_of(s.motor_v),   value_of(s.bristle_m)};
@@ -286,22 +280,9 @@ class EventEngine {
   template <class T>
   static LaggedMotor<T> lagged_motor(const Dynamics<T>& dynamics, const T& motor_v, const T& drive,
                                      const T& h) {
-    const T gap = motor_v - drive;
     const T r = h / dynamics.motor_time_constant_s();
-    constexpr double smooth_within_step = 0.1;
-    if (value_of(r) < smooth_within_step) {
-      const T half = elementary::exp(T(T(-0.5) * r));
-      return {motor_v, drive + gap * half, drive + gap * half * half, drive + gap * half * half};
-    }
-    // The parabola with the same zeroth, first and second moment as exp(-r u), u in [0, 1]: the step then
-    // has the exact impulse, however short the lag.
-    const T e = elementary::exp(T(-r));
-    const T m0 = (T(1.0) - e) / r;
-    const T m1 = (m0 - e) / r;
-    const T m2 = (T(2.0) * m1 - e) / r;
-    return {drive + gap * (T(9.0) * m0 - T(36.0) * m1 + T(30.0) * m2),
-            drive + gap * (T(-1.5) * m0 + T(15.0) * m1 - T(15.0) * m2),
-            drive + gap * (T(3.0) * m0 - T(24.0) * m1 + T(30.0) * m2), drive + gap * e};
+    return value_of(r) < smooth_within_lags ? slowly_lagged_motor(motor_v, drive, r)
+                                            : quickly_lagged_motor(motor_v, drive, r);
   }
 
   template <class T>
