@@ -72,7 +72,7 @@ class Diagnostician {
       const double lower = force ? named / force->held_out_error : 1.0;
       if (lower > policy_.power.clear_gap) {
         add_curve(*force, named, diagnosis);
-      } else if (force && shows_more(*force, lower)) {
+      } else if (force && force->shows_on_held_out(lower, policy_.acceptance)) {
         diagnosis.verdict = Verdict::unexplained;
         diagnosis.residual = force->left_sentence();
       } else if (const auto left = place_force_left(search_, known_)) {
@@ -106,13 +106,6 @@ class Diagnostician {
   const FitData& bounded(FitData& data) {
     data.bound = &bound_;
     return data;
-  }
-
-  /// Whether a force that no effect has shows on held-out data too. Of the position, the simulation must say
-  /// so: every track is a little rough. `lower`: by which factor the curve lowers the held-out error.
-  bool shows_more(const ForceDescription& force, double lower) const {
-    return lower > std::exp(policy_.acceptance.worse_simulation_by_chance) ||
-           (force.is_of_velocity && force.held_evidence > policy_.acceptance.min_evidence);
   }
 
   /// `named`: the held-out error without the curve.

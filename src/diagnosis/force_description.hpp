@@ -18,6 +18,9 @@ struct ForceDescription {
   bool is_of_velocity = false;  ///< else of the position, as the force of a rough track is
   double held_evidence = 0.0;   ///< what a curve of many nodes saves on held-out data, linearised
 
+  /// Whether held-out data show the force too. Of the position, their simulation must say so, since every
+  /// track is a little rough. `lower`: by which factor the curve lowers the error of that simulation.
+  bool shows_on_held_out(double lower, const AcceptancePolicy& policy) const;
   /// Whether the fits moved the parameters of this effect too.
   bool moved(std::size_t effect) const;
   /// What is left without the curve.
