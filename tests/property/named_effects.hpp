@@ -1,4 +1,5 @@
-// What a diagnosis names beside corrections of the plant file's numbers, and short runs of a cart for it.
+// What a diagnosis names beside corrections of the plant file's numbers, and short runs of a cart for it. A
+// force that it draws as a curve has no name.
 #pragma once
 
 #include <set>
@@ -14,7 +15,9 @@ namespace upright {
 inline std::set<std::string> named_effects(const std::vector<Measurement>& runs, const Plant& believed) {
   std::set<std::string> names;
   for (const FoundEffect& effect : diagnose(believed, runs, {}).effects)
-    if (effect_registry()[effect.effect].enters != Enters::parameter) names.insert(kind_of(effect.effect));
+    if (effect_registry()[effect.effect].enters != Enters::parameter &&
+        kind_of(effect.effect) != "force_table")
+      names.insert(kind_of(effect.effect));
   return names;
 }
 

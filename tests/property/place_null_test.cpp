@@ -1,4 +1,4 @@
-// A track that is a little rough is not taken for an effect, and an effect is still found on it.
+// A track that is a little rough is not taken for a named effect, and an effect is still found on it.
 #include <gtest/gtest.h>
 
 #include "named_effects.hpp"
@@ -24,7 +24,7 @@ std::vector<Measurement> runs_on_rough_track(const Plant& plant, unsigned seed) 
   return three_runs(rig, 6.0, seed);
 }
 
-TEST(PlaceNull, ARoughTrackIsNoEffect) {
+TEST(PlaceNull, ARoughTrackIsNoNamedEffect) {
   for (const unsigned seed : {1, 2, 3, 4, 5, 6})
     EXPECT_EQ(named_effects(runs_on_rough_track(file_plant(), seed), file_plant()), std::set<std::string>{})
         << seed;
