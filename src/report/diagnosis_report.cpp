@@ -95,6 +95,7 @@ std::vector<double> table_curve(const std::vector<double>& nodes, double from, d
   std::vector<double> values = {0.0, from, to};
   values.insert(values.end(), nodes.begin(), nodes.end());
   std::vector<double> curve;
+  curve.reserve(places.size());
   for (const double place : places) curve.push_back(Table::curve(values.data(), place));
   return curve;
 }

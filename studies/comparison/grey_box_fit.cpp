@@ -154,6 +154,7 @@ Fitted fit_by_output_error(const Plant& plant, const std::vector<FreeNumber>& nu
                            const std::vector<Measurement>& runs, double longest_s, bool fixed_starts) {
   const std::vector<Segment> pieces = cut_segments(runs, longest_s);
   std::vector<double> values;
+  values.reserve(numbers.size());
   for (const FreeNumber& number : numbers) values.push_back(number.start());
   std::vector<std::array<double, state_size>> states;
   for (const PlantState<double>& start : estimate_initial_states(runs, pieces, plant))
