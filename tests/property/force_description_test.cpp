@@ -11,15 +11,6 @@
 namespace upright {
 namespace {
 
-Plant file_plant() {
-  Plant plant;
-  plant.cart_mass_kg = 0.815;
-  plant.motor = {1.7189, 7.682};
-  plant.set("viscous_friction", {3.0});
-  plant.set("coulomb_friction", {0.4});
-  return plant;
-}
-
 std::optional<DescribedCurve> curve_in(const Diagnosis& diagnosis) {
   for (const FoundEffect& effect : diagnosis.effects)
     if (const auto curve = described_curve(effect)) return curve;
@@ -45,10 +36,10 @@ double likeness(const DescribedCurve& curve, double period) {
 
 TEST(ForceDescription, DrawsARippleOverTheVelocity) {
   for (const unsigned seed : {1, 2, 3}) {
-    blind::Rig rig{.plant = file_plant(), .unknown = blind::Unknown::velocity_ripple};
+    blind::Rig rig{.plant = cart_with_friction(), .unknown = blind::Unknown::velocity_ripple};
     rig.unknown_size = 0.3;
     rig.unknown_period = 0.4;
-    const Diagnosis d = diagnose(file_plant(), three_runs(rig, 6.0, seed));
+    const Diagnosis d = diagnose(cart_with_friction(), three_runs(rig, 6.0, seed));
     EXPECT_EQ(d.verdict, Verdict::described) << seed << ": " << d.residual;
     EXPECT_LT(3.0 * d.gap_after, d.gap_before) << seed;
     const auto curve = curve_in(d);
@@ -61,9 +52,9 @@ TEST(ForceDescription, DrawsARippleOverTheVelocity) {
 
 TEST(ForceDescription, DrawsNothingWhereNothingIsMissing) {
   for (const unsigned seed : {4, 5, 6}) {
-    blind::Rig rig{.plant = file_plant()};
+    blind::Rig rig{.plant = cart_with_friction()};
     rig.disturbance_n = 0.05;
-    const Diagnosis d = diagnose(file_plant(), three_runs(rig, 6.0, seed));
+    const Diagnosis d = diagnose(cart_with_friction(), three_runs(rig, 6.0, seed));
     EXPECT_FALSE(curve_in(d)) << seed;
     EXPECT_NE(d.verdict, Verdict::described) << seed;
   }

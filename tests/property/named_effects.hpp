@@ -21,6 +21,16 @@ inline std::set<std::string> named_effects(const std::vector<Measurement>& runs,
   return names;
 }
 
+/// A cart with viscous and dry friction, as its plant file has it.
+inline Plant cart_with_friction() {
+  Plant plant;
+  plant.cart_mass_kg = 0.815;
+  plant.motor = {1.7189, 7.682};
+  plant.set("viscous_friction", {3.0});
+  plant.set("coulomb_friction", {0.4});
+  return plant;
+}
+
 /// Three runs of a rig at 200 Hz that move its cart in two ways.
 inline std::vector<Measurement> three_runs(const blind::Rig& rig, double duration_s, unsigned seed) {
   std::vector<Measurement> runs;

@@ -6,15 +6,6 @@
 namespace upright {
 namespace {
 
-Plant file_plant() {
-  Plant plant;
-  plant.cart_mass_kg = 0.815;
-  plant.motor = {1.7189, 7.682};
-  plant.set("viscous_friction", {3.0});
-  plant.set("coulomb_friction", {0.4});
-  return plant;
-}
-
 /// Runs on a track whose force has a standard deviation of 0.08 N.
 std::vector<Measurement> runs_on_rough_track(const Plant& plant, unsigned seed) {
   blind::Rig rig{.plant = plant};
@@ -26,18 +17,21 @@ std::vector<Measurement> runs_on_rough_track(const Plant& plant, unsigned seed) 
 
 TEST(PlaceNull, ARoughTrackIsNoNamedEffect) {
   for (const unsigned seed : {1, 2, 3, 4, 5, 6})
-    EXPECT_EQ(named_effects(runs_on_rough_track(file_plant(), seed), file_plant()), std::set<std::string>{})
+    EXPECT_EQ(named_effects(runs_on_rough_track(cart_with_friction(), seed), cart_with_friction()),
+              std::set<std::string>{})
         << seed;
 }
 
 TEST(PlaceNull, AnEffectIsNamedOnARoughTrack) {
-  Plant cogging = file_plant(), spring = file_plant();
+  Plant cogging = cart_with_friction(), spring = cart_with_friction();
   cogging.set("cogging_force", {0.25, 0.03, 1.0});
   spring.set("cable_spring", {8.0, 0.0});
   for (const unsigned seed : {1, 2, 3}) {
-    EXPECT_TRUE(named_effects(runs_on_rough_track(cogging, seed), file_plant()).contains("cogging_force"))
+    EXPECT_TRUE(
+        named_effects(runs_on_rough_track(cogging, seed), cart_with_friction()).contains("cogging_force"))
         << seed;
-    EXPECT_TRUE(named_effects(runs_on_rough_track(spring, seed), file_plant()).contains("cable_spring"))
+    EXPECT_TRUE(
+        named_effects(runs_on_rough_track(spring, seed), cart_with_friction()).contains("cable_spring"))
         << seed;
   }
 }
