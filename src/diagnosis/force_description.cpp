@@ -99,8 +99,9 @@ struct Followed {
     return all;
   }
 
-  CurveEquations equations(const CurveNodes& nodes, Table::Over over) const {
-    return beyond_known(curve_equations(steps, nodes, arguments(over)), nodes, over);
+  CurveEquations equations(const CurveNodes& nodes, Table::Over over,
+                           const std::vector<CurveArgument>& along) const {
+    return beyond_known(curve_equations(steps, nodes, along), nodes, over);
   }
 };
 
@@ -110,7 +111,7 @@ struct Curve {
   double evidence = 0.0;              ///< of a curve of many nodes, on training data
   double held_evidence = 0.0;         ///< what the same curve saves on held-out data
   CurveNodes nodes;                   ///< of the table
-  Eigen::VectorXd force_n;            ///< at these nodes
+  Eigen::VectorXd force_n;            ///< at these nodes; empty: a table shows nothing
   Eigen::MatrixXd prior_information;  ///< of the forces at these nodes
 };
 
@@ -119,25 +120,31 @@ std::vector<Curve> curves_of(const Followed& train, const Followed& held, std::s
   std::vector<Curve> curves;
   for (int number = 0; number < Table::over_count; ++number) {
     const auto over = static_cast<Table::Over>(number);
-    const std::vector<CurveArgument> arguments = train.arguments(over);
-    const CurveNodes fine = nodes_along(arguments, many), coarse = nodes_along(arguments, Table::node_count);
-    if (fine.count == 0) continue;
-    const CurveEquations shown = train.equations(fine, over), drawn = train.equations(coarse, over);
-    const RandomCurve curve(shown, fine), table(drawn, coarse);
+    const std::vector<CurveArgument> along = train.arguments(over);
+    const CurveNodes nodes = nodes_along(along, many);
+    if (nodes.count == 0) continue;
+    const CurveEquations shown = train.equations(nodes, over, along);
+    const RandomCurve curve(shown, nodes);
     if (!curve.is_there()) continue;
     const Eigen::VectorXd force_n = curve.mean(shown);
-    const CurveEquations unseen = held.equations(fine, over);
+    const CurveEquations unseen = held.equations(nodes, over, held.arguments(over));
     const double held_evidence = 2.0 * force_n.dot(unseen.score) - force_n.dot(unseen.information * force_n);
-    Curve found{over, -curve.change(), held_evidence, coarse, {}, {}};
-    if (table.is_there()) {
-      found.force_n = table.mean(drawn);
-      found.prior_information = table.prior_information();
-    }
-    curves.push_back(found);
+    curves.push_back({over, -curve.change(), held_evidence, {}, {}, {}});
   }
   std::stable_sort(curves.begin(), curves.end(),
                    [](const Curve& a, const Curve& b) { return a.evidence > b.evidence; });
   return curves;
+}
+
+/// Draws a curve through the few nodes of a table.
+void draw_table(const Followed& train, Curve& curve) {
+  const std::vector<CurveArgument> along = train.arguments(curve.over);
+  curve.nodes = nodes_along(along, Table::node_count);
+  const CurveEquations shown = train.equations(curve.nodes, curve.over, along);
+  const RandomCurve table(shown, curve.nodes);
+  if (!table.is_there()) return;
+  curve.force_n = table.mean(shown);
+  curve.prior_information = table.prior_information();
 }
 
 Plant with_table(Plant plant, const Curve& curve) {
@@ -261,11 +268,12 @@ std::optional<ForceDescription> describe_force(const Search& search, const Hypot
   if (search.given().find(effect_index<Table>()) != nullptr) return std::nullopt;
   if (known.train.point.starts.size() != search.all_data().segments.size()) return std::nullopt;
   const ResidualWalk& walk = search.policy().location.walk;
-  const std::vector<Curve> curves =
-      curves_of(Followed(train, judged.train.point, walk), Followed(held, judged.held.point, walk),
-                search.budget().track_nodes);
+  const Followed fitted(train, judged.train.point, walk);
+  std::vector<Curve> curves =
+      curves_of(fitted, Followed(held, judged.held.point, walk), search.budget().track_nodes);
   if (curves.empty() || !(curves.front().evidence > search.policy().acceptance.min_evidence))
     return std::nullopt;
+  draw_table(fitted, curves.front());
   const Curve& curve = curves.front();
   ForceDescription force{
       judged, known, unbounded, sentence_of(curves), curve.over == Table::velocity, curve.held_evidence};
