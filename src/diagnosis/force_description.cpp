@@ -11,6 +11,7 @@
 #include "estimation/random_curve.hpp"
 #include "estimation/smoother.hpp"
 #include "force_formula.hpp"
+#include "model/dense_algebra.hpp"
 #include "upright/model/effects/force_table.hpp"
 #include "without_effect.hpp"
 
@@ -111,8 +112,8 @@ struct Curve {
   double evidence = 0.0;              ///< of a curve of many nodes, on training data
   double held_evidence = 0.0;         ///< what the same curve saves on held-out data
   CurveNodes nodes;                   ///< of the table
-  Eigen::VectorXd force_n;            ///< at these nodes; empty: a table shows nothing
   Eigen::MatrixXd prior_information;  ///< of the forces at these nodes
+  Eigen::VectorXd force_n;            ///< expected at these nodes
 };
 
 /// Curves over each quantity, the one with the most evidence first.
@@ -129,22 +130,19 @@ std::vector<Curve> curves_of(const Followed& train, const Followed& held, std::s
     const Eigen::VectorXd force_n = curve.mean(shown);
     const CurveEquations unseen = held.equations(nodes, over, held.arguments(over));
     const double held_evidence = 2.0 * force_n.dot(unseen.score) - force_n.dot(unseen.information * force_n);
-    curves.push_back({over, -curve.change(), held_evidence, {}, {}, {}});
+    const CurveNodes few = nodes_along(along, Table::node_count);
+    curves.push_back({over, -curve.change(), held_evidence, few, curve.prior_information(few), {}});
   }
   std::stable_sort(curves.begin(), curves.end(),
                    [](const Curve& a, const Curve& b) { return a.evidence > b.evidence; });
   return curves;
 }
 
-/// Draws a curve through the few nodes of a table.
+/// The expected values of a curve at the few nodes of its table. Where no data are, they are near zero: the
+/// size of the curve is that of the force, not what a few nodes would need to follow its details.
 void draw_table(const Followed& train, Curve& curve) {
-  const std::vector<CurveArgument> along = train.arguments(curve.over);
-  curve.nodes = nodes_along(along, Table::node_count);
-  const CurveEquations shown = train.equations(curve.nodes, curve.over, along);
-  const RandomCurve table(shown, curve.nodes);
-  if (!table.is_there()) return;
-  curve.force_n = table.mean(shown);
-  curve.prior_information = table.prior_information();
+  const CurveEquations shown = train.equations(curve.nodes, curve.over, train.arguments(curve.over));
+  curve.force_n = solve_symmetric(shown.information + curve.prior_information, shown.score);
 }
 
 Plant with_table(Plant plant, const Curve& curve) {
@@ -278,7 +276,7 @@ std::optional<ForceDescription> describe_force(const Search& search, const Hypot
   ForceDescription force{
       judged, known, unbounded, sentence_of(curves), curve.over == Table::velocity, curve.held_evidence};
   force.judged.simulation.reset();
-  if (curve.force_n.size() > 0) fit_table(search, curve, force);
+  fit_table(search, curve, force);
   return force;
 }
 

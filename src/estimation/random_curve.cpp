@@ -86,9 +86,9 @@ Eigen::VectorXd RandomCurve::mean(const CurveEquations& equations) const {
   return axes.values * expected.matrix();
 }
 
-Eigen::MatrixXd RandomCurve::prior_information() const {
-  const auto n = static_cast<Eigen::Index>(nodes_.count);
-  return correlation(nodes_, length_).llt().solve(Eigen::MatrixXd::Identity(n, n)) / variance_;
+Eigen::MatrixXd RandomCurve::prior_information(const CurveNodes& nodes) const {
+  const auto n = static_cast<Eigen::Index>(nodes.count);
+  return correlation(nodes, length_).llt().solve(Eigen::MatrixXd::Identity(n, n)) / variance_;
 }
 
 }  // namespace upright

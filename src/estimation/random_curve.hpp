@@ -29,8 +29,8 @@ class RandomCurve {
   double change_at(const CurveEquations& equations) const;
   /// The expected values at the nodes, from these equations and the prior.
   Eigen::VectorXd mean(const CurveEquations& equations) const;
-  /// Inverse of the prior covariance of the values at the nodes.
-  Eigen::MatrixXd prior_information() const;
+  /// Inverse of the prior covariance of its values at these nodes.
+  Eigen::MatrixXd prior_information(const CurveNodes& nodes) const;
 
  private:
   void consider(double variance, double length, double change);
