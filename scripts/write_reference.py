@@ -79,7 +79,7 @@ def limits_of(header):
 
 
 # The libraries that users link, and the folders of include/upright that each adds to those before.
-LIBRARIES = (("model", ("base", "model")), ("sim", ("sim", "sim/loop")), ("control", ("control",)), ("hal", ("hal",)),
+LIBRARIES = (("model", ("base", "model")), ("sim", ("sim",)), ("control", ("control",)), ("hal", ("hal",)),
              ("runtime", ("record", "runtime")), ("diagnosis", ("measurement", "estimation", "diagnosis")))
 
 
