@@ -11,7 +11,6 @@
 #include "lane_predictor.hpp"
 #include "lane_ring.hpp"
 #include "upright/control/velocity_estimator.hpp"
-#include "upright/model/dynamics.hpp"
 #include "upright/sim/loop/loop_run.hpp"
 
 namespace upright {

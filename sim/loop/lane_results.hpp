@@ -4,8 +4,7 @@
 #include <bit>
 #include <span>
 
-#include "lanes.hpp"
-#include "upright/model/dynamics.hpp"
+#include "lane_model.hpp"
 #include "upright/sim/loop/loop_run.hpp"
 
 namespace upright {
