@@ -5,7 +5,7 @@
 #include <span>
 
 #include "lane_model.hpp"
-#include "upright/sim/loop/loop_run.hpp"
+#include "loop_run.hpp"
 
 namespace upright {
 
