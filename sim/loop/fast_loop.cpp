@@ -113,10 +113,10 @@ class SmoothPeriod {
     if (smoothing > 0.0) {
       // tanh(smoothing v) turns within about 3 / smoothing; a step may sweep 0.7 / smoothing of it (errors of
       // 1e-8).
-      // Near rest of both contacts the loop amplifies errors a hundredfold: there half of it.
+      // Near rest of both contacts the loop amplifies errors a hundredfold: there a third of it.
       turning_ = 3.0 / smoothing;
       pivot_turns_ = physics_.pivot_is_dry();
-      sweep_ = (pivot_turns_ ? 0.35 : 0.7) / smoothing;
+      sweep_ = (pivot_turns_ ? 0.25 : 0.7) / smoothing;
     } else if (physics_.cart_has_kink()) {
       turning_ = 0.0;
       sweep_ = kink_sweep_mps;
