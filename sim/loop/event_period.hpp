@@ -36,7 +36,10 @@ class EventPeriod {
         sticks_(may_stick<Present> && physics_.cart_can_stick()),
         pivot_sticks_(physics_.pivot_can_stick()),
         cart_turns_(physics_.cart_has_kink()),
-        stiff_(parts.stiff_bristles) {}
+        stiff_(parts.stiff_bristles),
+        three_stages_(parts.three_stages) {
+    if (sticks_ && is_common_set<Present>) find_static_friction(Lanes(0.0), everywhere_);
+  }
 
   using State = PlantState<Lanes>;
   using Mask = LaneMask;
@@ -76,6 +79,8 @@ class EventPeriod {
     Step step{length_of(steps, begin, stay), {}, {}};
     if (stiff_)
       step_on_bristles(steps, begin, step);
+    else if (!lags() && three_stages_)
+      step_of_three_stages(steps, begin, step);
     else if (!lags())
       step.end = runge_kutta_4(rates_of(steps, steps.drive_v, steps.drive_v, step), steps.state, begin.rate,
                                step.length_s);
@@ -105,10 +110,13 @@ class EventPeriod {
     Lanes pivot_load_nm;  ///< and the pendulum
   };
   using Rate = std::conditional_t<second, BothRate, CartRate>;
-  struct CartBegin {
+  /// Of a resting cart, forward and backward.
+  struct StaticFriction {
+    Lanes forward_n, backward_n;
+  };
+  struct CartBegin : StaticFriction {
     State rate;
-    Lanes forward_n, backward_n;  ///< the static friction of a resting cart
-    Lanes excess_n;               ///< of the load over it
+    Lanes excess_n;  ///< of the load over the static friction
   };
   struct BothBegin : CartBegin {
     Lanes pivot_excess_nm;  ///< the same of a resting pendulum
@@ -147,7 +155,18 @@ class EventPeriod {
     return larger(load - forward, -load - backward);
   }
 
-  [[gnu::flatten, gnu::noinline]] Begin begin_of(Steps& steps) const {
+  /// Inlined where it pays: into the common loops.
+  static constexpr bool inlines = is_common_set<Present> && !second;
+  Begin begin_of(Steps& steps) const {
+    if constexpr (inlines)
+      return begin_of_inlined(steps);
+    else
+      return begin_of_called(steps);
+  }
+  [[gnu::flatten, gnu::noinline]] Begin begin_of_called(Steps& steps) const {
+    return begin_of_inlined(steps);
+  }
+  Begin begin_of_inlined(Steps& steps) const {
     Begin begin{};
     const State& at = steps.state;
     const Lanes& motor_v = motor_of(steps);
@@ -160,7 +179,10 @@ class EventPeriod {
     }
     const auto balance = physics_.balance(at, motor_v);
     if (any(at.cart_mps == Lanes(0.0))) {
-      find_static_friction(at, begin);
+      if constexpr (is_common_set<Present>)
+        static_cast<StaticFriction&>(begin) = everywhere_;
+      else
+        find_static_friction(at.cart_m, begin);
       const Lanes load = physics_.cart_load(at, balance);
       begin.excess_n = excess_of(load, begin.forward_n, begin.backward_n);
       const Lanes moves = select(begin.excess_n > Lanes(0.0), sign_of(load), Lanes(0.0));
@@ -170,16 +192,16 @@ class EventPeriod {
     return begin;
   }
 
-  void find_static_friction(const State& at, Begin& begin) const {
-    begin.forward_n = physics_.cart_dry_level(at.cart_m, Lanes(0.0), Lanes(1.0));
-    begin.backward_n = physics_.cart_dry_level(at.cart_m, Lanes(0.0), Lanes(-1.0));
+  void find_static_friction(const Lanes& cart_m, StaticFriction& friction) const {
+    friction.forward_n = physics_.cart_dry_level(cart_m, Lanes(0.0), Lanes(1.0));
+    friction.backward_n = physics_.cart_dry_level(cart_m, Lanes(0.0), Lanes(-1.0));
   }
 
   Begin begin_of_both(Steps& steps) const {
     Begin begin{};
     const State& at = steps.state;
     LaneModes& modes = steps.modes;
-    if (sticks_ && any(at.cart_mps == Lanes(0.0))) find_static_friction(at, begin);
+    if (sticks_ && any(at.cart_mps == Lanes(0.0))) find_static_friction(at.cart_m, begin);
     if (any(steps.settles)) {
       const auto unheld = physics_.unheld(at, motor_of(steps), modes.cart);
       settle_contacts(physics_, at, unheld, begin.forward_n, begin.backward_n, steps.settles, modes);
@@ -202,6 +224,20 @@ class EventPeriod {
       if (stage == Stage::end) step.last = found;
       return found.of;
     };
+  }
+
+  /// Of plants that are slow beside the period.
+  void step_of_three_stages(const Steps& steps, const Begin& begin, Step& step) const {
+    if constexpr (inlines && may_stick<Present>) {
+      const auto rate = [&](const State& at, Stage) {
+        step.last = rate_of_cart(at, steps.drive_v, steps.modes.cart);
+        return step.last.of;
+      };
+      step.end = runge_kutta_3(rate, steps.state, begin.rate, step.length_s);
+    } else {
+      step.end = runge_kutta_3(rates_of(steps, steps.drive_v, steps.drive_v, step), steps.state, begin.rate,
+                               step.length_s);
+    }
   }
 
   /// The voltages within the step give it the exact impulse; events are sought by the true accelerations at
@@ -232,15 +268,18 @@ class EventPeriod {
   Rate rate_of(const State& state, const Lanes& motor_v, const LaneModes& modes) const {
     if constexpr (second) {
       if (pivot_sticks_) return rate_of_both(state, motor_v, modes);
-      return {rate_of_cart(state, motor_v, modes.cart), Lanes(0.0)};
+      return {called_rate_of_cart(state, motor_v, modes.cart), Lanes(0.0)};
     } else {
-      return rate_of_cart(state, motor_v, modes.cart);
+      return called_rate_of_cart(state, motor_v, modes.cart);
     }
   }
 
   /// One copy for the stages of a step, as in SmoothPeriod.
-  [[gnu::flatten, gnu::noinline]] CartRate rate_of_cart(const State& state, const Lanes& motor_v,
-                                                        const Lanes& direction) const {
+  [[gnu::flatten, gnu::noinline]] CartRate called_rate_of_cart(const State& state, const Lanes& motor_v,
+                                                               const Lanes& direction) const {
+    return rate_of_cart(state, motor_v, direction);
+  }
+  CartRate rate_of_cart(const State& state, const Lanes& motor_v, const Lanes& direction) const {
     if (!sticks_) return {unheld_rate(state, motor_v, direction), Lanes(0.0)};
     const auto balance = physics_.balance(state, motor_v);
     return {physics_.derivative_by_direction(state, balance, direction), physics_.cart_load(state, balance)};
@@ -354,7 +393,9 @@ class EventPeriod {
   Dynamics<Lanes, Present> physics_;
   std::conditional_t<second, LaneMotor, PromptMotor> motor_;
   bool sticks_, pivot_sticks_, cart_turns_;
-  bool stiff_;  ///< bristles relax too fast for the classical method
+  bool stiff_;                   ///< bristles relax too fast for the classical method
+  bool three_stages_;            ///< suffice
+  StaticFriction everywhere_{};  ///< of the common sets, whose levels are the same at every place
 };
 
 }  // namespace upright

@@ -32,7 +32,7 @@ class LaneDelay {
   /// Gives one lane this delay.
   void take(std::size_t lane, double delay_s) {
     const DelayLine line(delay_s, period_s_);
-    whole_[lane] = line.whole_periods();
+    whole_[lane] = static_cast<std::uint32_t>(line.whole_periods());
     put(fraction_, lane, line.fraction());
     same_ = std::all_of(whole_.begin(), whole_.end(), [this](std::size_t of) { return of == whole_[0]; });
     exact_ = exact_ && line.exact();
@@ -54,11 +54,13 @@ class LaneDelay {
       longest = std::max(longest, DelayLine(run.delay_s, period_s).whole_periods());
     return longest;
   }
-  Lanes back(std::size_t more) const { return same_ ? ring_.ago(whole_[0] + more) : ring_.ago(whole_, more); }
+  Lanes back(std::uint32_t more) const {
+    return same_ ? ring_.ago(whole_[0] + more) : ring_.ago(whole_, more);
+  }
 
   double period_s_;
   LaneRing<Mask> ring_;
-  std::array<std::size_t, lane_count> whole_{};
+  std::array<std::uint32_t, lane_count> whole_{};
   Lanes fraction_;
   bool same_ = true, exact_ = true;
 };
@@ -111,9 +113,10 @@ class SmoothPeriod {
     if (smoothing > 0.0) {
       // tanh(smoothing v) turns within about 3 / smoothing; a step may sweep 0.7 / smoothing of it (errors of
       // 1e-8).
+      // Near rest of both contacts the loop amplifies errors a hundredfold: there a third of it.
       turning_ = 3.0 / smoothing;
-      sweep_ = 0.7 / smoothing;
       pivot_turns_ = physics_.pivot_is_dry();
+      sweep_ = (pivot_turns_ ? 0.25 : 0.7) / smoothing;
     } else if (physics_.cart_has_kink()) {
       turning_ = 0.0;
       sweep_ = kink_sweep_mps;

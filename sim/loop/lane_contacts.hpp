@@ -37,11 +37,16 @@ inline LaneMeeting stops_of(const LaneContact& contact, const Lanes& length_s, c
   const LaneMask none = active & !active;
   LaneMeeting met{none, none, none, zero, h};
   const Lanes bend = (end_growth - growth) * per_length;
-  const Lanes under = end_growth * end_growth - two * bend * to;
-  const LaneMask falls = active & (end_growth < zero) & (under >= zero);
-  met.to_stop_s = two * to / select(falls, sqrt(under) - end_growth, Lanes(1.0));
-  met.stops =
-      falls & (absolute(met.to_stop_s) <= Lanes(LaneMeeting::near_stop_s)) & (met.to_stop_s <= left_s);
+  // No parabola of this bend stops within that time from a higher velocity.
+  const Lanes near_s(LaneMeeting::near_stop_s);
+  const LaneMask slow =
+      active & (end_growth < zero) & (absolute(to) <= near_s * (near_s * absolute(bend) - two * end_growth));
+  if (any(slow)) {
+    const Lanes under = end_growth * end_growth - two * bend * to;
+    const LaneMask falls = slow & (under >= zero);
+    met.to_stop_s = two * to / select(falls, sqrt(under) - end_growth, Lanes(1.0));
+    met.stops = falls & (absolute(met.to_stop_s) <= near_s) & (met.to_stop_s <= left_s);
+  }
   met.beyond = active & (to < zero) & !met.stops;
   if (!any(met.beyond)) return met;
   // The first zero after the beginning of the parabola through what the step met.

@@ -7,6 +7,17 @@
 
 namespace upright {
 
+/// The inverse is found once.
+template <>
+class Divisor<Lanes> {
+ public:
+  explicit Divisor(const Lanes& value) : inverse_(inverse(value)) {}
+  friend Lanes operator/(const Lanes& dividend, const Divisor& by) { return dividend * by.inverse_; }
+
+ private:
+  Lanes inverse_;
+};
+
 /// Gives one lane this plant, which has the effects of the others.
 inline void put_on_lane(PlantModel<Lanes>& lanes, std::size_t lane, const PlantModel<double>& model) {
   put(lanes.base.cart_mass_kg, lane, model.base.cart_mass_kg);
@@ -57,6 +68,10 @@ constexpr std::uint64_t viscous_set = bit_of<effects::ViscousFriction>;
 constexpr std::uint64_t coulomb_set = viscous_set | bit_of<effects::CoulombFriction>;
 constexpr std::uint64_t exponential_set = coulomb_set | bit_of<effects::StribeckFriction>;
 constexpr std::uint64_t dynamic_set = exponential_set | bit_of<effects::BristleFriction>;
+
+/// Whether these effects are one of the sets above.
+template <class Present>
+constexpr bool is_common_set = !std::is_same_v<Present, EffectSet>;
 
 /// Whether a cart with these effects can stick: of the sets above, one has no dry friction, and bristles hold
 /// a cart without sticking.

@@ -1,8 +1,7 @@
 // The motor's lag by lane.
 #pragma once
 
-#include "lanes.hpp"
-#include "upright/model/dynamics.hpp"
+#include "lane_model.hpp"
 #include "upright/sim/motor_lag.hpp"
 
 namespace upright {

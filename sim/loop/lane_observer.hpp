@@ -12,7 +12,6 @@
 #include "lane_ring.hpp"
 #include "loop_run.hpp"
 #include "upright/control/velocity_estimator.hpp"
-#include "upright/model/dynamics.hpp"
 
 namespace upright {
 

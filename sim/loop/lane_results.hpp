@@ -4,9 +4,8 @@
 #include <bit>
 #include <span>
 
-#include "lanes.hpp"
+#include "lane_model.hpp"
 #include "loop_run.hpp"
-#include "upright/model/dynamics.hpp"
 
 namespace upright {
 

@@ -47,6 +47,18 @@ UPRIGHT_LANES_INLINE Batch inverse(const Batch& x) {
 #endif
 }
 
+/// The numbers at these places.
+UPRIGHT_LANES_INLINE Batch gathered(const double* numbers, const std::uint32_t* places) {
+#ifdef __AVX512F__
+  return _mm512_i32gather_pd(_mm256_loadu_si256(reinterpret_cast<const __m256i*>(places)), numbers,
+                             sizeof(double));
+#else
+  std::array<double, Batch::size> found;
+  for (std::size_t i = 0; i < found.size(); ++i) found[i] = numbers[places[i]];
+  return Batch::load_unaligned(found.data());
+#endif
+}
+
 /// Horner's rule; the coefficients begin with the highest power.
 template <class... C>
 UPRIGHT_LANES_INLINE Batch polynomial(const Batch& x, double highest, C... others) {
@@ -194,6 +206,13 @@ class Lanes {
       lanes.part_[i] = Batch::load_unaligned(numbers + i * Batch::size);
     return lanes;
   }
+  /// The numbers at these places.
+  static Lanes gather(const double* numbers, const std::array<std::uint32_t, lane_count>& places) {
+    Lanes lanes(uninitialised{});
+    for (std::size_t i = 0; i < lanes.part_.size(); ++i)
+      lanes.part_[i] = lanes_detail::gathered(numbers, places.data() + i * Batch::size);
+    return lanes;
+  }
   void store(double* numbers) const {
     for (std::size_t i = 0; i < part_.size(); ++i) part_[i].store_unaligned(numbers + i * Batch::size);
   }
@@ -224,6 +243,8 @@ class Lanes {
   UPRIGHT_LANES_INLINE friend Lanes operator/(const Lanes& a, const Lanes& b) {
     return map(a, b, [](const Batch& x, const Batch& y) { return x * lanes_detail::inverse(y); });
   }
+  /// 1 / a for a that is finite and not 0.
+  UPRIGHT_LANES_INLINE friend Lanes inverse(const Lanes& a) { return map(a, lanes_detail::inverse); }
   UPRIGHT_LANES_INLINE friend Lanes operator-(const Lanes& a) {
     return map(a, [](const Batch& x) { return -x; });
   }

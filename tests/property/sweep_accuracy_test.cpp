@@ -221,13 +221,15 @@ const Friction everywhere[] = {{"smooth", "exponential", 100.0},
                                {"bristles", "dynamic", 0.0},
                                {"table", "viscous", 0.0, "force_table", table},
                                {"pivot_drag", "exponential", 0.0, "pivot_quadratic_drag", {0.003}}};
-const Friction sampled_only[] = {{"pivot_smooth", "exponential", 100.0, "pivot_coulomb_friction", {0.01}},
-                                 {"lag_smooth", "exponential", 100.0, "motor_lag", {0.001}},
-                                 {"lag_stick_slip", "exponential", 0.0, "motor_lag", {0.0004}},
-                                 {"lag_bristles", "dynamic", 0.0, "motor_lag", {0.001}},
-                                 {"pivot_and_cart", "exponential", 0.0, "pivot_coulomb_friction", {0.01}},
-                                 {"pivot_alone", "viscous", 0.0, "pivot_coulomb_friction", {0.003}},
-                                 {"pivot_and_bristles", "dynamic", 0.0, "pivot_coulomb_friction", {0.003}}};
+const Friction sampled_only[] = {
+    {"pivot_smooth", "exponential", 100.0, "pivot_coulomb_friction", {0.01}},
+    {"large_pivot_smooth", "exponential", 100.0, "pivot_coulomb_friction", {0.03}},
+    {"lag_smooth", "exponential", 100.0, "motor_lag", {0.001}},
+    {"lag_stick_slip", "exponential", 0.0, "motor_lag", {0.0004}},
+    {"lag_bristles", "dynamic", 0.0, "motor_lag", {0.001}},
+    {"pivot_and_cart", "exponential", 0.0, "pivot_coulomb_friction", {0.01}},
+    {"pivot_alone", "viscous", 0.0, "pivot_coulomb_friction", {0.003}},
+    {"pivot_and_bristles", "dynamic", 0.0, "pivot_coulomb_friction", {0.003}}};
 std::string name_of(const testing::TestParamInfo<Friction>& friction) {
   return friction.param.name;
 }

@@ -36,6 +36,18 @@ struct Contacts {
   Contact pivot = Contact::slip_forward;  ///< in the pivot
 };
 
+/// A number that many others are divided by. A scalar may have a faster way than the division.
+template <class S>
+class Divisor {
+ public:
+  explicit Divisor(const S& value) : value_(value) {}
+  /// The quotient.
+  friend S operator/(const S& dividend, const Divisor& by) { return dividend / by.value_; }
+
+ private:
+  S value_;
+};
+
 /// The physics of one plant. `Present` is the set of its effects: EffectSet, or a StaticEffectSet for
 /// engines that are compiled for it. Constants of a run are computed once, in the constructor.
 template <class S, class Present = EffectSet>
@@ -56,7 +68,9 @@ class Dynamics {
       total_mass_ = base_.cart_mass_kg + base_.pendulum_mass_kg;
       coupling_ = base_.pendulum_mass_kg * base_.length_to_com_m;
       gravity_torque_ = coupling_ * base_.gravity_mps2;
+      inertia_ = Divisor<S>(base_.inertia_about_pivot_kgm2);
     }
+    mass_ = Divisor<S>(total_mass_);
     for_each_effect([&]<std::size_t I>() {
       using E = EffectAt<I>;
       if (!present_.template has<I>()) return;
@@ -242,8 +256,8 @@ class Dynamics {
   /// As `cart_load`, of a cart at rest.
   S cart_load(const PlantState<S>& state, const Balance& at) const {
     const S turn = gravity_torque_ * at.sine + at.torque;
-    return at.force + coupling_ * (at.sine * state.theta_radps * state.theta_radps -
-                                   at.cosine * turn / base_.inertia_about_pivot_kgm2);
+    return at.force +
+           coupling_ * (at.sine * state.theta_radps * state.theta_radps - at.cosine * turn / inertia_);
   }
 
   /// As `derivative`, with the mode of the cart's contact as a number: -1 or 1 slides in that direction, 0
@@ -257,7 +271,7 @@ class Dynamics {
     rate.cart_mps = select(rests, S(0.0), rate.cart_mps);
     rate.cart_m = select(rests, S(0.0), state.cart_mps);
     rate.theta_rad = state.theta_radps;
-    const S turn = (gravity_torque_ * at.sine + at.torque) / base_.inertia_about_pivot_kgm2;
+    const S turn = (gravity_torque_ * at.sine + at.torque) / inertia_;
     rate.theta_radps = select(rests, turn, rate.theta_radps);
     return rate;
   }
@@ -302,12 +316,12 @@ class Dynamics {
   }
   /// The force that holds a resting cart, with the pivot in this mode.
   S cart_load(const Unheld& at, const S& pivot) const {
-    const S turn = (at.turn - pivot_dry_level() * pivot) / base_.inertia_about_pivot_kgm2;
+    const S turn = (at.turn - pivot_dry_level() * pivot) / inertia_;
     return at.push - at.coupling * select(pivot == S(0.0), S(0.0), turn);
   }
   /// The torque that holds a resting pendulum, with the cart in this mode, at this level of its friction.
   S pivot_load(const Unheld& at, const S& cart, const S& level) const {
-    const S push = (at.push - level * cart) / total_mass_;
+    const S push = (at.push - level * cart) / mass_;
     if (!cart_can_stick()) return at.turn - at.coupling * push;
     return at.turn - at.coupling * select(cart == S(0.0), S(0.0), push);
   }
@@ -322,12 +336,12 @@ class Dynamics {
     rate.cart_m = state.cart_mps;
     rate.theta_rad = state.theta_radps;
     rate.bristle_m = at.bristle_mps;
-    rate.cart_mps = select(pivot_rests, push / total_mass_, (inertia * push - at.coupling * turn) * inverse);
+    rate.cart_mps = select(pivot_rests, push / mass_, (inertia * push - at.coupling * turn) * inverse);
     rate.theta_radps = select(pivot_rests, S(0.0), S((total_mass_ * turn - at.coupling * push) * inverse));
     if (!cart_can_stick()) return rate;
     const auto cart_rests = cart == S(0.0);
     rate.cart_mps = select(cart_rests, S(0.0), rate.cart_mps);
-    rate.theta_radps = select(cart_rests, select(pivot_rests, S(0.0), S(turn / inertia)), rate.theta_radps);
+    rate.theta_radps = select(cart_rests, select(pivot_rests, S(0.0), S(turn / inertia_)), rate.theta_radps);
     return rate;
   }
 
@@ -343,7 +357,7 @@ class Dynamics {
     if (!(pivot == Contact::stick && pivot_can_stick())) {
       S torque = pivot_smooth_torque(state.theta_radps);
       if (pivot_dry_) torque = torque + pivot_sliding_torque(state.theta_radps, pivot);
-      theta_acceleration = (gravity_torque_ * s + torque) / base_.inertia_about_pivot_kgm2;
+      theta_acceleration = (gravity_torque_ * s + torque) / inertia_;
     }
     return force + coupling_ * (s * state.theta_radps * state.theta_radps - c * theta_acceleration);
   }
@@ -390,7 +404,7 @@ class Dynamics {
   /// Smallest inertia that a force on the cart acts on [kg].
   S min_cart_inertia() const {
     if (!model_.has_pendulum) return total_mass_;
-    return total_mass_ - coupling_ * coupling_ / base_.inertia_about_pivot_kgm2;
+    return total_mass_ - coupling_ * coupling_ / inertia_;
   }
 
  private:
@@ -461,7 +475,7 @@ class Dynamics {
     rate.cart_mps = S(0.0);
     rate.theta_radps = S(0.0);
     if (!model_.has_pendulum) {
-      if (!cart_rests) rate.cart_mps = force / total_mass_;
+      if (!cart_rests) rate.cart_mps = force / mass_;
       return;
     }
     const auto [s, c] = elementary::sine_and_cosine(state.theta_rad);
@@ -473,12 +487,12 @@ class Dynamics {
                   bool cart_rests, bool pivot_rests, PlantState<S>& rate) const {
     const S push = force + coupling_ * s * state.theta_radps * state.theta_radps;
     if (pivot_rests) {
-      if (!cart_rests) rate.cart_mps = push / total_mass_;
+      if (!cart_rests) rate.cart_mps = push / mass_;
       return;
     }
     const S turn = gravity_torque_ * s + torque;
     if (cart_rests) {
-      rate.theta_radps = turn / base_.inertia_about_pivot_kgm2;
+      rate.theta_radps = turn / inertia_;
       return;
     }
     const S off_diagonal = coupling_ * c;
@@ -504,6 +518,7 @@ class Dynamics {
   BaseParameters<S> base_;
   Present present_;
   S total_mass_, coupling_, gravity_torque_;
+  Divisor<S> inertia_{S(1.0)}, mass_{S(1.0)};  ///< about the pivot, and of both bodies
   bool bristles_ = false, cart_dry_ = false, pivot_dry_ = false, cart_kink_ = false, pivot_kink_ = false,
        lag_ = false;
 };
