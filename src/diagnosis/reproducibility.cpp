@@ -240,6 +240,17 @@ std::vector<Reproduction> reproduce(const Search& search, const Hypothesis& h,
   return results;
 }
 
+double white_evidence(const Reproduction& reproduction) {
+  double sum = 0.0;
+  for (const RunEvidence& run : reproduction.runs) sum += run.evidence;
+  return sum;
+}
+
+bool is_beyond_doubt(const Reproduction& reproduction, const SelectionPolicy& policy) {
+  return std::isfinite(reproduction.t_value) && reproduction.t_value > policy.reproducibility.min_t &&
+         white_evidence(reproduction) > policy.acceptance.overwhelming_evidence;
+}
+
 bool is_contradicted(const Reproduction& reproduction, const ReproducibilityPolicy& policy) {
   return reproduction.t_value < -policy.min_t;
 }
