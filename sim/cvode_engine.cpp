@@ -1,4 +1,4 @@
-#include "upright/sim/cvode_engine.hpp"
+#include "cvode_engine.hpp"
 
 #include <cvode/cvode.h>
 #include <nvector/nvector_serial.h>

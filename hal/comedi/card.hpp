@@ -6,7 +6,7 @@
 
 #include <string>
 
-#include "upright/hal/comedi_wiring.hpp"
+#include "upright/hal/wiring.hpp"
 
 namespace upright {
 

@@ -6,7 +6,7 @@
 #include <memory>
 #include <string>
 
-#include "upright/hal/gpio.hpp"
+#include "upright/hal/wiring.hpp"
 
 namespace upright {
 

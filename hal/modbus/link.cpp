@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <span>
 
+#include "registers.hpp"
 #include "upright/base/error.hpp"
 #include "upright/hal/clock.hpp"
 

@@ -1,9 +1,9 @@
+#include "registers.hpp"
+
 #include <algorithm>
 #include <bit>
 #include <cmath>
 #include <limits>
-
-#include "upright/hal/modbus_registers.hpp"
 
 namespace upright {
 

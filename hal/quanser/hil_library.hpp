@@ -4,7 +4,7 @@
 #include <string>
 
 #include "hil.hpp"
-#include "upright/hal/quanser_wiring.hpp"
+#include "upright/hal/wiring.hpp"
 
 namespace upright {
 

@@ -17,6 +17,7 @@
 #include <vector>
 
 #include "endpoint.hpp"
+#include "hal/modbus/registers.hpp"
 #include "upright/base/error.hpp"
 #include "upright/hal/clock.hpp"
 #include "virtual_plant.hpp"

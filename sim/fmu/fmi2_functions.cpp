@@ -116,6 +116,7 @@ FMI2_EXPORT fmi2Status fmi2SetDebugLogging(fmi2Component, fmi2Boolean, size_t, c
   return fmi2OK;
 }
 
+// The parameters are those of FMI 2.0, as for all functions here.
 FMI2_EXPORT fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid,
                                           fmi2String resources, const fmi2CallbackFunctions* callbacks,
                                           fmi2Boolean, fmi2Boolean) {
@@ -236,6 +237,7 @@ FMI2_EXPORT fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate, fmi2
 FMI2_EXPORT fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte*, size_t, fmi2FMUstate*) {
   return fail(of(c), "the state cannot be serialized");
 }
+// The parameters are those of FMI 2.0.
 FMI2_EXPORT fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReference*, size_t,
                                                     const fmi2ValueReference*, size_t, const fmi2Real*,
                                                     fmi2Real*) {

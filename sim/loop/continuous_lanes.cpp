@@ -262,7 +262,8 @@ class ContinuousRuns {
   }
 
   /// Looks for stops and breakaways within the steps of `accepted`. A step that goes too far past one is
-  /// taken again, shorter; returns those that stay. Snaps the velocity of a cart that stopped.
+  /// taken again, shorter; returns those that stay. Snaps the velocity of a cart that stopped. Not split: see
+  /// `step`. Eight parameters: what the step has computed, in registers.
   std::uint32_t find_events(std::uint32_t accepted, const Lanes& begin_s, const Lanes& h, const State& y,
                             const State& k1, State& end, const State& k7, const Lanes& end_v) {
     const Lanes zero(0.0), direction = Lanes::load(direction_.data());
@@ -362,7 +363,7 @@ class ContinuousRuns {
     }
   }
 
-  /// Extremes of the motion over the steps, and falls.
+  /// Extremes of the motion over the steps, and falls. Seven parameters: as for `find_events`.
   void watch(std::uint32_t accepted, const Lanes& begin_s, const Lanes& h, const State& y, const State& k1,
              const State& end, const State& k7) {
     const Lanes theta = hermite(y.theta_rad, h * k1.theta_rad, end.theta_rad, h * k7.theta_rad,

@@ -3,7 +3,7 @@
 
 #include <span>
 
-#include "upright/sim/loop/loop_run.hpp"
+#include "loop_run.hpp"
 
 namespace upright::UPRIGHT_LANES {
 

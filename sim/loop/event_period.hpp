@@ -284,7 +284,8 @@ class EventPeriod {
     return select(slows & (stop_s < longest), larger(stop_s, smaller(longest, Lanes(shortest_s))), longest);
   }
 
-  /// Takes the step in the lanes where it met nothing, or ends at what it met.
+  /// Takes the step in the lanes where it met nothing, or ends at what it met. Not split: with contracted
+  /// multiply-adds a split may change last digits.
   void take(Steps& steps, const Begin& begin, const Step& step, const LaneMask& stay) const {
     const Lanes zero(0.0), one(1.0), h = step.length_s;
     const LaneMask active = steps.left_s > zero;

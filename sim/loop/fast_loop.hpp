@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <span>
 
-#include "upright/sim/loop/loop_run.hpp"
+#include "loop_run.hpp"
 
 namespace upright {
 

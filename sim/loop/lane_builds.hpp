@@ -9,8 +9,8 @@
 
 #include "control/kalman_step.hpp"
 #include "control/predictor_step.hpp"
+#include "loop_run.hpp"
 #include "upright/model/dynamics.hpp"
-#include "upright/sim/loop/loop_run.hpp"
 
 namespace upright {
 

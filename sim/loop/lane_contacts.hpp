@@ -104,7 +104,8 @@ struct LaneModes {
 };
 
 /// Consistent modes in these lanes, as `settled_contacts`: contacts at rest stick, or accelerate in the
-/// direction of their load. `forward_n` and `backward_n`: static friction of the cart.
+/// direction of their load. `forward_n` and `backward_n`: static friction of the cart. Seven parameters: what
+/// the step knows already, in registers.
 template <class Physics>
 void settle_contacts(const Physics& physics, const PlantState<Lanes>& state,
                      const typename Physics::Unheld& at, const Lanes& forward_n, const Lanes& backward_n,

@@ -10,9 +10,9 @@
 #include "lane_model.hpp"
 #include "lane_predictor.hpp"
 #include "lane_ring.hpp"
+#include "loop_run.hpp"
 #include "upright/control/velocity_estimator.hpp"
 #include "upright/model/dynamics.hpp"
-#include "upright/sim/loop/loop_run.hpp"
 
 namespace upright {
 

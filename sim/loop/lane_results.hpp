@@ -5,8 +5,8 @@
 #include <span>
 
 #include "lanes.hpp"
+#include "loop_run.hpp"
 #include "upright/model/dynamics.hpp"
-#include "upright/sim/loop/loop_run.hpp"
 
 namespace upright {
 

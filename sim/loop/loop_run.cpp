@@ -1,10 +1,10 @@
-#include "upright/sim/loop/loop_run.hpp"
+#include "loop_run.hpp"
 
 #include <algorithm>
 #include <cmath>
 
 #include "closed_loop.hpp"
-#include "upright/sim/cvode_engine.hpp"
+#include "sim/cvode_engine.hpp"
 
 namespace upright {
 

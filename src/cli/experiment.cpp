@@ -239,6 +239,19 @@ void print(const TrialResult& r) {
   std::fflush(stdout);
 }
 
+/// The rig of an experiment, and the hand that places the pendulum of a simulated one.
+struct AssembledRig {
+  std::unique_ptr<Rig> rig;
+  SimulatedRigWithHand* hand = nullptr;  ///< null: real hands
+};
+
+AssembledRig assemble_rig(const ExperimentSetup& setup, Clock& clock, std::uint64_t seed) {
+  if (!is_simulated(setup.rig)) return {make_rig(setup.rig, {setup.control.period_s()})};
+  auto plant = make_simulated_rig(setup.rig, clock, {seed, {}});
+  SimulatedRigWithHand* const hand = plant.get();
+  return {assembled(std::move(plant), setup.rig), hand};
+}
+
 /// Runs the pieces that were planned. Seven parameters: all that the command has open by then.
 ExperimentResult perform(const ExperimentArguments& arguments, const ExperimentSetup& setup,
                          const std::vector<Piece>& pieces, const fs::path& folder, const SignalFlag& signal,
@@ -247,15 +260,7 @@ ExperimentResult perform(const ExperimentArguments& arguments, const ExperimentS
   MonotonicClock real_clock;
   VirtualClock virtual_clock;
   Clock& clock = arguments.fast ? static_cast<Clock&>(virtual_clock) : real_clock;
-  SimulatedRigWithHand* hand = nullptr;
-  std::unique_ptr<Rig> rig;
-  if (simulated) {
-    auto plant = make_simulated_rig(setup.rig, clock, {arguments.seed.value_or(1), {}});
-    hand = plant.get();
-    rig = assembled(std::move(plant), setup.rig);
-  } else {
-    rig = make_rig(setup.rig, {setup.control.period_s()});
-  }
+  const AssembledRig assembly = assemble_rig(setup, clock, arguments.seed.value_or(1));
 
   ExperimentOptions options;
   options.folder = folder;
@@ -294,7 +299,8 @@ ExperimentResult perform(const ExperimentArguments& arguments, const ExperimentS
       if (on_terminal) show_live(live, phase);
       if (view != nullptr) view->say(state_of(current.first, current.second, phase, simulated));
     };
-  ExperimentResult result = run_experiment(setup, pieces, *rig, hand, clock, signal, options);
+  ExperimentResult result =
+      run_experiment(setup, pieces, *assembly.rig, assembly.hand, clock, signal, options);
   if (view != nullptr)
     view->end({result.complete && result.stop.done() ? LiveState::Kind::completed : LiveState::Kind::stopped,
                (result.stop.done() ? "" : sentence_of(result.stop) + ". ") +

@@ -8,9 +8,9 @@
 
 #include "command_line.hpp"
 #include "live/live_view.hpp"
+#include "runtime/realtime.hpp"
 #include "upright/hal/rig_file.hpp"
 #include "upright/model/plant.hpp"
-#include "upright/runtime/realtime.hpp"
 
 namespace upright::cli {
 

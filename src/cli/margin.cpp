@@ -11,9 +11,9 @@
 #include "design/delay_margin.hpp"
 #include "design/physical_limits.hpp"
 #include "json_number.hpp"
+#include "model/linear_plant.hpp"
 #include "progress.hpp"
 #include "runtime/overrun_limit.hpp"
-#include "upright/model/linear_plant.hpp"
 #include "upright/model/plant_file.hpp"
 
 namespace upright::cli {

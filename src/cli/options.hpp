@@ -5,7 +5,7 @@
 #include <optional>
 
 #include "command_line.hpp"
-#include "upright/runtime/realtime.hpp"
+#include "runtime/realtime.hpp"
 
 namespace upright::cli {
 

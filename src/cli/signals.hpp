@@ -3,8 +3,8 @@
 
 #include <string>
 
+#include "runtime/control_loop.hpp"
 #include "upright/hal/rig_file.hpp"
-#include "upright/runtime/control_loop.hpp"
 
 namespace upright::cli {
 

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "live/live_view.hpp"
-#include "upright/runtime/zero_volts.hpp"
+#include "runtime/zero_volts.hpp"
 
 namespace upright::cli {
 

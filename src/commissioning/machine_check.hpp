@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "finding.hpp"
-#include "upright/runtime/realtime.hpp"
+#include "runtime/realtime.hpp"
 
 namespace upright {
 

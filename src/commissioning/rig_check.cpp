@@ -7,8 +7,8 @@
 #include <optional>
 
 #include "base/angle_units.hpp"
-#include "upright/runtime/device_clock.hpp"
-#include "upright/runtime/sleep_policy.hpp"
+#include "runtime/device_clock.hpp"
+#include "runtime/sleep_policy.hpp"
 
 namespace upright {
 

@@ -9,13 +9,12 @@
 #include <vector>
 
 #include "finding.hpp"
+#include "runtime/control_loop.hpp"
 #include "upright/hal/calibration.hpp"
 #include "upright/hal/clock.hpp"
-#include "upright/hal/gpio.hpp"
 #include "upright/hal/rig.hpp"
-#include "upright/record/device_timing.hpp"
+#include "upright/hal/wiring.hpp"
 #include "upright/record/timing_stats.hpp"
-#include "upright/runtime/control_loop.hpp"
 
 namespace upright {
 

@@ -11,8 +11,8 @@
 #include <vector>
 
 #include "runtime/cpu_latency.hpp"
+#include "runtime/sleep_policy.hpp"
 #include "upright/hal/clock.hpp"
-#include "upright/runtime/sleep_policy.hpp"
 
 namespace upright {
 

@@ -4,8 +4,8 @@
 #include <string>
 
 #include "finding.hpp"
+#include "runtime/realtime.hpp"
 #include "upright/record/timing_stats.hpp"
-#include "upright/runtime/realtime.hpp"
 
 namespace upright {
 

@@ -4,9 +4,9 @@
 #include <cmath>
 #include <limits>
 
+#include "runtime/control_loop.hpp"
 #include "student.hpp"
 #include "upright/record/run_reader.hpp"
-#include "upright/runtime/control_loop.hpp"
 
 namespace upright {
 

@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "limiter.hpp"
 #include "upright/base/error.hpp"
 
 namespace upright {

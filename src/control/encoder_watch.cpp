@@ -1,4 +1,4 @@
-#include "upright/control/encoder_watch.hpp"
+#include "encoder_watch.hpp"
 
 #include <algorithm>
 #include <cmath>

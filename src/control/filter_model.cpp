@@ -5,9 +5,9 @@
 #include <vector>
 
 #include "model/dense_algebra.hpp"
+#include "model/linear_plant.hpp"
 #include "model/riccati.hpp"
 #include "upright/base/error.hpp"
-#include "upright/model/linear_plant.hpp"
 
 namespace upright {
 

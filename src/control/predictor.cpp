@@ -5,8 +5,8 @@
 #include <cmath>
 
 #include "kalman_step.hpp"
+#include "model/linear_plant.hpp"
 #include "upright/base/error.hpp"
-#include "upright/model/linear_plant.hpp"
 #include "whole_periods.hpp"
 
 namespace upright {

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "upright/model/linear_plant.hpp"
+#include "model/linear_plant.hpp"
 
 namespace upright {
 

@@ -5,9 +5,9 @@
 
 #include "control/filter_model.hpp"
 #include "delay_margin.hpp"
+#include "model/linear_plant.hpp"
 #include "uncertain_parameters.hpp"
 #include "upright/base/error.hpp"
-#include "upright/model/linear_plant.hpp"
 
 namespace upright {
 

@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "controllable_part.hpp"
+#include "model/linear_plant.hpp"
 #include "upright/control/velocity_estimator.hpp"
-#include "upright/model/linear_plant.hpp"
 #include "upright/model/plant.hpp"
 
 namespace upright {

@@ -9,9 +9,9 @@
 
 #include "base/parallel.hpp"
 #include "control/filter_model.hpp"
+#include "sim/loop/loop_run.hpp"
 #include "uncertain_parameters.hpp"
 #include "upright/control/model_parts.hpp"
-#include "upright/sim/loop/loop_run.hpp"
 
 namespace upright {
 

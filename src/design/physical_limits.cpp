@@ -5,8 +5,8 @@
 
 #include "delay_margin.hpp"
 #include "model/dense_algebra.hpp"
+#include "model/linear_plant.hpp"
 #include "upright/base/error.hpp"
-#include "upright/model/linear_plant.hpp"
 
 namespace upright {
 

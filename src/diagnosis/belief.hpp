@@ -3,7 +3,7 @@
 
 #include <Eigen/Core>
 
-#include "upright/estimation/fit.hpp"
+#include "estimation/fit.hpp"
 
 namespace upright {
 

@@ -4,9 +4,9 @@
 
 #include <vector>
 
+#include "estimation/fit.hpp"
 #include "search_budget.hpp"
 #include "selection_policy.hpp"
-#include "upright/estimation/fit.hpp"
 
 namespace upright {
 

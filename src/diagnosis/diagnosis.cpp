@@ -13,6 +13,7 @@
 #include "base_numbers.hpp"
 #include "detectable.hpp"
 #include "disturbance_null.hpp"
+#include "doubtful_scales.hpp"
 #include "estimation/coarse_record.hpp"
 #include "estimation/held_out.hpp"
 #include "estimation/smoother.hpp"
@@ -210,7 +211,11 @@ class Diagnostician {
   ResidualTests tests_of(const FitPoint& fitted, const Noise& noise) const {
     ResidualTests left = examine_fit(search_.all_data(), fitted, policy_, budget_);
     if (!left.structured) compare_held_out(search_, final_, noise, left);
-    if (!left.structured) flag_scale_at_bound(left);
+    if (left.structured) return left;
+    if (const auto impossible = sentence_on_impossible_scale(known_, all_found(), policy_.correction)) {
+      left.structured = true;
+      left.sentence = *impossible;
+    }
     return left;
   }
 
@@ -393,7 +398,8 @@ class Diagnostician {
     }
     std::stable_sort(result_.candidates.begin(), result_.candidates.end(),
                      [](const auto& a, const auto& b) { return a.evidence > b.evidence; });
-    note_doubtful_numbers();
+    for (const std::string& note : notes_on_doubtful_numbers(known_, all, policy_.correction))
+      result_.notes.push_back(note);
     beyond_sensors_ = tests.beyond_sensors;
     opened_ = open_effects(search_, final_, all);
     result_.detectable = detectable_sizes(search_, final_, opened_);
@@ -409,45 +415,6 @@ class Diagnostician {
     Hypothesis as_given = search_.fitted_separately({}, final_, &noise);
     search_.filter_held_out(as_given, noise);
     result_.residual_before = smooth_residuals(data_.held, as_given.held.point, policy_.location.walk);
-  }
-
-  /// A scale at the end of what it may be stands for something else.
-  void flag_scale_at_bound(ResidualTests& tests) const {
-    for (const std::size_t effect : all_found()) {
-      const auto [scale, parameter] = scale_of(effect);
-      if (parameter == nullptr) continue;
-      const EndOfRange end = end_of_range(scale, parameter->low, parameter->high, policy_.correction);
-      if (end == EndOfRange::none) continue;
-      tests.structured = true;
-      std::ostringstream text;
-      text.precision(3);
-      text << "it takes a " << kind_of(effect) << " of " << scale
-           << (end == EndOfRange::low ? " or less" : " or more")
-           << ", which cannot be: something else is missing";
-      tests.sentence = text.str();
-    }
-  }
-
-  /// A scale among what was fitted, and how far it may go; else none.
-  std::pair<double, const FreeParameter*> scale_of(std::size_t effect) const {
-    for (const FreeParameter& p : known_.free)
-      if (p.effect == effect && effect_registry()[effect].parameters[p.index].name == "scale")
-        return {known_.train.point.plant.find(effect)->values[p.index], &p};
-    return {1.0, nullptr};
-  }
-
-  /// Numbers of the plant file that are off by more than a data sheet is.
-  void note_doubtful_numbers() {
-    for (const std::size_t effect : all_found()) {
-      const double scale = scale_of(effect).first;
-      if (effect_registry()[effect].enters != Enters::parameter || !is_doubtful(scale, policy_.correction))
-        continue;
-      std::ostringstream text;
-      text.precision(3);
-      text << "check " << kind_of(effect) << " another way: " << scale
-           << " times what the plant file says is far off; what was found beside it is no more certain";
-      result_.notes.push_back(text.str());
-    }
   }
 
   std::vector<std::size_t> all_found() const {

@@ -3,8 +3,8 @@
 
 #include <string>
 
+#include "estimation/fit.hpp"
 #include "selection_policy.hpp"
-#include "upright/estimation/fit.hpp"
 
 namespace upright {
 

@@ -14,10 +14,10 @@
 #include <string>
 #include <vector>
 
+#include "estimation/fit.hpp"
 #include "selection_policy.hpp"
 #include "tails.hpp"
 #include "upright/diagnosis/diagnosis.hpp"
-#include "upright/estimation/fit.hpp"
 
 namespace upright {
 

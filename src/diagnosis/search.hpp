@@ -10,10 +10,10 @@
 #include "candidates.hpp"
 #include "decision.hpp"
 #include "effect_starts.hpp"
+#include "estimation/fit.hpp"
 #include "search_budget.hpp"
 #include "selection_policy.hpp"
 #include "upright/diagnosis/diagnosis.hpp"
-#include "upright/estimation/fit.hpp"
 
 namespace upright {
 

@@ -4,6 +4,7 @@
 
 #include <vector>
 
+#include "estimation/segments.hpp"
 #include "upright/diagnosis/diagnosis.hpp"
 
 namespace upright {

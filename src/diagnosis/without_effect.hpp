@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "upright/estimation/fit.hpp"
+#include "estimation/fit.hpp"
 
 namespace upright {
 

@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "upright/estimation/segments.hpp"
+#include "segments.hpp"
 #include "upright/model/plant.hpp"
 
 namespace upright {

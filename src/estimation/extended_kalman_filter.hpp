@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 
-#include "upright/estimation/linear_step.hpp"
+#include "linear_step.hpp"
 #include "upright/estimation/noise.hpp"
 #include "upright/measurement/measurement.hpp"
 #include "upright/model/plant.hpp"

@@ -1,4 +1,4 @@
-#include "upright/estimation/fit.hpp"
+#include "fit.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -12,7 +12,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "upright/estimation/fit.hpp"
+#include "fit.hpp"
 
 namespace upright {
 

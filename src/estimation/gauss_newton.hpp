@@ -5,8 +5,8 @@
 #include <optional>
 #include <vector>
 
+#include "fit.hpp"
 #include "linearisation.hpp"
-#include "upright/estimation/fit.hpp"
 
 namespace upright {
 

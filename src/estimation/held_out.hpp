@@ -4,7 +4,7 @@
 #include <array>
 #include <vector>
 
-#include "upright/estimation/segments.hpp"
+#include "segments.hpp"
 
 namespace upright {
 

@@ -7,8 +7,8 @@
 #include <utility>
 
 #include "base/parallel.hpp"
+#include "fit.hpp"
 #include "sensor_gains.hpp"
-#include "upright/estimation/fit.hpp"
 
 namespace upright {
 

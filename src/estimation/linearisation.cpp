@@ -9,11 +9,11 @@
 #include <cmath>
 #include <limits>
 
+#include "model/rigid_body.hpp"
 #include "segment_start.hpp"
 #include "sensor_gains.hpp"
 #include "state_vector.hpp"
 #include "upright/model/elementary.hpp"
-#include "upright/model/rigid_body.hpp"
 #include "upright/sim/simulator.hpp"
 
 namespace upright {

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "extended_kalman_filter.hpp"
-#include "upright/estimation/fit.hpp"
+#include "fit.hpp"
 
 namespace upright {
 

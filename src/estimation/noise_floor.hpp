@@ -1,7 +1,7 @@
 // The error of a plain simulation with the right model, caused by noise alone.
 #pragma once
 
-#include "upright/estimation/fit.hpp"
+#include "fit.hpp"
 
 namespace upright {
 

@@ -4,7 +4,7 @@
 
 #include <cstddef>
 
-#include "upright/estimation/segments.hpp"
+#include "segments.hpp"
 #include "upright/model/elementary.hpp"
 #include "upright/sim/simulator.hpp"
 

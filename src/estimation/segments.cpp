@@ -1,4 +1,4 @@
-#include "upright/estimation/segments.hpp"
+#include "segments.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -6,11 +6,11 @@
 #include <string>
 
 #include "base/parallel.hpp"
+#include "fit.hpp"
 #include "segment_start.hpp"
 #include "simulation_pieces.hpp"
 #include "upright/base/error.hpp"
 #include "upright/base/yaml_reader.hpp"
-#include "upright/estimation/fit.hpp"
 
 namespace upright {
 

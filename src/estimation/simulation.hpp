@@ -8,8 +8,8 @@
 #include <optional>
 #include <vector>
 
+#include "segments.hpp"
 #include "upright/control/controller.hpp"
-#include "upright/estimation/segments.hpp"
 #include "upright/measurement/measurement.hpp"
 #include "upright/model/plant.hpp"
 

@@ -5,7 +5,7 @@
 #include <array>
 #include <vector>
 
-#include "upright/estimation/fit.hpp"
+#include "fit.hpp"
 #include "upright/estimation/residual_trace.hpp"
 
 namespace upright {

@@ -3,7 +3,7 @@
 
 #include <array>
 
-#include "upright/estimation/linear_step.hpp"
+#include "linear_step.hpp"
 #include "upright/model/dynamics.hpp"
 
 namespace upright {

@@ -157,6 +157,7 @@ class TrialMaker {
 
 }  // namespace
 
+// Seven parameters: experiment.hpp says why.
 ExperimentResult run_experiment(const ExperimentSetup& setup, const std::vector<Piece>& pieces, Rig& rig,
                                 SimulatedRigWithHand* hand, Clock& clock, const SignalFlag& signal,
                                 const ExperimentOptions& options) {

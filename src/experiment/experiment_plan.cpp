@@ -6,7 +6,10 @@
 #include "base/number_text.hpp"
 #include "control/filter_model.hpp"
 #include "experiment.hpp"
+#include "record/run_log.hpp"
+#include "runtime/control_loop.hpp"
 #include "upright/base/error.hpp"
+#include "upright/control/controller.hpp"
 #include "upright/control/model_parts.hpp"
 #include "upright/model/plant_file.hpp"
 

@@ -4,8 +4,8 @@
 #include <cmath>
 
 #include "base/angle_units.hpp"
+#include "model/rigid_body.hpp"
 #include "upright/model/elementary.hpp"
-#include "upright/model/rigid_body.hpp"
 
 namespace upright {
 

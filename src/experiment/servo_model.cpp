@@ -1,6 +1,6 @@
 #include "servo_model.hpp"
 
-#include "upright/model/rigid_body.hpp"
+#include "model/rigid_body.hpp"
 
 namespace upright {
 

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "upright/model/rigid_body.hpp"
+#include "model/rigid_body.hpp"
 
 namespace upright {
 

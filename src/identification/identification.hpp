@@ -8,9 +8,9 @@
 #include <string>
 #include <vector>
 
+#include "estimation/fit.hpp"
 #include "force_balance.hpp"
 #include "upright/diagnosis/diagnosis.hpp"
-#include "upright/estimation/fit.hpp"
 
 namespace upright {
 

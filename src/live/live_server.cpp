@@ -24,8 +24,8 @@
 
 #include "base/palette.hpp"
 #include "http_connection.hpp"
+#include "runtime/realtime.hpp"
 #include "upright/base/error.hpp"
-#include "upright/runtime/realtime.hpp"
 
 namespace upright {
 

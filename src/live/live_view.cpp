@@ -10,7 +10,7 @@
 
 #include "live_feed.hpp"
 #include "live_server.hpp"
-#include "upright/runtime/realtime.hpp"
+#include "runtime/realtime.hpp"
 
 namespace upright {
 

@@ -10,8 +10,8 @@
 #include <string>
 
 #include "frame_maker.hpp"
+#include "record/run_log.hpp"
 #include "upright/hal/calibration.hpp"
-#include "upright/record/run_log.hpp"
 
 namespace upright {
 

@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "upright/record/run_log.hpp"
+#include "record/run_log.hpp"
 
 namespace upright {
 

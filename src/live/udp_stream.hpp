@@ -11,7 +11,7 @@
 #include <cstdint>
 #include <string>
 
-#include "upright/record/run_log.hpp"
+#include "record/run_log.hpp"
 
 namespace upright {
 

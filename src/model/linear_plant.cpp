@@ -1,4 +1,4 @@
-#include "upright/model/linear_plant.hpp"
+#include "linear_plant.hpp"
 
 #include <ceres/jet.h>
 

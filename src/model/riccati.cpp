@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <complex>
 
+#include "linear_plant.hpp"
 #include "upright/base/error.hpp"
-#include "upright/model/linear_plant.hpp"
 
 namespace upright {
 

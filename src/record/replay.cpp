@@ -5,6 +5,8 @@
 #include <string>
 #include <utility>
 
+#include "upright/control/controller.hpp"
+
 namespace upright {
 
 namespace {

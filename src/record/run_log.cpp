@@ -1,4 +1,4 @@
-#include "upright/record/run_log.hpp"
+#include "run_log.hpp"
 
 #include <fcntl.h>
 #include <pthread.h>

@@ -13,6 +13,7 @@
 #include "experiment/pieces/delay_sweep.hpp"
 #include "experiment/pieces/free_decay.hpp"
 #include "html.hpp"
+#include "model/linear_plant.hpp"
 #include "paired_report.hpp"
 #include "plot.hpp"
 #include "result_text.hpp"
@@ -22,7 +23,6 @@
 #include "upright/base/error.hpp"
 #include "upright/control/delay_line.hpp"
 #include "upright/control/model_parts.hpp"
-#include "upright/model/linear_plant.hpp"
 #include "upright/model/plant_file.hpp"
 
 namespace upright {

@@ -1,4 +1,4 @@
-#include "upright/runtime/control_loop.hpp"
+#include "control_loop.hpp"
 
 #include <algorithm>
 #include <cmath>

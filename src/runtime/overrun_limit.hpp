@@ -5,10 +5,10 @@
 #include <optional>
 #include <string>
 
+#include "control_loop.hpp"
 #include "design/delay_margin.hpp"
 #include "upright/control/gain_file.hpp"
 #include "upright/model/plant.hpp"
-#include "upright/runtime/control_loop.hpp"
 
 namespace upright {
 

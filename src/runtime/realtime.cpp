@@ -1,4 +1,4 @@
-#include "upright/runtime/realtime.hpp"
+#include "realtime.hpp"
 
 #include <pthread.h>
 #include <sched.h>

@@ -7,12 +7,17 @@
 #include <optional>
 #include <thread>
 
+#include "control_loop.hpp"
 #include "cpu_latency.hpp"
+#include "realtime.hpp"
+#include "record/run_log.hpp"
 #include "record/sign_record.hpp"
 #include "record/stop_report.hpp"
 #include "upright/base/error.hpp"
 #include "upright/base/yaml_reader.hpp"
+#include "upright/control/controller.hpp"
 #include "upright/model/plant_file.hpp"
+#include "zero_volts.hpp"
 
 namespace upright {
 

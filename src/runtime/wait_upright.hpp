@@ -4,11 +4,11 @@
 #include <cstdint>
 #include <functional>
 
+#include "control_loop.hpp"
 #include "upright/hal/calibration.hpp"
 #include "upright/hal/clock.hpp"
 #include "upright/hal/rig.hpp"
 #include "upright/hal/rig_file.hpp"
-#include "upright/runtime/control_loop.hpp"
 
 namespace upright {
 

@@ -1,4 +1,4 @@
-#include "upright/runtime/zero_volts.hpp"
+#include "zero_volts.hpp"
 
 #include <algorithm>
 

@@ -7,11 +7,11 @@
 #include <set>
 
 #include "design/delay_margin.hpp"
+#include "model/linear_plant.hpp"
 #include "sweep_journal.hpp"
 #include "sweep_stages.hpp"
 #include "upright/base/error.hpp"
 #include "upright/base/yaml_reader.hpp"
-#include "upright/model/linear_plant.hpp"
 
 namespace upright {
 

@@ -11,9 +11,9 @@
 #include <string>
 #include <vector>
 
+#include "sim/loop/loop_run.hpp"
 #include "uncertainty.hpp"
 #include "upright/model/plant.hpp"
-#include "upright/sim/loop/loop_run.hpp"
 
 namespace upright {
 

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "design/uncertain_plant.hpp"
-#include "upright/sim/loop/loop_run.hpp"
+#include "sim/loop/loop_run.hpp"
 
 namespace upright {
 

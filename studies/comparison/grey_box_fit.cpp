@@ -20,9 +20,9 @@
 #include <string>
 #include <vector>
 
+#include "estimation/fit.hpp"
 #include "estimation/segment_start.hpp"
 #include "upright/base/error.hpp"
-#include "upright/estimation/fit.hpp"
 #include "upright/model/plant_file.hpp"
 
 namespace {

@@ -9,6 +9,7 @@
 #include <numbers>
 #include <vector>
 
+#include "upright/control/controller.hpp"
 #include "upright/hal/simulated_rig.hpp"
 #include "upright/runtime/session.hpp"
 

@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "blind_case.hpp"
+#include "estimation/fit.hpp"
 #include "upright/diagnosis/diagnosis.hpp"
 
 namespace upright::blind {

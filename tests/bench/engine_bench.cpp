@@ -6,7 +6,7 @@
 
 #include "../property/engine_runs.hpp"
 #include "../unit/plants.hpp"
-#include "upright/sim/cvode_engine.hpp"
+#include "sim/cvode_engine.hpp"
 
 namespace upright {
 namespace {

@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "live/live_view.hpp"
+#include "runtime/realtime.hpp"
 #include "upright/hal/simulated_rig.hpp"
 #include "upright/model/plant_file.hpp"
 #include "upright/runtime/session.hpp"

@@ -4,8 +4,8 @@
 #include <boost/numeric/odeint.hpp>
 #include <cstdio>
 
+#include "sim/loop/loop_run.hpp"
 #include "sweep_bench.hpp"
-#include "upright/sim/loop/loop_run.hpp"
 
 namespace upright {
 

@@ -6,7 +6,7 @@
 
 #include "blind_run.hpp"
 #include "coloured_noise.hpp"
-#include "upright/sim/cvode_engine.hpp"
+#include "sim/cvode_engine.hpp"
 
 namespace upright::blind {
 

@@ -13,7 +13,7 @@
 #include <algorithm>
 #include <stdexcept>
 
-#include "upright/hal/modbus_registers.hpp"
+#include "hal/modbus/registers.hpp"
 #include "virtual_rig_process.hpp"
 
 namespace upright::test {

@@ -8,8 +8,8 @@
 #include <thread>
 
 #include "fake_device.hpp"
+#include "runtime/zero_volts.hpp"
 #include "upright/hal/rig_factory.hpp"
-#include "upright/runtime/zero_volts.hpp"
 #include "virtual_rig_process.hpp"
 
 namespace upright::test {

@@ -7,9 +7,12 @@
 
 #include "design/delay_margin.hpp"
 #include "design/gain_design.hpp"
+#include "model/linear_plant.hpp"
+#include "record/run_log.hpp"
+#include "runtime/control_loop.hpp"
 #include "upright/base/error.hpp"
+#include "upright/control/controller.hpp"
 #include "upright/hal/simulated_rig.hpp"
-#include "upright/model/linear_plant.hpp"
 #include "upright/model/plant_file.hpp"
 #include "upright/runtime/session.hpp"
 

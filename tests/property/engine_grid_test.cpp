@@ -6,7 +6,7 @@
 
 #include "../unit/plants.hpp"
 #include "engine_runs.hpp"
-#include "upright/sim/cvode_engine.hpp"
+#include "sim/cvode_engine.hpp"
 
 namespace upright {
 namespace {

@@ -13,9 +13,9 @@
 #include "control/filter_model.hpp"
 #include "design/estimator_design.hpp"
 #include "design/perturbed_plant.hpp"
+#include "sim/loop/loop_run.hpp"
 #include "upright/control/model_parts.hpp"
 #include "upright/model/plant_file.hpp"
-#include "upright/sim/loop/loop_run.hpp"
 
 namespace upright {
 namespace {

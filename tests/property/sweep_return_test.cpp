@@ -10,7 +10,10 @@
 
 #include "control/predictor.hpp"
 #include "experiment/experiment.hpp"
+#include "record/run_log.hpp"
+#include "runtime/control_loop.hpp"
 #include "upright/base/error.hpp"
+#include "upright/control/controller.hpp"
 #include "upright/model/plant_file.hpp"
 
 namespace upright {

@@ -6,7 +6,7 @@
 #include <limits>
 #include <random>
 
-#include "upright/hal/modbus_registers.hpp"
+#include "hal/modbus/registers.hpp"
 
 namespace upright {
 namespace {

@@ -8,12 +8,12 @@ import unittest
 SCRIPT = pathlib.Path(__file__).resolve().parents[2] / "scripts" / "check_sizes.py"
 
 
-def check(**files):
-    with tempfile.TemporaryDirectory() as folder:
-        root = pathlib.Path(folder)
-        (root / "tests").mkdir()
+def check(folder="tests", **files):
+    with tempfile.TemporaryDirectory() as temporary:
+        root = pathlib.Path(temporary)
+        (root / folder).mkdir()
         for name, text in files.items():
-            (root / "tests" / f"{name}.cpp").write_text(text)
+            (root / folder / f"{name}.cpp").write_text(text)
         done = subprocess.run([sys.executable, SCRIPT, "--root", root], capture_output=True, text=True)
         return done.returncode, done.stderr
 
@@ -32,6 +32,24 @@ class CheckSizes(unittest.TestCase):
             code, said = check(named=f"\n{kind}(Suite,\n     {'A' * 55}) {{}}\n")
             self.assertEqual(code, 1, kind)
             self.assertIn("tests/named.cpp:2: Suite.AAA", said)
+
+    def test_names_a_long_function_without_a_reason(self):
+        for head in ("int f() {\n", "namespace a {\n\nint f(int a,\n      int b) const {\n", "class A {\n public:\n  A() : b_(1) {\n"):
+            indent = "  " if "class" in head else ""
+            text = head + "  go();\n" * 60 + indent + "}\n"
+            code, said = check("src", long=text)
+            self.assertEqual(code, 1, head)
+            self.assertIn("more than 60: split it", said)
+        self.assertEqual(check("src", long="// Not split: one equation.\nint f() {\n" + "  go();\n" * 60 + "}\n"), (0, ""))
+        self.assertEqual(check("src", short="int f() {\n" + "  go();\n" * 58 + "}\n"), (0, ""))
+
+    def test_names_a_function_with_many_parameters_without_a_reason(self):
+        many = "int f(int a, std::pair<int, int> b, int c, int d, int e, int f, int g) {\n}\n"
+        code, said = check("src", many=many)
+        self.assertEqual(code, 1)
+        self.assertIn("src/many.cpp:1: f has 7 parameters", said)
+        self.assertEqual(check("src", many="/// Seven parameters: all are known.\n" + many), (0, ""))
+        self.assertEqual(check("src", few=many.replace("int a, ", "")), (0, ""))
 
 
 if __name__ == "__main__":

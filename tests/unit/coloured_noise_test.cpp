@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "blind_case.hpp"
-#include "upright/estimation/fit.hpp"
+#include "estimation/fit.hpp"
 
 namespace upright {
 namespace {

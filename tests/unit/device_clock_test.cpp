@@ -1,5 +1,5 @@
 // Which cycle a device's sample belongs to, and what is known of the device's clock.
-#include "upright/runtime/device_clock.hpp"
+#include "runtime/device_clock.hpp"
 
 #include <gtest/gtest.h>
 

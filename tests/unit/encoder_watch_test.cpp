@@ -1,4 +1,4 @@
-#include "upright/control/encoder_watch.hpp"
+#include "control/encoder_watch.hpp"
 
 #include <gtest/gtest.h>
 

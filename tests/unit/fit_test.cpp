@@ -1,5 +1,5 @@
 // The filter by which segments are followed, on data of the CVODE reference (tests/blind).
-#include "upright/estimation/fit.hpp"
+#include "estimation/fit.hpp"
 
 #include <gtest/gtest.h>
 

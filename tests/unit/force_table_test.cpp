@@ -6,10 +6,10 @@
 #include <cmath>
 #include <random>
 
+#include "model/linear_plant.hpp"
 #include "plants.hpp"
+#include "sim/cvode_engine.hpp"
 #include "upright/base/error.hpp"
-#include "upright/model/linear_plant.hpp"
-#include "upright/sim/cvode_engine.hpp"
 #include "upright/sim/simulator.hpp"
 
 namespace upright {

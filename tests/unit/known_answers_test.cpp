@@ -5,8 +5,8 @@
 #include <numbers>
 
 #include "plants.hpp"
+#include "sim/cvode_engine.hpp"
 #include "sim/loop/closed_loop.hpp"
-#include "upright/sim/cvode_engine.hpp"
 
 namespace upright {
 namespace {

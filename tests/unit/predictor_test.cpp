@@ -5,9 +5,9 @@
 #include <deque>
 #include <random>
 
+#include "model/linear_plant.hpp"
 #include "upright/base/error.hpp"
 #include "upright/control/controller.hpp"
-#include "upright/model/linear_plant.hpp"
 #include "upright/model/plant_file.hpp"
 #include "upright/sim/simulator.hpp"
 

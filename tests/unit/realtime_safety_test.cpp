@@ -20,12 +20,12 @@
 #include "counted_calls.hpp"
 #include "fake_comedi.hpp"
 #include "hal/virtual_rig.hpp"
+#include "runtime/control_loop.hpp"
 #include "tests/support/real_time.hpp"
 #include "upright/control/model_parts.hpp"
 #include "upright/hal/rig_factory.hpp"
 #include "upright/hal/simulated_rig.hpp"
 #include "upright/model/plant_file.hpp"
-#include "upright/runtime/control_loop.hpp"
 #include "upright/runtime/session.hpp"
 
 namespace upright {

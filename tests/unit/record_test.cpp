@@ -7,11 +7,11 @@
 #include <set>
 #include <string>
 
+#include "record/run_log.hpp"
 #include "temporary_folder.hpp"
 #include "upright/base/error.hpp"
 #include "upright/record/link_counts.hpp"
 #include "upright/record/run_directory.hpp"
-#include "upright/record/run_log.hpp"
 #include "upright/record/run_reader.hpp"
 #include "upright/record/timing_stats.hpp"
 

@@ -1,5 +1,5 @@
 // When the next cycle is due, and how it is waited for.
-#include "upright/runtime/sleep_policy.hpp"
+#include "runtime/sleep_policy.hpp"
 
 #include <gtest/gtest.h>
 

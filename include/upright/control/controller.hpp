@@ -10,7 +10,6 @@
 #include "upright/control/command_source.hpp"
 #include "upright/control/delay_line.hpp"
 #include "upright/control/gain_file.hpp"
-#include "upright/control/limiter.hpp"
 #include "upright/control/state.hpp"
 #include "upright/control/state_estimator.hpp"
 #include "upright/control/velocity_estimator.hpp"

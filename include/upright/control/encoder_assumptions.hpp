@@ -1,7 +1,8 @@
-// Bounds on motor, cart and pendulum that the encoder watch assumes. They come from the rig file (section
-// `encoder_watch`) or are derived from a plant file.
+// Bounds on motor, cart and pendulum that the encoder watch assumes, and the encoders that it may find stuck.
+// The bounds come from the rig file (section `encoder_watch`) or are derived from a plant file.
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
@@ -11,6 +12,9 @@
 namespace upright {
 
 class YamlKeys;
+
+/// Which encoder is stuck.
+enum class StuckEncoder : std::uint8_t { none, cart, pendulum };
 
 /// A lower and an upper bound of a quantity.
 struct Bounds {

@@ -8,11 +8,21 @@
 #include <string>
 #include <vector>
 
-#include "upright/estimation/fit.hpp"
-#include "upright/estimation/parameter_estimate.hpp"
+#include "upright/estimation/noise.hpp"
 #include "upright/estimation/residual_trace.hpp"
+#include "upright/measurement/measurement.hpp"
+#include "upright/model/plant.hpp"
 
 namespace upright {
+
+/// An estimated parameter of an effect, with its uncertainty.
+struct ParameterEstimate {
+  std::string name;    ///< as in plant files
+  std::string unit;    ///< of the value
+  double value = 0.0;  ///< the estimate
+  double low = 0.0;    ///< lower end of the 95 percent confidence interval
+  double high = 0.0;   ///< upper end
+};
 
 /// The name of an effect in plant files.
 std::string kind_of(std::size_t effect);

@@ -11,10 +11,7 @@
 #include "upright/base/yaml_reader.hpp"
 #include "upright/control/encoder_assumptions.hpp"
 #include "upright/hal/calibration.hpp"
-#include "upright/hal/comedi_wiring.hpp"
-#include "upright/hal/gpio.hpp"
-#include "upright/hal/modbus_registers.hpp"
-#include "upright/hal/quanser_wiring.hpp"
+#include "upright/hal/wiring.hpp"
 
 namespace upright {
 
@@ -51,63 +48,6 @@ struct SimulatedRig {
   double cart_noise_m = 0.0;     ///< standard deviation, before quantisation
   double theta_noise_rad = 0.0;  ///< standard deviation, before quantisation
   double timing_jitter_s = 0.0;  ///< standard deviation of the delay of readings
-};
-
-/// Of a serial line.
-enum class Parity : std::uint8_t { none, even, odd };
-
-/// Modbus functions that transfer counts and voltage.
-enum class ModbusExchange : std::uint8_t {
-  read_write,  ///< function 0x17 (holding registers only)
-  separate,    ///< 0x03 or 0x04 to read, 0x10 to write
-};
-
-/// A watchdog in the device: it switches the voltage off when no valid request came within its time.
-struct DeviceWatchdog {
-  int address = 0;                 ///< of the holding register
-  double time_s = 0.0;             ///< its time [s]
-  double seconds_per_count = 0.0;  ///< seconds per count of the register
-
-  int counts() const;  ///< its time as the register holds it
-};
-
-/// A device that samples on its own time: it answers a read of `sample_address` with its next sample.
-struct DeviceSampling {
-  int sample_address = 0;          ///< holding register: the sample's number
-  int period_address = 0;          ///< holding register: the time between samples; 0: none are taken
-  double seconds_per_count = 0.0;  ///< of that register
-
-  /// A period as the register holds it; absent: it cannot.
-  std::optional<int> counts(double period_s) const;
-};
-
-/// Section `modbus` of a rig file.
-struct ModbusRig {
-  std::string host;                 ///< modbus-tcp
-  int port = 502;                   ///< modbus-tcp
-  std::string device;               ///< modbus-rtu: the serial line
-  int baud = 0;                     ///< modbus-rtu
-  Parity parity = Parity::none;     ///< of the serial line
-  int stop_bits = 1;                ///< of the serial line, 1 or 2
-  int unit = 1;                     ///< address of the device
-  double response_timeout_s = 0.0;  ///< per exchange; the factory checks it against the period
-  ModbusExchange exchange = ModbusExchange::read_write;  ///< how counts and voltage are transferred
-  // The following keys are present as far as the device is used: no counters where only the voltage uses
-  // Modbus, no voltage where only the encoders do and `exchange` does not need one.
-  bool input_registers = false;  ///< counters are input registers (0x04)
-  int cart_address = 0;          ///< of the cart's counter
-  int pendulum_address = 0;      ///< of the pendulum's counter
-  CounterFormat counter;         ///< of both counters
-  int voltage_address = 0;       ///< of the voltage's holding register
-  VoltageFormat voltage;         ///< what the voltage's registers hold
-  /// False: the voltage registers do not read back as the output, so that a stop does not read them.
-  bool voltage_reads_back = true;
-  std::optional<int> enable_address;      ///< holding register: 1 enables the amplifier, 0 disables it
-  std::optional<int> boot_count_address;  ///< same table as the counters: changes when the device restarts
-  /// Same table as the counters: why the device has stopped the motor itself, see fault_in_status().
-  std::optional<int> status_address;
-  std::optional<DeviceWatchdog> watchdog;  ///< absent: the device has none
-  std::optional<DeviceSampling> sampling;  ///< absent: the loop follows the computer's clock
 };
 
 /// The section of a backend that has no own member in RigFile.

@@ -1,7 +1,9 @@
-// One row of samples.csv, filled in by the loop.
+// One row of samples.csv, filled in by the loop, and who may watch the rows.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <span>
 #include <string_view>
 
 namespace upright {
@@ -50,6 +52,18 @@ struct LogRecord {
   std::int64_t write_ns = 0;         ///< how long writing took [ns]
   std::uint32_t flags = 0;           ///< bits of row_flag
   std::uint64_t sequence = 0;        ///< sequence number of the rig's readings
+};
+
+/// Rows that may wait for the disk, unless a session says otherwise.
+inline constexpr std::size_t default_log_queue_rows = 16384;
+
+/// Receives the rows before they are written. Called by the writing thread, which it must not delay: no
+/// lock, no waiting.
+class RowWatcher {
+ public:
+  virtual ~RowWatcher() = default;
+  /// Called by the writer thread. It must not wait.
+  virtual void see(std::span<const LogRecord> rows) noexcept = 0;
 };
 
 }  // namespace upright

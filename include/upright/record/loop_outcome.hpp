@@ -5,9 +5,8 @@
 #include <optional>
 #include <string>
 
-#include "upright/control/encoder_watch.hpp"
+#include "upright/control/encoder_assumptions.hpp"
 #include "upright/hal/rig.hpp"
-#include "upright/record/device_timing.hpp"
 #include "upright/record/link_counts.hpp"
 #include "upright/record/timing_stats.hpp"
 

@@ -6,7 +6,8 @@
 #include <optional>
 
 #include "upright/base/progress.hpp"
-#include "upright/control/controller.hpp"
+#include "upright/control/command_source.hpp"
+#include "upright/control/state_estimator.hpp"
 #include "upright/record/run_reader.hpp"
 
 namespace upright {

@@ -10,7 +10,7 @@
 #include "upright/hal/rig_file.hpp"
 #include "upright/model/plant.hpp"
 #include "upright/record/loop_outcome.hpp"
-#include "upright/record/realtime_grant.hpp"
+#include "upright/record/realtime_settings.hpp"
 
 namespace upright {
 

@@ -1,17 +1,20 @@
 // A complete run: run directory, log, loop thread, outcome.
 #pragma once
 
-#include <atomic>
+#include <cstddef>
+#include <cstdint>
 #include <filesystem>
 #include <functional>
-#include <memory>
+#include <optional>
 
+#include "upright/control/command_source.hpp"
+#include "upright/control/state_estimator.hpp"
 #include "upright/hal/clock.hpp"
 #include "upright/hal/rig.hpp"
+#include "upright/record/log_record.hpp"
+#include "upright/record/realtime_settings.hpp"
 #include "upright/record/run_directory.hpp"
-#include "upright/runtime/control_loop.hpp"
-#include "upright/runtime/realtime.hpp"
-#include "upright/runtime/zero_volts.hpp"
+#include "upright/runtime/live_status.hpp"
 
 namespace upright {
 
@@ -36,11 +39,11 @@ LoopLimits rig_limits(const RigFile& rig, const std::optional<Plant>& plant);
 
 /// What a session adds to its setup.
 struct SessionOptions {
-  std::filesystem::path out = "runs";                         ///< parent folder of run directories
-  RealtimeRequest realtime;                                   ///< ignored in virtual time
-  ModelParts parts;                                           ///< of the control step (`make_model_parts`)
-  std::size_t log_queue_rows = RunLog::Options{}.queue_rows;  ///< rows that may wait for the disk
-  CommandSource* source = nullptr;                            ///< null: balance. It must outlive the session.
+  std::filesystem::path out = "runs";                   ///< parent folder of run directories
+  RealtimeRequest realtime;                             ///< ignored in virtual time
+  ModelParts parts;                                     ///< of the control step (`make_model_parts`)
+  std::size_t log_queue_rows = default_log_queue_rows;  ///< rows that may wait for the disk
+  CommandSource* source = nullptr;                      ///< null: balance. It must outlive the session.
   RowWatcher* watcher = nullptr;  ///< of the log's rows; null: none. It must outlive the session.
   /// Called about five times per second by the calling thread while the loop runs; may be empty.
   std::function<void(const LiveStatus&)> show;

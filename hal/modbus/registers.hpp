@@ -6,31 +6,9 @@
 #include <span>
 
 #include "upright/hal/rig.hpp"
+#include "upright/hal/wiring.hpp"
 
 namespace upright {
-
-/// Which of two registers has the upper half.
-enum class WordOrder : std::uint8_t { high_first, low_first };
-/// How a voltage is written into registers.
-enum class VoltageEncoding : std::uint8_t { int16, int32, float32 };
-
-/// A counter: one register (16 bits) or two (32 bits).
-struct CounterFormat {
-  int registers = 2;                             ///< 1 or 2, of 16 bits
-  WordOrder word_order = WordOrder::high_first;  ///< of two registers
-};
-
-/// The voltage: int16 (one register), int32 or float32 (two). Integers hold volts times `counts_per_v`.
-struct VoltageFormat {
-  VoltageEncoding encoding = VoltageEncoding::int16;  ///< what the registers hold
-  WordOrder word_order = WordOrder::high_first;       ///< of two registers
-  double counts_per_v = 1.0;                          ///< of a whole number [1/V]
-
-  /// How many registers it takes.
-  int registers() const noexcept { return encoding == VoltageEncoding::int16 ? 1 : 2; }
-  /// The largest voltage that the format can represent.
-  double largest_v() const noexcept;
-};
 
 /// Counts from registers, as an unsigned number.
 std::int64_t decode_counter(std::span<const std::uint16_t> registers, const CounterFormat& format) noexcept;

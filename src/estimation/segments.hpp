@@ -4,8 +4,8 @@
 #include <cstddef>
 #include <vector>
 
-#include "upright/estimation/work_bound.hpp"
 #include "upright/measurement/measurement.hpp"
+#include "work_bound.hpp"
 
 namespace upright {
 

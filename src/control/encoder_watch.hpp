@@ -18,9 +18,6 @@
 
 namespace upright {
 
-/// Which encoder is stuck.
-enum class StuckEncoder : std::uint8_t { none, cart, pendulum };
-
 /// One period with fresh counts, in which the loop balances.
 struct WatchedPeriod {
   std::uint64_t tick = 0;            ///< number of the period

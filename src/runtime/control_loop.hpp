@@ -2,36 +2,20 @@
 // simulated. It follows the computer's clock, or that of a rig whose device is the clock.
 #pragma once
 
-#include <atomic>
 #include <cstdint>
 
+#include "control/encoder_watch.hpp"
+#include "device_clock.hpp"
+#include "record/run_log.hpp"
+#include "sleep_policy.hpp"
 #include "upright/control/controller.hpp"
-#include "upright/control/encoder_watch.hpp"
 #include "upright/hal/calibration.hpp"
 #include "upright/hal/clock.hpp"
 #include "upright/hal/rig.hpp"
 #include "upright/record/loop_outcome.hpp"
-#include "upright/record/run_log.hpp"
-#include "upright/runtime/device_clock.hpp"
-#include "upright/runtime/sleep_policy.hpp"
+#include "upright/runtime/live_status.hpp"
 
 namespace upright {
-
-/// The latest values of the loop, for display. The loop writes each field separately; others read it.
-struct LiveStatus {
-  std::atomic<double> time_s{0.0};         ///< since the start
-  std::atomic<double> cart_m{0.0};         ///< position of the cart
-  std::atomic<double> theta_rad{0.0};      ///< angle of the pendulum
-  std::atomic<double> voltage_v{0.0};      ///< after the limiter
-  std::atomic<double> worst_late_us{0.0};  ///< latest wake-up so far
-  std::atomic<bool> running{false};        ///< between start and stop
-  std::atomic<bool> balancing{false};      ///< the state feedback acts
-};
-
-/// Set by a signal handler to the signal's number, otherwise 0. The stop button of the live page sets
-/// `stop_button_pressed`.
-using SignalFlag = std::atomic<int>;
-inline constexpr int stop_button_pressed = -1;  ///< the value of a SignalFlag that is no signal
 
 /// Runs for the given number of periods or until a safety stop. The rig must be open. On return its stop
 /// has begun (`LoopOutcome::stop`); the caller waits for its completion. The last row of a safety stop

@@ -2,18 +2,10 @@
 #pragma once
 
 #include <cstdint>
-#include <optional>
 
-#include "upright/record/realtime_grant.hpp"
+#include "upright/record/realtime_settings.hpp"
 
 namespace upright {
-
-/// What is asked of the kernel.
-struct RealtimeRequest {
-  int priority = 80;  ///< of SCHED_FIFO
-  int cpu = -1;       ///< processor for the thread; -1: the last one allowed, when there are several
-  std::optional<double> spin_us;  ///< replaces the rig file's spin_us
-};
 
 /// Requests SCHED_FIFO, a processor and locked memory for the calling thread, pre-faults its stack, and
 /// reports what was not granted. Never fails.

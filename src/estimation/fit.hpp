@@ -14,9 +14,9 @@
 #include <optional>
 #include <vector>
 
-#include "upright/estimation/linear_step.hpp"
+#include "linear_step.hpp"
+#include "segments.hpp"
 #include "upright/estimation/noise.hpp"
-#include "upright/estimation/segments.hpp"
 #include "upright/model/dynamics.hpp"
 #include "upright/model/plant.hpp"
 

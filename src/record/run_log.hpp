@@ -48,15 +48,6 @@ class RowMemory final : public RowSink {
   std::vector<LogRecord> rows_;
 };
 
-/// Receives the rows before they are written. Called by the writing thread, which it must not delay: no
-/// lock, no waiting.
-class RowWatcher {
- public:
-  virtual ~RowWatcher() = default;
-  /// Called by the writer thread. It must not wait.
-  virtual void see(std::span<const LogRecord> rows) noexcept = 0;
-};
-
 /// Changes that other programs have made to a log's file while it was written.
 enum class LogFileState : std::uint8_t {
   in_place,
@@ -71,7 +62,7 @@ class RunLog final : public RowSink {
  public:
   /// Sizes of the log.
   struct Options {
-    std::size_t queue_rows = 16384;  ///< rows that may wait for the disk
+    std::size_t queue_rows = default_log_queue_rows;  ///< rows that may wait for the disk
     /// False: sync only at the end (virtual time, where only the simulation could be lost).
     bool sync_while_running = true;
     RowWatcher* watcher = nullptr;  ///< null: none. It must outlive the log.

@@ -4,9 +4,9 @@
 #include <algorithm>
 #include <cstdint>
 
+#include "sleep_policy.hpp"
 #include "upright/hal/rig.hpp"
-#include "upright/record/device_timing.hpp"
-#include "upright/runtime/sleep_policy.hpp"
+#include "upright/record/timing_stats.hpp"
 
 namespace upright {
 
