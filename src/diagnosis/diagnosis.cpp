@@ -25,6 +25,7 @@
 #include "place_null.hpp"
 #include "plant_scale.hpp"
 #include "plausibility.hpp"
+#include "quick.hpp"
 #include "reproducibility.hpp"
 #include "search.hpp"
 #include "stepwise_selection.hpp"
@@ -310,9 +311,15 @@ class Diagnostician {
     for (;;) {
       options_.tell(0.93, "comparing parts of the data");
       reproductions_ = reproduce(search_, known_, all_found());
-      if (options_.quick && withdraw_doubtful()) {
-        left = settle();
-        continue;
+      if (options_.quick) {
+        const std::vector<std::size_t> doubtful = doubtful_effects(reproductions_, search_);
+        for (const std::size_t effect : doubtful)
+          if (!withdrawn_.contains(effect))
+            withdraw(effect, "not certain enough for a quick diagnosis: repeat it without --quick");
+        if (!doubtful.empty()) {
+          left = settle();
+          continue;
+        }
       }
       const Reproduction* worst = nullptr;
       for (const Reproduction& r : reproductions_)
@@ -330,17 +337,6 @@ class Diagnostician {
       }
       left = settle();
     }
-  }
-
-  /// Of the effects that the plant file lacks those that are not beyond doubt go. Whether one went.
-  bool withdraw_doubtful() {
-    std::vector<std::size_t> doubtful;
-    for (const Reproduction& r : reproductions_)
-      if (!search_.is_nuisance(r.effect) && !is_beyond_doubt(r, policy_)) doubtful.push_back(r.effect);
-    for (const std::size_t effect : doubtful)
-      if (!withdrawn_.contains(effect))
-        withdraw(effect, "not certain enough for a quick diagnosis: repeat it without --quick");
-    return !doubtful.empty();
   }
 
   void withdraw(std::size_t effect, const std::string& where) {
@@ -572,22 +568,6 @@ void look_further(const Plant& plant, const std::vector<Measurement>& runs, cons
   }
 }
 
-/// Of thinned runs: one search, and only what is beyond doubt.
-Diagnosis diagnose_quickly(const Plant& plant, const std::vector<Measurement>& runs,
-                           const DiagnosisOptions& options) {
-  const std::vector<Measurement> thinned = coarse_runs(runs, plant, quick_budget().quick_period_s);
-  Diagnostician only(plant, thinned, options, HeldOut::middle);
-  Diagnosis diagnosis = only.run();
-  diagnosis.work_samples = only.work_samples();
-  diagnosis.not_examined = {"samples less than 10 ms apart",
-                            "effects that are not beyond doubt",
-                            "pairs of effects that hide each other",
-                            "effects that these data do not distinguish",
-                            "other held-out runs",
-                            "curves of what is left"};
-  return diagnosis;
-}
-
 }  // namespace
 
 Diagnosis diagnose(const Plant& plant, const std::vector<Measurement>& runs,
@@ -602,11 +582,16 @@ Diagnosis diagnose(const Plant& plant, const std::vector<Measurement>& runs,
     throw ConfigError(
         "the runs contain only theta_rad, and the model has no pendulum: add the pendulum to the plant file");
   const InterruptibleWork watch(options.signal);
-  if (options.quick) return diagnose_quickly(plant, runs, options);
-  Diagnostician first(plant, runs, options, HeldOut::middle);
+  std::vector<Measurement> thinned;
+  if (options.quick) thinned = coarse_runs(runs, plant, quick_budget().quick_period_s);
+  const std::vector<Measurement>& used = options.quick ? thinned : runs;
+  Diagnostician first(plant, used, options, HeldOut::middle);
   std::optional<Diagnostician> second;
   Diagnosis diagnosis = first.run();
-  look_further(plant, runs, options, first, second, diagnosis);
+  if (options.quick)
+    diagnosis.not_examined = not_examined_quickly();
+  else
+    look_further(plant, runs, options, first, second, diagnosis);
   diagnosis.work_samples = first.work_samples() + (second ? second->work_samples() : 0.0);
   return diagnosis;
 }

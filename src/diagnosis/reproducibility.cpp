@@ -246,9 +246,16 @@ double white_evidence(const Reproduction& reproduction) {
   return sum;
 }
 
-bool is_beyond_doubt(const Reproduction& reproduction, const SelectionPolicy& policy) {
-  return std::isfinite(reproduction.t_value) && reproduction.t_value > policy.reproducibility.min_t &&
-         white_evidence(reproduction) > policy.acceptance.overwhelming_evidence;
+std::vector<std::size_t> doubtful_effects(const std::vector<Reproduction>& reproductions,
+                                          const Search& search) {
+  const SelectionPolicy& policy = search.policy();
+  std::vector<std::size_t> doubtful;
+  for (const Reproduction& r : reproductions) {
+    const bool borne_out = std::isfinite(r.t_value) && r.t_value > policy.reproducibility.min_t;
+    const bool certain = borne_out && white_evidence(r) > policy.acceptance.overwhelming_evidence;
+    if (!certain && !search.is_nuisance(r.effect)) doubtful.push_back(r.effect);
+  }
+  return doubtful;
 }
 
 bool is_contradicted(const Reproduction& reproduction, const ReproducibilityPolicy& policy) {

@@ -169,7 +169,9 @@ void expect_quick_derivatives(double lag_s) {
                                    &PlantState<Jet>::cart_mps, &PlantState<Jet>::theta_radps}) {
     EXPECT_NEAR((full.*of).a, (quick.*of).a, 1e-10);
     const double largest = (full.*of).v.cwiseAbs().maxCoeff();
-    for (int i = 0; i < 8; ++i) EXPECT_NEAR((full.*of).v[i], (quick.*of).v[i], 1e-3 * largest) << i;
+    // The voltage of a lagging motor counts with its mean over a step.
+    const double share = lag_s > 0.0 ? 2e-3 : 1e-3;
+    for (int i = 0; i < 8; ++i) EXPECT_NEAR((full.*of).v[i], (quick.*of).v[i], share * largest) << i;
   }
 }
 
