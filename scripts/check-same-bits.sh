@@ -2,7 +2,7 @@
 # Checks that results do not depend on the processor. Builds the program for x86-64, x86-64-v3 (AVX2) and x86-64-v4
 # (AVX-512) and compares byte for byte: logs of `run --fast`, each log replayed by the other builds, and docs/paper.md
 # with its figures. A build that this processor cannot run is reported and not compared.
-#   scripts/check-same-bits.sh [FOLDER]     FOLDER keeps builds and results (default: build/same-bits)
+#   scripts/check-same-bits.sh [FOLDER]     FOLDER keeps the results, FOLDER-ARCH the builds (default: build/same-bits)
 # UPRIGHT_SKIP_PAPER=1 skips the paper, which takes most of the time.
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -11,11 +11,12 @@ folder=${1:-build/same-bits}
 mkdir -p "$folder/results"
 folder=$(realpath "$folder")
 programs=()
+# The builds are as deep as build/ci: ccache then has most of their objects from it.
 for arch in x86-64 x86-64-v3 x86-64-v4; do
-  cmake --preset ci -B "$folder/$arch" -DUPRIGHT_WIDE_ARCH=$arch -DBUILD_TESTING=OFF \
+  cmake --preset ci -B "$folder-$arch" -DUPRIGHT_WIDE_ARCH=$arch -DBUILD_TESTING=OFF \
     -DCMAKE_CXX_COMPILER_LAUNCHER="$(command -v ccache || true)" >/dev/null
-  CCACHE_BASEDIR=$PWD CCACHE_NOHASHDIR=1 cmake --build "$folder/$arch" --target upright -- -v >"$folder/$arch.log" ||
-    { tail -n 30 "$folder/$arch.log" >&2; exit 1; }
+  CCACHE_BASEDIR=$PWD CCACHE_NOHASHDIR=1 cmake --build "$folder-$arch" --target upright -- -v >"$folder-$arch.log" ||
+    { tail -n 30 "$folder-$arch.log" >&2; exit 1; }
   if /lib64/ld-linux-x86-64.so.2 --help | grep -q "^  $arch (supported" || [ "$arch" = x86-64 ]; then
     programs+=("$arch")
   else
@@ -35,7 +36,7 @@ run() {
     for gain in config/gains/*.yaml; do
       out=$folder/results/$2/$plant-$(basename "$gain" .yaml)
       # A run that falls also has a log (exit code 3).
-      env $3 "$folder/$1/src/cli/upright" run --fast --duration 20 --theta0-deg 2 --seed 5 --rig "$folder/rig-$plant.yaml" \
+      env $3 "$folder-$1/src/cli/upright" run --fast --duration 20 --theta0-deg 2 --seed 5 --rig "$folder/rig-$plant.yaml" \
         --gains "$gain" --out "$out" >/dev/null || [ $? = 3 ]
     done
   done
@@ -49,7 +50,7 @@ for other in "${programs[@]:1}" older-libm; do
     name=$(basename "$run")
     cmp "$run"/*/samples.csv "$folder/results/$other/$name"/*/samples.csv || different=1
     # Replay the log of one build with the other.
-    program=$folder/$other/src/cli/upright
+    program=$folder-$other/src/cli/upright
     [ -x "$program" ] || continue
     "$program" replay "$run"/* >/dev/null || { echo "$other cannot replay $run" >&2; different=1; }
   done
@@ -59,7 +60,7 @@ echo "logs compared: $runs runs each of ${programs[*]} and with an older libm"
 
 if [ -z "${UPRIGHT_SKIP_PAPER:-}" ]; then
   for arch in "${programs[@]}"; do
-    "$folder/$arch/src/cli/upright" paper --config config --out "$folder/paper-$arch" --overwrite >/dev/null
+    "$folder-$arch/src/cli/upright" paper --config config --out "$folder/paper-$arch" --overwrite >/dev/null
     diff -r "$folder/paper-$first" "$folder/paper-$arch" || different=1
   done
   echo "paper compared: ${programs[*]}"

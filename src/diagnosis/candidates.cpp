@@ -141,16 +141,34 @@ std::vector<FreeParameter> free_parameters(std::size_t effect, const DataRange& 
   return free;
 }
 
+namespace {
+
+/// Names of one and the same force, the one that supposes least first.
+constexpr std::array<std::string_view, 3> one_force = {"constant_force", "friction_asymmetry",
+                                                       "voltage_offset"};
+
+std::size_t place_among_one_force(std::size_t effect) {
+  const auto place = std::find(one_force.begin(), one_force.end(), effect_registry()[effect].kind);
+  return static_cast<std::size_t>(place - one_force.begin());
+}
+
+}  // namespace
+
 bool is_plainer(std::size_t a, std::size_t b) {
-  const auto one_force = [](std::size_t effect) {
-    const std::array<std::string_view, 3> names = {"constant_force", "friction_asymmetry", "voltage_offset"};
-    return std::find(names.begin(), names.end(), effect_registry()[effect].kind) - names.begin();
-  };
   const std::size_t parameters_a = effect_registry()[a].parameters.size();
   const std::size_t parameters_b = effect_registry()[b].parameters.size();
   if (parameters_a != parameters_b) return parameters_a < parameters_b;
-  if (one_force(a) < 3 && one_force(b) < 3) return one_force(a) < one_force(b);
+  const std::size_t place_a = place_among_one_force(a), place_b = place_among_one_force(b);
+  if (std::max(place_a, place_b) < one_force.size()) return place_a < place_b;
   return a < b;
+}
+
+std::vector<std::size_t> same_force_as(std::size_t effect) {
+  std::vector<std::size_t> others;
+  if (place_among_one_force(effect) == one_force.size()) return others;
+  for (const std::string_view kind : one_force)
+    if (effect_number(kind) != effect) others.push_back(effect_number(kind));
+  return others;
 }
 
 std::vector<FreeParameter> correction_parameters(const Plant& plant, std::size_t effect,

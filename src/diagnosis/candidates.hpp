@@ -49,6 +49,9 @@ std::vector<std::size_t> candidate_effects(const Plant& plant, const DataRange& 
 /// the same force (docs/reference/effects.md) the one that supposes least; else the one registered first.
 bool is_plainer(std::size_t a, std::size_t b);
 
+/// The other names of one and the same force (docs/reference/effects.md); empty for an effect that has none.
+std::vector<std::size_t> same_force_as(std::size_t effect);
+
 /// Parameter values from which to search for an effect; several where the misfit has several valleys.
 /// `force_residual` pairs of (x, residual force) point at the pitch of periodic forces.
 std::vector<std::vector<double>> search_starts(std::size_t effect, const DataRange& range,

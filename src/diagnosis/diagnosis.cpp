@@ -27,9 +27,11 @@
 #include "plausibility.hpp"
 #include "quick.hpp"
 #include "reproducibility.hpp"
+#include "run_differences.hpp"
 #include "search.hpp"
 #include "stepwise_selection.hpp"
 #include "upright/base/error.hpp"
+#include "verdict.hpp"
 
 namespace upright {
 
@@ -125,11 +127,16 @@ class Diagnostician {
     scale_gaps(diagnosis, floor_ / floor);
     for (FoundEffect& found : diagnosis.effects)
       if (force.moved(found.effect)) found.parameters = estimates_of(found.effect, force.known);
+    // The curve may account for all of one.
+    std::erase_if(diagnosis.effects, [&](const FoundEffect& found) {
+      const double neutral = effect_registry()[found.effect].parameters[0].neutral;
+      return !found.parameters.empty() && found.parameters[0].value == neutral;
+    });
     diagnosis.effects.push_back(force.as_effect(named / floor, force.held_out_error / floor));
     diagnosis.gap_after = diagnosis.effects.back().gap_after;
     diagnosis.verdict = Verdict::described;
-    std::vector<std::size_t> listed = all_found();
-    listed.push_back(diagnosis.effects.back().effect);
+    std::vector<std::size_t> listed;
+    for (const FoundEffect& found : diagnosis.effects) listed.push_back(found.effect);
     diagnosis.model = model_with(plant_, force.known.train.point.plant, search_.nuisances(), listed);
     diagnosis.numbers = moved_numbers(plant_, diagnosis.model, search_.range(), policy_.prior);
     diagnosis.noise = force.known.train.point.noise;
@@ -327,6 +334,11 @@ class Diagnostician {
           worst = &r;
       if (worst != nullptr) {
         withdraw(worst->effect, worst->where);
+      } else if (const RunDifference* differs = most_different_between_runs()) {
+        withdraw(differs->effect, sentence_on(*differs, runs_));
+        result_.helps_here_only.back().by_run = differs->sizes;
+        selection_.exclude(same_force_as(differs->effect));
+        selection_.find_again();
       } else if (const auto outdone = outdone_by_disturbance(search_, known_, final_, reproductions_)) {
         withdraw(outdone->effect, outdone->where);
       } else {
@@ -339,9 +351,21 @@ class Diagnostician {
     }
   }
 
+  /// Of the effects that need not help on a further run, the one whose sizes differ most certainly; else
+  /// null.
+  const RunDifference* most_different_between_runs() {
+    differences_ = run_differences(search_, known_, all_found());
+    const RunDifference* most = nullptr;
+    for (const RunDifference& difference : differences_)
+      if (is_of_single_runs(difference, policy_.reproducibility) &&
+          (most == nullptr || difference.certainty > most->certainty))
+        most = &difference;
+    return most;
+  }
+
   void withdraw(std::size_t effect, const std::string& where) {
     for (const std::size_t gone : selection_.withdraw(effect)) {
-      LocalEffect local{gone, estimates_of(gone, known_), where, {}};
+      LocalEffect local{gone, estimates_of(gone, known_), where, {}, {}};
       if (gone != effect) local.where = "it cannot be without " + kind_of(effect);
       for (const Reproduction& r : reproductions_)
         if (r.effect == gone) local.shown_on = r.runs;
@@ -376,6 +400,8 @@ class Diagnostician {
           found.shown_on = r.runs;
           found.shows_most = r.shows_most;
         }
+      for (const RunDifference& difference : differences_)
+        if (difference.effect == row.effect) found.by_run = difference.sizes;
       result_.effects.push_back(found);
     }
     result_.gap_after = listing_.after / floor_;
@@ -420,44 +446,15 @@ class Diagnostician {
   }
 
   void decide(const ResidualTests& tests) {
-    const bool clear_gap = result_.gap_after > policy_.power.clear_gap;
     const std::vector<Detectable> hidden = may_hide(result_.detectable, plant_, policy_.power);
-    result_.verdict = verdict_of(tests.structured, clear_gap, !hidden.empty());
-    if (result_.verdict == Verdict::not_excited) note_power(clear_gap, hidden);
-    decided_ = true;
-  }
-
-  /// `structured`: what is left is more than noise. `clear_gap`: held-out data are clearly further off than
-  /// noise. `may_hide`: usual friction would not have been shown.
-  Verdict verdict_of(bool structured, bool clear_gap, bool may_hide) const {
-    if (structured) return Verdict::unexplained;
-    const bool found = !result_.effects.empty();
-    if (found || !result_.numbers.empty()) {
-      if (!clear_gap || closes_excess()) return Verdict::explained;
-      if (found) return Verdict::unexplained;
+    const VerdictGrounds grounds{tests.structured, result_.gap_after > policy_.power.clear_gap,
+                                 !hidden.empty(), moves_enough(runs_, policy_.excitation)};
+    result_.verdict = verdict_of(result_, grounds, policy_.power);
+    if (result_.verdict == Verdict::not_excited) {
+      const std::string reason = why_not_excited(result_, grounds, hidden);
+      if (!reason.empty()) result_.notes.push_back(reason);
     }
-    if (!result_.helps_here_only.empty()) return Verdict::unexplained;
-    const bool shows_nothing = clear_gap || may_hide || !moves_enough(runs_, policy_.excitation);
-    return shows_nothing ? Verdict::not_excited : Verdict::no_discrepancy;
-  }
-
-  /// Whether what was found closes most of what the plant file as given has above the noise floor.
-  bool closes_excess() const {
-    const double before = result_.gap_before - 1.0, after = result_.gap_after - 1.0;
-    return after < (1.0 - policy_.power.min_share_closed) * before;
-  }
-
-  /// Why data in which nothing is found do not show that nothing is missing.
-  void note_power(bool clear_gap, const std::vector<Detectable>& hidden) {
-    std::ostringstream text;
-    text.precision(2);
-    if (clear_gap)
-      text << "the fitted runs leave the numbers of the plant file so open that held-out data are "
-           << result_.gap_after << " times as far off as noise: record longer runs";
-    const std::string could_hide = sentence_on_hidden(hidden);
-    if (clear_gap && !could_hide.empty()) text << "; ";
-    text << could_hide;
-    if (!text.str().empty()) result_.notes.push_back(text.str());
+    decided_ = true;
   }
 
   /// Other effects that do as well in the place of one that was found: from sensitivities, or fitted where an
@@ -535,6 +532,7 @@ class Diagnostician {
   std::vector<std::size_t> corrections_;
   std::set<std::size_t> withdrawn_;  ///< found, and not named
   std::vector<Reproduction> reproductions_;
+  std::vector<RunDifference> differences_;
   Listing listing_;
   std::vector<OpenedEffect> opened_;
 };

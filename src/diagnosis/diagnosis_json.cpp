@@ -39,6 +39,7 @@ json trial_json(const Trial& trial) {
           {"held_out", number(trial.held)},
           {"t", number(trial.t_value)},
           {"standard_errors", number(trial.certainty)},
+          {"dispersion", number(trial.dispersion)},
           {"parameters", parameters_json(trial.parameters)},
           {"noise", noise_json(trial.noise)},
           {"rule", trial.rule},
@@ -76,6 +77,18 @@ json shown_on_json(const Diagnosis& diagnosis, const std::vector<RunEvidence>& s
   return runs;
 }
 
+json by_run_json(const Diagnosis& diagnosis, std::size_t effect, const std::vector<RunSize>& sizes) {
+  const ParameterInfo& size = effect_registry()[effect].parameters[0];
+  json runs = json::array();
+  for (const RunSize& of : sizes)
+    runs.push_back({{"run", run_name(diagnosis, of.run)},
+                    {"parameter", std::string(size.name)},
+                    {"unit", std::string(size.unit)},
+                    {"value", number(of.value)},
+                    {"ci95", {number(of.low), number(of.high)}}});
+  return runs;
+}
+
 json shows_most_json(const Diagnosis& diagnosis, const FoundEffect& effect) {
   if (effect.shown_on.empty()) return nullptr;
   const ShownStretch& most = effect.shows_most;
@@ -89,7 +102,8 @@ json local_json(const Diagnosis& diagnosis, const LocalEffect& effect) {
   return {{"kind", kind_of(effect.effect)},
           {"parameters", parameters_json(effect.parameters)},
           {"where", effect.where},
-          {"shown_on", shown_on_json(diagnosis, effect.shown_on)}};
+          {"shown_on", shown_on_json(diagnosis, effect.shown_on)},
+          {"by_run", by_run_json(diagnosis, effect.effect, effect.by_run)}};
 }
 
 json detectable_json(const Detectable& d) {
@@ -156,6 +170,7 @@ json effect_json(const Diagnosis& diagnosis, const FoundEffect& effect) {
                    {"next_best", next_best_json(next_best(diagnosis, effect))},
                    {"where", effect.where},
                    {"shown_on", shown_on_json(diagnosis, effect.shown_on)},
+                   {"by_run", by_run_json(diagnosis, effect.effect, effect.by_run)},
                    {"shows_most", shows_most_json(diagnosis, effect)}};
   if (const auto curve = described_curve(effect)) document["curve"] = curve_json(*curve);
   return document;

@@ -4,6 +4,7 @@
 
 #include "estimation/coarse_record.hpp"
 #include "estimation/held_out.hpp"
+#include "without_effect.hpp"
 
 namespace upright {
 
@@ -14,6 +15,15 @@ FitData coarse(const FitData& data, const std::vector<Measurement>& runs) {
 }
 
 }  // namespace
+
+Hypothesis Search::refitted(const Hypothesis& other) {
+  const FitPoint start{plant_, train_starts_, other.train.point.noise};
+  Hypothesis h =
+      fitted(other.added, with_fitted_initial_states(train_, moved_to(start, other.train.point.plant)),
+             FitOptions{}, other.free);
+  predict_held_out(h);
+  return h;
+}
 
 Exploration::Exploration(const Search& search, const DiagnosisOptions& options)
     : runs_(coarse_runs(*search.train_data().runs, search.given(), search.budget().exploration_period_s)),

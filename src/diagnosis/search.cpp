@@ -54,7 +54,27 @@ double t_of(const std::vector<double>& values) {
 
 }  // namespace
 
-Improvement compare(const Hypothesis& simpler, const Hypothesis& richer) {
+/// Minus twice the log of likelihood and priors if the data count `dispersion` times less than the likelihood
+/// says. The parameters are where that is least: a step from the fit, in which they count in full.
+double tempered_objective(const Hypothesis& h, double dispersion) {
+  const double likelihood = minus_log_likelihood(h.train) / dispersion;
+  const auto n = static_cast<Eigen::Index>(h.free.size());
+  if (n == 0) return likelihood;
+  Eigen::VectorXd prior(n), off(n);
+  for (Eigen::Index j = 0; j < n; ++j) {
+    const FreeParameter& p = h.free[static_cast<std::size_t>(j)];
+    prior[j] = p.prior_sigma > 0.0 ? 1.0 / (p.prior_sigma * p.prior_sigma) : 0.0;
+    off[j] = h.train.point.plant.find(p.effect)->values[p.index] - p.prior_mean;
+  }
+  const Eigen::VectorXd pull = prior.cwiseProduct(off);
+  Eigen::MatrixXd information = h.train.information / dispersion;
+  information.diagonal() += (1.0 - 1.0 / dispersion) * prior;
+  const double share = 1.0 - 1.0 / dispersion;
+  return likelihood + off.dot(pull) -
+         share * share * pull.dot(Eigen::VectorXd(solve_symmetric(information, pull)));
+}
+
+Improvement compare(const Hypothesis& simpler, const Hypothesis& richer, double dispersion) {
   Improvement result;
   if (!std::isfinite(richer.train.objective)) return {-infinity, -infinity, -infinity, -infinity};
   std::vector<double> falls;
@@ -62,11 +82,16 @@ Improvement compare(const Hypothesis& simpler, const Hypothesis& richer) {
       std::min(simpler.train.block_objective.size(), richer.train.block_objective.size());
   for (std::size_t b = 0; b < blocks; ++b)
     falls.push_back(simpler.train.block_objective[b] - richer.train.block_objective[b]);
-  result.train = simpler.train.objective - richer.train.objective;
-  result.prior = std::accumulate(falls.begin(), falls.end(), result.train, std::minus<>());
-  result.held = simpler.negative_log_predictive_density - richer.negative_log_predictive_density;
+  result.train = tempered_objective(simpler, dispersion) - tempered_objective(richer, dispersion);
+  result.prior = result.train - std::accumulate(falls.begin(), falls.end(), 0.0) / dispersion;
+  result.held =
+      (simpler.negative_log_predictive_density - richer.negative_log_predictive_density) / dispersion;
   result.t_value = t_of(falls);
   return result;
+}
+
+Improvement compare(const Hypothesis& simpler, const Hypothesis& richer) {
+  return compare(simpler, richer, std::max(richer.train.dispersion, 1.0));
 }
 
 std::vector<ParameterEstimate> estimates_of(std::size_t effect, const Hypothesis& h) {
@@ -432,15 +457,6 @@ Hypothesis Search::exchanged(const Hypothesis& base, std::size_t effect,
     plant.set(other.number, other.values);
   }
   Hypothesis h = fitted(added, moved_to(base.train.point, plant), FitOptions{}, free_of(added));
-  predict_held_out(h);
-  return h;
-}
-
-Hypothesis Search::refitted(const Hypothesis& other) {
-  const FitPoint start{plant_, train_starts_, other.train.point.noise};
-  Hypothesis h =
-      fitted(other.added, with_fitted_initial_states(train_, moved_to(start, other.train.point.plant)),
-             FitOptions{}, other.free);
   predict_held_out(h);
   return h;
 }

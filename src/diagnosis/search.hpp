@@ -37,7 +37,9 @@ struct Hypothesis {
   std::optional<FreeRunSimulation> simulation;  ///< once measured
 };
 
-/// How much better the richer one is.
+/// How much better the richer one is, if the data count `dispersion` times less than the likelihood says.
+Improvement compare(const Hypothesis& simpler, const Hypothesis& richer, double dispersion);
+/// The same with the dispersion that the richer one leaves.
 Improvement compare(const Hypothesis& simpler, const Hypothesis& richer);
 
 /// What a hypothesis says about one effect, as numbers with intervals.

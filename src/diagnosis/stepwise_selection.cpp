@@ -63,6 +63,11 @@ bool StepwiseSelection::find_thoroughly(bool certainly_missing) {
   return true;
 }
 
+void StepwiseSelection::find_again() {
+  select_forward(3 * budget_.max_rounds, 4 * budget_.max_rounds, false);
+  eliminate_backward();
+}
+
 std::vector<std::size_t> StepwiseSelection::withdraw(std::size_t effect) {
   std::vector<std::size_t> gone = {effect};
   if (is_found(effect)) {
@@ -249,6 +254,7 @@ void StepwiseSelection::record_trial(int round, std::size_t effect, const Hypoth
   trial.t_value = improvement.t_value;
   trial.certainty = search_.certainty(h, effect);
   trial.noise = h.train.point.noise;
+  trial.dispersion = h.train.dispersion;
   if (std::isfinite(h.train.objective)) trial.parameters = estimates_of(effect, h);
   record_.trials.push_back(trial);
 }
@@ -333,7 +339,8 @@ std::vector<StepwiseSelection::Finalist> StepwiseSelection::fit_finalists(
 }
 
 Decision StepwiseSelection::try_finalist(int round, bool with_low_noise, Finalist& finalist) {
-  auto& [effect, h, score] = finalist;
+  const std::size_t effect = finalist.effect;
+  Hypothesis& h = finalist.hypothesis;
   search_.refine(current_, h);
   if (round == 0) search_.simulate(h);
   if (round == 0) {
@@ -349,18 +356,22 @@ Decision StepwiseSelection::try_finalist(int round, bool with_low_noise, Finalis
   record_trial(round, effect, h, e.improvement);
   const Decision decision = decided(e, h, effect);
   record_.trials.back().rule = name_of(decision.rule);
-  const bool as_first_seen = decision.rule == Rule::held_out_in_doubt;
-  score = (as_first_seen ? e.improvement : compare(current_, h)).train - penalty_of(effect);
   return decision;
 }
 
 std::size_t StepwiseSelection::choose(std::vector<Finalist>& accepted) {
-  const auto largest = [&] {
-    double score = -std::numeric_limits<double>::infinity();
-    for (const Finalist& b : accepted) score = std::max(score, b.score);
-    return score;
+  // The data count as much as the best of them leaves room for.
+  const auto rate = [&] {
+    double dispersion = std::numeric_limits<double>::infinity();
+    for (const Finalist& b : accepted) dispersion = std::min(dispersion, b.hypothesis.train.dispersion);
+    double largest = -std::numeric_limits<double>::infinity();
+    for (Finalist& b : accepted) {
+      b.score = compare(current_, b.hypothesis, dispersion).train - penalty_of(b.effect);
+      largest = std::max(largest, b.score);
+    }
+    return largest;
   };
-  const double to_reach = (1.0 - policy_.acceptance.close_score_share) * largest();
+  const double to_reach = (1.0 - policy_.acceptance.close_score_share) * rate();
   if (std::count_if(accepted.begin(), accepted.end(), [&](const Finalist& b) { return b.score > to_reach; }) >
       1)
     for (Finalist& b : accepted) {
@@ -368,11 +379,9 @@ std::size_t StepwiseSelection::choose(std::vector<Finalist>& accepted) {
       options_.tell(0.8, "completing the fit of " + kind_of(b.effect));
       Hypothesis further = b.hypothesis;
       search_.refine(b.hypothesis, further);
-      const double gain = b.hypothesis.train.objective - further.train.objective;
-      if (!(gain > 0.0)) continue;
-      b.hypothesis = std::move(further);
-      b.score += gain;
+      if (further.train.objective < b.hypothesis.train.objective) b.hypothesis = std::move(further);
     }
+  rate();
   std::vector<Contender> contenders;
   contenders.reserve(accepted.size());
   for (const Finalist& b : accepted)

@@ -45,6 +45,11 @@ class StepwiseSelection {
   /// This, or the exploration where it had found more when the search ended.
   const StepwiseSelection& latest() const;
 
+  /// After something was taken out for good: looks for what can stand in its place.
+  void find_again();
+  /// No candidate from now on.
+  void exclude(const std::vector<std::size_t>& effects) { withdrawn_.insert(effects.begin(), effects.end()); }
+
   /// Takes an effect out, for good, and before it what cannot be without it. What went.
   std::vector<std::size_t> withdraw(std::size_t effect);
 

@@ -80,6 +80,7 @@ FitResult result_of(const GaussNewton& solver, const std::vector<FreeParameter>&
   if (free.empty()) return result;
   const GaussNewton::Information information = solver.information();
   result.information = information.total;
+  result.dispersion = dispersion(information.total - solver.prior().information(), information.scatter);
   result.covariance = sandwich_covariance(information.total, information.scatter,
                                           solver.prior().information(), at_bounds(result.point.plant, free));
   if (!std::isfinite(result.objective)) return result;

@@ -61,8 +61,10 @@ struct FitResult {
   std::vector<double> segment_samples;     ///< number of residuals in that sum, weighted
   Eigen::MatrixXd covariance;   ///< of the free parameters, robust to coloured noise (sandwich estimator)
   Eigen::MatrixXd information;  ///< of the free parameters, initial states eliminated
-  bool converged = false;       ///< false: the iterations were used up
-  double work_samples = 0.0;    ///< number of samples processed, counting repetitions
+  /// Variance of the scores of segments relative to what the likelihood says: 1 if the noise is as modelled.
+  double dispersion = 1.0;
+  bool converged = false;     ///< false: the iterations were used up
+  double work_samples = 0.0;  ///< number of samples processed, counting repetitions
 };
 
 /// A joint Gaussian prior of all free parameters, in their order.

@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "base/parallel.hpp"
+#include "parameter_equations.hpp"
 #include "state_vector.hpp"
 
 namespace upright {
@@ -211,18 +212,37 @@ GaussNewton::ReducedEquations GaussNewton::eliminate_initial_states(double dampi
   return reduced;
 }
 
+namespace {
+
+ParameterEquations without_initial_state(const NormalEquations& n, Eigen::Index np) {
+  Matrix hii = n.information.topLeftCorner(state_count, state_count);
+  for (int i = 0; i < state_count; ++i) hii(i, i) += start_information[i];
+  const Matrix back = Eigen::LDLT<Matrix>(hii).solve(n.information.topRightCorner(state_count, np));
+  return {n.information.bottomRightCorner(np, np) - n.information.bottomLeftCorner(np, state_count) * back,
+          n.score.tail(np) - back.transpose() * n.score.head(state_count)};
+}
+
+}  // namespace
+
+std::vector<ParameterEquations> parameter_equations(const FitData& data, const FitPoint& point,
+                                                    const std::vector<FreeParameter>& free) {
+  const auto np = static_cast<Eigen::Index>(free.size());
+  std::vector<ParameterEquations> equations(data.segments.size());
+  parallel_for(data.segments.size(), [&](std::size_t s) {
+    LinearisedSegment at;
+    linearise_segment(data, s, point, free, at.steps, &at.normal);
+    equations[s] = without_initial_state(at.normal, np);
+  });
+  return equations;
+}
+
 GaussNewton::Information GaussNewton::information() const {
   const auto np = static_cast<Eigen::Index>(free_.size());
   Matrix h = prior_.information(), spread = Matrix::Zero(np, np);
   for (const LinearisedSegment& segment : linearised_) {
-    const NormalEquations& n = segment.normal;
-    Matrix hii = n.information.topLeftCorner(state_count, state_count);
-    for (int i = 0; i < state_count; ++i) hii(i, i) += start_information[i];
-    const Eigen::LDLT<Matrix> solver(hii);
-    const Matrix back = solver.solve(n.information.topRightCorner(state_count, np));
-    h += n.information.bottomRightCorner(np, np) - n.information.bottomLeftCorner(np, state_count) * back;
-    const Eigen::VectorXd score = n.score.tail(np) - back.transpose() * n.score.head(state_count);
-    spread += score * score.transpose();
+    const ParameterEquations reduced = without_initial_state(segment.normal, np);
+    h += reduced.information;
+    spread += reduced.score * reduced.score.transpose();
   }
   const auto segments = static_cast<double>(linearised_.size());
   const double small_sample = segments > np + 1.0 ? segments / (segments - 1.0) : 2.0;

@@ -2,7 +2,9 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
+#include <algorithm>
 #include <cmath>
+
 namespace upright {
 
 namespace {
@@ -54,6 +56,21 @@ Matrix sandwich_covariance(const Matrix& information, const Matrix& spread, cons
                            const std::vector<bool>& held) {
   const Matrix inverse = inverse_of(without_held(information, held));
   return inverse * (robust_spread(information - prior, spread) + prior) * inverse;
+}
+
+double dispersion(const Matrix& information, const Matrix& spread) {
+  const Eigen::VectorXd scale =
+      information.diagonal().unaryExpr([](double v) { return v > 1e-200 ? 1.0 / std::sqrt(v) : 0.0; });
+  const Eigen::SelfAdjointEigenSolver<Matrix> solver(scale.asDiagonal() * information * scale.asDiagonal());
+  constexpr double min_eigenvalue = 1e-9;
+  double sum = 0.0, directions = 0.0;
+  for (Eigen::Index i = 0; i < solver.eigenvalues().size(); ++i) {
+    if (!(solver.eigenvalues()[i] > min_eigenvalue)) continue;
+    const Eigen::VectorXd way = scale.cwiseProduct(solver.eigenvectors().col(i));
+    sum += way.dot(spread * way) / solver.eigenvalues()[i];
+    directions += 1.0;
+  }
+  return directions > 0.0 ? std::max(sum / directions, 1.0) : 1.0;
 }
 
 }  // namespace upright

@@ -13,4 +13,10 @@ namespace upright {
 Eigen::MatrixXd sandwich_covariance(const Eigen::MatrixXd& information, const Eigen::MatrixXd& spread,
                                     const Eigen::MatrixXd& prior, const std::vector<bool>& held);
 
+/// The scatter of the scores over segments relative to the information of the likelihood: the mean of
+/// tr(H^-1 B) over the directions that hold information (the variance inflation factor of quasi-likelihood,
+/// Wedderburn 1974). About 1 if the noise is as modelled; larger if it lasts or depends on the state. At
+/// least 1.
+double dispersion(const Eigen::MatrixXd& information, const Eigen::MatrixXd& spread);
+
 }  // namespace upright

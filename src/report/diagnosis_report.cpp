@@ -178,6 +178,23 @@ void add_local(HtmlPage& page, const json& d) {
   page.table(table);
 }
 
+/// Whether what was found is the same in every run.
+void add_by_run(HtmlPage& page, const json& d) {
+  HtmlTable table{
+      {"effect", "parameter", "run", "value", "from", "to", "unit"},
+      {},
+      "Each size is estimated for the run by itself, with everything else common to all runs (95 % "
+      "intervals)."};
+  for (const json& effect : d.at("effects"))
+    for (const json& of : effect.value("by_run", json::array()))
+      table.rows.push_back({effect.at("kind"), of.at("parameter"), of.at("run"),
+                            number_text(number(of.at("value"))), number_text(number(of.at("ci95").at(0))),
+                            number_text(number(of.at("ci95").at(1))), of.at("unit")});
+  if (table.rows.empty()) return;
+  page.section("Effects in each run");
+  page.table(table);
+}
+
 void add_numbers(HtmlPage& page, const json& d) {
   const json numbers = d.value("numbers", json::array());
   if (numbers.empty()) return;
@@ -479,6 +496,7 @@ std::filesystem::path write_diagnosis_report(const std::filesystem::path& folder
     add_answer(page, d, diagnosis);
     add_gap(page, d);
     add_effects(page, d);
+    add_by_run(page, d);
     add_local(page, d);
     add_numbers(page, d);
     add_validation(page, d);

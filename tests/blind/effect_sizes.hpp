@@ -1,7 +1,7 @@
 // How large an effect is that is hidden in a rig.
 //
 // Sizes are set by the plant's own forces in these runs, not by what a diagnosis finds: a run of the believed
-// plant gives the motor's force, speed, travel and swing (root mean square of the liveliest run), and an
+// plant gives the motor's force, speed, travel and swing (root mean square of the run with the largest), and an
 // effect takes a share of them: 3, 10 or 25 percent of the motor's force for what acts on the cart; 1, 3 or
 // 10 percent of gravity's torque for what acts in the pivot; 3, 10 or 25 percent of the plant's time constant
 // for delays.
@@ -25,7 +25,7 @@ inline double pick(Size size, double weak, double typical, double strong) {
   return size == Size::weak ? weak : size == Size::typical ? typical : strong;
 }
 
-/// What moves in the runs of the believed plant: root mean square of the liveliest run.
+/// What moves in the runs of the believed plant: root mean square of the run with the largest.
 struct Scales {
   double force_n = 0.0, volts = 0.0, high_volts = 0.0;
   double speed_mps = 0.0, travel_m = 0.0, center_m = 0.0;

@@ -59,12 +59,12 @@ void count(const char* kind, const Excused& excused) {
 }
 
 /// Waits until half a second has passed without a stall, because stalls come in groups.
-void await_calm() {
-  constexpr auto calm = std::chrono::milliseconds(500);
+void await_no_stall() {
+  constexpr auto quiet = std::chrono::milliseconds(500);
   constexpr int max_waits = 20;
   for (int i = 0; i < max_waits; ++i) {
     const Since begin;
-    std::this_thread::sleep_for(calm);
+    std::this_thread::sleep_for(quiet);
     if (!detector().stall_in(begin.until_now())) return;
   }
 }
@@ -104,7 +104,7 @@ bool in_real_time(const std::function<void()>& attempt) {
       return false;
     }
     count("retry", *excused);
-    await_calm();
+    await_no_stall();
   }
 }
 

@@ -60,6 +60,17 @@ TEST(ColouredNoise, ExplainsAColouredForceBetterThanWhiteNoise) {
   EXPECT_LT(fitted(runs, true).objective, fitted(runs, false).objective - 100.0);
 }
 
+TEST(ColouredNoise, DispersesTheScoresOfAFitWithWhiteNoise) {
+  double white = 0.0, coloured = 0.0;
+  for (const std::uint64_t seed : {4, 5, 6}) {
+    const std::vector<Measurement> runs = disturbed_run(30.0, seed);
+    white += fitted(runs, false).dispersion / 3.0;
+    coloured += fitted(runs, true).dispersion / 3.0;
+  }
+  EXPECT_GT(white, 1.5 * coloured);
+  EXPECT_LT(coloured, 1.6);
+}
+
 TEST(ColouredNoise, IsNothingWhereOnlyTheEncoderRounds) {
   blind::Plan plan;
   plan.experiment = blind::Experiment::multisine;

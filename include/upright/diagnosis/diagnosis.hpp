@@ -49,6 +49,14 @@ struct ShownStretch {
   double evidence = 0.0;  ///< of the effect there
 };
 
+/// The size of an effect in one run, with all else common to all runs.
+struct RunSize {
+  std::size_t run = 0;  ///< its place among the runs
+  double value = 0.0;   ///< of the effect's first parameter
+  double low = 0.0;     ///< lower end of the 95 percent confidence interval
+  double high = 0.0;    ///< upper end
+};
+
 /// An effect that the data require.
 struct FoundEffect {
   std::size_t effect = 0;                     ///< number in the registry
@@ -60,6 +68,7 @@ struct FoundEffect {
   std::string where;                  ///< where in time and state the disagreement is, in words
   std::vector<RunEvidence> shown_on;  ///< by run; empty if it was not measured
   ShownStretch shows_most;            ///< the 0.2 s that show it most
+  std::vector<RunSize> by_run;        ///< its size in each run; empty for one run
 };
 
 /// An effect that helps a part of the data only, so that it is not named.
@@ -68,6 +77,7 @@ struct LocalEffect {
   std::vector<ParameterEstimate> parameters;  ///< fitted to all runs
   std::string where;                          ///< where it holds and where not
   std::vector<RunEvidence> shown_on;          ///< each run fitted with its own part of the data
+  std::vector<RunSize> by_run;                ///< its size in each run, if that is why it is not named
 };
 
 /// The smallest size of an effect that the data would have shown.
@@ -119,6 +129,7 @@ struct Trial {
   double held = 0.0;                          ///< the same on held-out runs
   double t_value = 0.0;                       ///< of the reduction per quarter of a second
   double certainty = 0.0;                     ///< distance of its size from zero effect [standard errors]
+  double dispersion = 1.0;                    ///< of the fit (FitResult::dispersion)
   Noise noise;                                ///< estimated together with the effect
   std::vector<ParameterEstimate> parameters;  ///< values of this fit
   std::string rule = "undecided";             ///< the deciding rule, see docs/reference/diagnosis-rules.md

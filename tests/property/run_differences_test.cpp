@@ -1,0 +1,77 @@
+// An effect whose size differs from run to run is listed as such, and one that all runs share is named.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "named_effects.hpp"
+
+namespace upright {
+namespace {
+
+/// A run of a cart with Coulomb friction of 0.4 N and this constant force.
+Measurement run_with_force(double force_n, unsigned number) {
+  blind::Rig rig{.plant = cart_with_friction()};
+  rig.plant.set("constant_force", {force_n});
+  blind::Plan plan;
+  plan.experiment = number % 2 == 1 ? blind::Experiment::square : blind::Experiment::multisine;
+  plan.rate_hz = 200.0;
+  plan.duration_s = 8.0;
+  plan.seed = 500 + number;
+  return measure(rig, plan, "run" + std::to_string(number));
+}
+
+std::vector<Measurement> runs_with_forces(const std::vector<double>& forces_n) {
+  std::vector<Measurement> runs;
+  for (const double force_n : forces_n)
+    runs.push_back(run_with_force(force_n, static_cast<unsigned>(runs.size())));
+  return runs;
+}
+
+const LocalEffect* local(const Diagnosis& d, const std::string& kind) {
+  for (const LocalEffect& effect : d.helps_here_only)
+    if (kind_of(effect.effect) == kind) return &effect;
+  return nullptr;
+}
+
+/// The constant force, whichever of its names stands for it.
+const FoundEffect* constant_force(const Diagnosis& d) {
+  for (const FoundEffect& effect : d.effects)
+    for (const char* kind : {"constant_force", "friction_asymmetry", "voltage_offset"})
+      if (kind_of(effect.effect) == kind) return &effect;
+  return nullptr;
+}
+
+TEST(RunDifferences, AForceOfTheRunIsNotNamed) {
+  const std::vector<double> forces_n = {0.30, 0.15, 0.02, 0.25};
+  const Diagnosis d = diagnose(cart_with_friction(), runs_with_forces(forces_n));
+  EXPECT_EQ(constant_force(d), nullptr);
+  const LocalEffect* force = local(d, "constant_force");
+  ASSERT_NE(force, nullptr);
+  ASSERT_EQ(force->by_run.size(), forces_n.size());
+  for (std::size_t r = 0; r < forces_n.size(); ++r) {
+    EXPECT_EQ(force->by_run[r].run, r);
+    EXPECT_NEAR(force->by_run[r].value, forces_n[r], 0.01) << r;
+  }
+  EXPECT_NE(force->where.find("differs from run to run"), std::string::npos) << force->where;
+  EXPECT_EQ(d.model.find("constant_force"), nullptr);
+}
+
+TEST(RunDifferences, AForceOfTheRigIsNamed) {
+  const Diagnosis d = diagnose(cart_with_friction(), runs_with_forces({0.2, 0.2, 0.2}));
+  const FoundEffect* force = constant_force(d);
+  ASSERT_NE(force, nullptr);
+  ASSERT_EQ(force->by_run.size(), 3u);
+  std::size_t holds = 0;
+  for (const RunSize& of : force->by_run) holds += of.low < 0.2 && 0.2 < of.high ? 1 : 0;
+  EXPECT_GE(holds, 2u);
+}
+
+TEST(RunDifferences, AForceThatVariesALittleIsNamed) {
+  const Diagnosis d = diagnose(cart_with_friction(), runs_with_forces({0.20, 0.22, 0.21}));
+  const FoundEffect* force = constant_force(d);
+  ASSERT_NE(force, nullptr);
+  EXPECT_NEAR(std::abs(force->parameters[0].value), 0.21, 0.015);
+}
+
+}  // namespace
+}  // namespace upright
