@@ -39,12 +39,6 @@ class ColouredNull {
   Hypothesis with_;
 };
 
-double white_evidence(const Reproduction& reproduction) {
-  double sum = 0.0;
-  for (const RunEvidence& run : reproduction.runs) sum += run.evidence;
-  return sum;
-}
-
 }  // namespace
 
 std::optional<std::size_t> outdone_by_coloured_noise(const Search& search, const Hypothesis& known,

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <memory>
 #include <set>
 #include <sstream>
 #include <tuple>
@@ -12,8 +13,11 @@
 #include "base_numbers.hpp"
 #include "detectable.hpp"
 #include "disturbance_null.hpp"
+#include "doubtful_scales.hpp"
+#include "estimation/coarse_record.hpp"
 #include "estimation/held_out.hpp"
 #include "estimation/smoother.hpp"
+#include "exploration.hpp"
 #include "force_description.hpp"
 #include "indistinguishable.hpp"
 #include "listing.hpp"
@@ -21,6 +25,7 @@
 #include "place_null.hpp"
 #include "plant_scale.hpp"
 #include "plausibility.hpp"
+#include "quick.hpp"
 #include "reproducibility.hpp"
 #include "run_differences.hpp"
 #include "search.hpp"
@@ -37,23 +42,27 @@ class Diagnostician {
   Diagnostician(const Plant& plant, const std::vector<Measurement>& runs, const DiagnosisOptions& options,
                 HeldOut which)
       : policy_(policy_for(plant)),
+        budget_(options.quick ? quick_budget() : SearchBudget{}),
         plant_(plant),
         runs_(runs),
         options_(options),
         data_(checked(split(runs, which, policy_.excitation.arm_m, policy_.excitation.speed_window_s))),
-        work_samples_(options.search_bound * samples_of(data_)),
+        work_samples_(options.search_bound * (sample_count(data_.train) + sample_count(data_.held))),
         bound_(work_samples_),
         search_(plant_, runs_, bounded(data_.train), bounded(data_.held), policy_, budget_),
-        selection_(search_, options, result_) {}
+        selection_(search_, options, result_),
+        exploration_(options.quick ? nullptr : Exploration::of(search_, options)) {
+    if (exploration_) selection_.explore_with(exploration_->selection(), exploration_->sample_ratio());
+  }
 
-  Diagnosis run() {
+  /// `only_missing`: the answer counts only if an effect was found that the plant file lacks.
+  Diagnosis run(bool only_missing = false) {
     try {
       selection_.begin();
       selection_.find();
       ResidualTests left = settle();
-      if (left.structured && selection_.renew_initial_states()) left = settle();
-      if (left.structured && selection_.find_pairs_of_all()) left = settle();
-      if (left.beyond_sensors && selection_.find_thoroughly(left.structured)) left = settle();
+      if (!options_.quick) left = search_further(left);
+      if (only_missing && !found_missing_effect()) return std::move(result_);
       conclude(beside_coloured_noise(without_local_effects(left)));
     } catch (const Interrupted&) {
       result_.interrupted = true;
@@ -86,6 +95,8 @@ class Diagnostician {
       diagnosis.bound_reached = true;
     }
   }
+  /// That all fits processed.
+  double work_samples() const { return bound_.counted_samples(); }
   /// Whether an effect was found that the plant file lacks, not only numbers of it that are off.
   bool found_missing_effect() const {
     return std::any_of(selection_.found().begin(), selection_.found().end(),
@@ -133,13 +144,6 @@ class Diagnostician {
     diagnosis.residual_after = smooth_residuals(data_.held, force.judged.held.point, policy_.location.walk);
   }
 
-  static double samples_of(const DataSplit& data) {
-    double samples = 0.0;
-    for (const FitData* part : {&data.train, &data.held})
-      for (const Segment& s : part->segments) samples += static_cast<double>(s.last - s.first + 1);
-    return samples;
-  }
-
   /// After the bound ended the search: what it found is examined as if it had ended by itself, within a bound
   /// of its own.
   void examine_at_bound() {
@@ -147,6 +151,7 @@ class Diagnostician {
     if (decided_) return;
     bound_.grant(budget_.examination_share * work_samples_);
     try {
+      selection_.adopt_unfinished();
       conclude(beside_coloured_noise(without_local_effects(settle())));
     } catch (const Interrupted&) {
       result_.interrupted = true;
@@ -158,25 +163,26 @@ class Diagnostician {
   /// What a search that was given up has found, unexamined: nothing is claimed of it.
   void report_so_far() {
     constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
-    const Hypothesis& h = selection_.current();
+    const StepwiseSelection& latest = selection_.latest();
+    const Hypothesis& h = latest.current();
     const auto known_gap = [&](const Hypothesis& of) { return of.simulation ? of.simulation->gap : unknown; };
     note_runs();
     result_.examined = false;
-    for (const std::size_t effect : selection_.found()) {
+    for (const std::size_t effect : latest.found()) {
       FoundEffect found;
       found.effect = effect;
       found.gap_before = found.gap_after = unknown;
       found.parameters = estimates_of(effect, h);
-      found.where = selection_.where(effect);
+      found.where = latest.where(effect);
       result_.effects.push_back(found);
     }
     for (CandidateScore& candidate : result_.candidates) candidate.gap_after = unknown;
-    result_.gap_before = known_gap(selection_.given());
+    result_.gap_before = known_gap(latest.given());
     result_.gap_after = known_gap(h);
     result_.noise = h.train.point.noise;
-    result_.model = selection_.found().empty()
+    result_.model = latest.found().empty()
                         ? plant_
-                        : model_with(plant_, h.train.point.plant, search_.nuisances(), selection_.found());
+                        : model_with(plant_, h.train.point.plant, search_.nuisances(), latest.found());
     result_.residual = "not examined: the search was not finished";
     result_.verdict = moves_enough(runs_, policy_.excitation) ? Verdict::unexplained : Verdict::not_excited;
   }
@@ -193,6 +199,14 @@ class Diagnostician {
     result_.held_out_runs = data_.held_out_runs;
   }
 
+  /// Where more than noise is left, the search goes on.
+  ResidualTests search_further(ResidualTests left) {
+    if (left.structured && selection_.renew_initial_states()) left = settle();
+    if (left.structured && selection_.find_pairs_of_all()) left = settle();
+    if (left.beyond_sensors && selection_.find_thoroughly(left.structured)) left = settle();
+    return left;
+  }
+
   /// Settles the corrections, and looks at what is left.
   ResidualTests settle() {
     settle_corrections();
@@ -205,7 +219,11 @@ class Diagnostician {
   ResidualTests tests_of(const FitPoint& fitted, const Noise& noise) const {
     ResidualTests left = examine_fit(search_.all_data(), fitted, policy_, budget_);
     if (!left.structured) compare_held_out(search_, final_, noise, left);
-    if (!left.structured) flag_scale_at_bound(left);
+    if (left.structured) return left;
+    if (const auto impossible = sentence_on_impossible_scale(known_, all_found(), policy_.correction)) {
+      left.structured = true;
+      left.sentence = *impossible;
+    }
     return left;
   }
 
@@ -300,6 +318,16 @@ class Diagnostician {
     for (;;) {
       options_.tell(0.93, "comparing parts of the data");
       reproductions_ = reproduce(search_, known_, all_found());
+      if (options_.quick) {
+        const std::vector<std::size_t> doubtful = doubtful_effects(reproductions_, search_);
+        for (const std::size_t effect : doubtful)
+          if (!withdrawn_.contains(effect))
+            withdraw(effect, "not certain enough for a quick diagnosis: repeat it without --quick");
+        if (!doubtful.empty()) {
+          left = settle();
+          continue;
+        }
+      }
       const Reproduction* worst = nullptr;
       for (const Reproduction& r : reproductions_)
         if (is_contradicted(r, policy_.reproducibility) && (worst == nullptr || r.t_value < worst->t_value))
@@ -386,19 +414,20 @@ class Diagnostician {
       candidate.gap_after = result_.gap_before;
       for (auto& [effect, h] : selection_.finalists()) {
         if (effect != candidate.effect) continue;
-        candidate.evidence = compare(selection_.given(), h).train;
+        candidate.evidence = selection_.finalist_evidence(effect);
         candidate.gap_after = search_.simulate(h).gap / floor_;
       }
     }
     std::stable_sort(result_.candidates.begin(), result_.candidates.end(),
                      [](const auto& a, const auto& b) { return a.evidence > b.evidence; });
-    note_doubtful_numbers();
+    for (const std::string& note : notes_on_doubtful_numbers(known_, all, policy_.correction))
+      result_.notes.push_back(note);
     beyond_sensors_ = tests.beyond_sensors;
     opened_ = open_effects(search_, final_, all);
     result_.detectable = detectable_sizes(search_, final_, opened_);
     decide(tests);
     trace_residuals();
-    find_indistinguishable();
+    if (!options_.quick) find_indistinguishable();
   }
 
   void trace_residuals() {
@@ -408,45 +437,6 @@ class Diagnostician {
     Hypothesis as_given = search_.fitted_separately({}, final_, &noise);
     search_.filter_held_out(as_given, noise);
     result_.residual_before = smooth_residuals(data_.held, as_given.held.point, policy_.location.walk);
-  }
-
-  /// A scale at the end of what it may be stands for something else.
-  void flag_scale_at_bound(ResidualTests& tests) const {
-    for (const std::size_t effect : all_found()) {
-      const auto [scale, parameter] = scale_of(effect);
-      if (parameter == nullptr) continue;
-      const EndOfRange end = end_of_range(scale, parameter->low, parameter->high, policy_.correction);
-      if (end == EndOfRange::none) continue;
-      tests.structured = true;
-      std::ostringstream text;
-      text.precision(3);
-      text << "it takes a " << kind_of(effect) << " of " << scale
-           << (end == EndOfRange::low ? " or less" : " or more")
-           << ", which cannot be: something else is missing";
-      tests.sentence = text.str();
-    }
-  }
-
-  /// A scale among what was fitted, and how far it may go; else none.
-  std::pair<double, const FreeParameter*> scale_of(std::size_t effect) const {
-    for (const FreeParameter& p : known_.free)
-      if (p.effect == effect && effect_registry()[effect].parameters[p.index].name == "scale")
-        return {known_.train.point.plant.find(effect)->values[p.index], &p};
-    return {1.0, nullptr};
-  }
-
-  /// Numbers of the plant file that are off by more than a data sheet is.
-  void note_doubtful_numbers() {
-    for (const std::size_t effect : all_found()) {
-      const double scale = scale_of(effect).first;
-      if (effect_registry()[effect].enters != Enters::parameter || !is_doubtful(scale, policy_.correction))
-        continue;
-      std::ostringstream text;
-      text.precision(3);
-      text << "check " << kind_of(effect) << " another way: " << scale
-           << " times what the plant file says is far off; what was found beside it is no more certain";
-      result_.notes.push_back(text.str());
-    }
   }
 
   std::vector<std::size_t> all_found() const {
@@ -522,7 +512,7 @@ class Diagnostician {
   }
 
   const SelectionPolicy policy_;
-  const SearchBudget budget_{};
+  const SearchBudget budget_;
   const Plant plant_;
   const std::vector<Measurement>& runs_;
   const DiagnosisOptions& options_;
@@ -535,7 +525,8 @@ class Diagnostician {
   bool beyond_sensors_ = false;  ///< more is left than noise of the sensors
   Search search_;
   StepwiseSelection selection_;
-  Hypothesis final_;  ///< fitted to the training runs, judged on the others
+  std::unique_ptr<Exploration> exploration_;  ///< null: there is none
+  Hypothesis final_;                          ///< fitted to the training runs, judged on the others
   Hypothesis known_;  ///< the same effects fitted to all runs: what the model says in the end
   Noise noise_;       ///< of all runs beside that model
   std::vector<std::size_t> corrections_;
@@ -545,6 +536,35 @@ class Diagnostician {
   Listing listing_;
   std::vector<OpenedEffect> opened_;
 };
+
+/// The search with other runs held out, where that may show more, and what is left in the end.
+void look_further(const Plant& plant, const std::vector<Measurement>& runs, const DiagnosisOptions& options,
+                  Diagnostician& first, std::optional<Diagnostician>& second, Diagnosis& diagnosis) {
+  if (diagnosis.verdict == Verdict::not_excited || diagnosis.interrupted || diagnosis.bound_reached) return;
+  const bool unexplained = diagnosis.verdict == Verdict::unexplained;
+  try {
+    // A weak effect may show too little in the runs that are left once one is held out.
+    if (unexplained ? first.misses_held_out_excitation() : !first.found_missing_effect()) {
+      options.tell(0.02, "repeating the search with other runs held out");
+      second.emplace(plant, runs, options, HeldOut::other);
+      Diagnosis other = second->run(!unexplained);
+      if (other.verdict == Verdict::explained && (unexplained || second->found_missing_effect())) {
+        second->describe_what_is_left(other);
+        other.notes.emplace_back(
+            "the runs held out at first show what the others alone do not: others were held out instead");
+        diagnosis = std::move(other);
+        return;
+      }
+      diagnosis.interrupted = other.interrupted;
+      diagnosis.bound_reached = other.bound_reached;
+    }
+    if (!diagnosis.interrupted) first.describe_what_is_left(diagnosis);
+  } catch (const Interrupted&) {
+    diagnosis.interrupted = true;
+  } catch (const BoundReached&) {
+    diagnosis.bound_reached = true;
+  }
+}
 
 }  // namespace
 
@@ -560,32 +580,17 @@ Diagnosis diagnose(const Plant& plant, const std::vector<Measurement>& runs,
     throw ConfigError(
         "the runs contain only theta_rad, and the model has no pendulum: add the pendulum to the plant file");
   const InterruptibleWork watch(options.signal);
-  Diagnostician first(plant, runs, options, HeldOut::middle);
+  std::vector<Measurement> thinned;
+  if (options.quick) thinned = coarse_runs(runs, plant, quick_budget().quick_period_s);
+  const std::vector<Measurement>& used = options.quick ? thinned : runs;
+  Diagnostician first(plant, used, options, HeldOut::middle);
+  std::optional<Diagnostician> second;
   Diagnosis diagnosis = first.run();
-  if (diagnosis.verdict == Verdict::not_excited || diagnosis.interrupted || diagnosis.bound_reached)
-    return diagnosis;
-  const bool unexplained = diagnosis.verdict == Verdict::unexplained;
-  try {
-    // A weak effect may show too little in the runs that are left once one is held out.
-    if (unexplained ? first.misses_held_out_excitation() : !first.found_missing_effect()) {
-      options.tell(0.02, "repeating the search with other runs held out");
-      Diagnostician second(plant, runs, options, HeldOut::other);
-      Diagnosis other = second.run();
-      if (other.verdict == Verdict::explained && (unexplained || second.found_missing_effect())) {
-        second.describe_what_is_left(other);
-        other.notes.emplace_back(
-            "the runs held out at first show what the others alone do not: others were held out instead");
-        return other;
-      }
-      diagnosis.interrupted = other.interrupted;
-      diagnosis.bound_reached = other.bound_reached;
-    }
-    if (!diagnosis.interrupted) first.describe_what_is_left(diagnosis);
-  } catch (const Interrupted&) {
-    diagnosis.interrupted = true;
-  } catch (const BoundReached&) {
-    diagnosis.bound_reached = true;
-  }
+  if (options.quick)
+    diagnosis.not_examined = not_examined_quickly();
+  else
+    look_further(plant, runs, options, first, second, diagnosis);
+  diagnosis.work_samples = first.work_samples() + (second ? second->work_samples() : 0.0);
   return diagnosis;
 }
 

@@ -218,6 +218,10 @@ json diagnosis_json(const Diagnosis& diagnosis) {
   // Of a search that was not finished only.
   if (diagnosis.interrupted) document["interrupted"] = true;
   if (diagnosis.bound_reached) document["bound_reached"] = true;
+  if (!diagnosis.not_examined.empty()) {
+    document["quick"] = true;
+    document["not_examined"] = diagnosis.not_examined;
+  }
   return document;
 }
 

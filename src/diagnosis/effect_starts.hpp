@@ -1,16 +1,31 @@
 // The starts of the fit of an effect, from the residual of an earlier fit of the same data.
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "candidates.hpp"
 
 namespace upright {
 
-/// Starting values of the parameters of an effect, in SI units. The residual force at the fit `point` of
-/// `data` shows the pitch of periodic forces.
-std::vector<std::vector<double>> effect_starts(std::size_t effect, const DataRange& range,
-                                               const FitData& data, const FitPoint& point,
-                                               const SelectionPolicy& policy, const SearchBudget& budget);
+/// Remembers the latest starts of a periodic force, which take as long as a fit: each round asks for them
+/// twice.
+class EffectStarts {
+ public:
+  /// Both must outlive it.
+  EffectStarts(const SelectionPolicy& policy, const SearchBudget& budget)
+      : policy_(policy), budget_(budget) {}
+
+  /// Of an effect beside the model at `point`. A periodic force starts from the pitches that the residual has
+  /// most of.
+  std::vector<std::vector<double>> of(std::size_t effect, const DataRange& range, const FitData& data,
+                                      const FitPoint& point);
+
+ private:
+  const SelectionPolicy& policy_;
+  const SearchBudget& budget_;
+  std::optional<FitPoint> point_;  ///< of the latest
+  std::vector<std::vector<double>> periodic_;
+};
 
 }  // namespace upright

@@ -31,5 +31,11 @@ std::vector<Reproduction> reproduce(const Search& search, const Hypothesis& h,
                                     const std::vector<std::size_t>& effects);
 
 bool is_contradicted(const Reproduction& reproduction, const ReproducibilityPolicy& policy);
+/// The effects that are not beyond doubt: of overwhelming evidence, and borne out by each part as surely as
+/// an effect can be contradicted. Not numbers of the plant file.
+std::vector<std::size_t> doubtful_effects(const std::vector<Reproduction>& reproductions,
+                                          const Search& search);
+/// What all runs save with what their own parts say [evidence].
+double white_evidence(const Reproduction& reproduction);
 
 }  // namespace upright

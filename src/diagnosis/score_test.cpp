@@ -43,7 +43,7 @@ ScoreTestResult best_by_score_test(const FitData& data, const FitResult& fitted,
     std::vector<FreeParameter> with = free;
     for (const FreeParameter& p : free_parameters(effect, range, search.policy().prior)) with.push_back(p);
     for (const std::vector<double>& values :
-         effect_starts(effect, range, data, fitted.point, search.policy(), search.budget())) {
+         EffectStarts(search.policy(), search.budget()).of(effect, range, data, fitted.point)) {
       FitPoint point = fitted.point;
       point.plant.set(effect, values);
       convert_initial_states(point.starts, fitted.point.plant, point.plant);

@@ -7,7 +7,6 @@
 #include <numeric>
 
 #include "belief.hpp"
-#include "effect_starts.hpp"
 #include "model/dense_algebra.hpp"
 #include "phases.hpp"
 #include "plausibility.hpp"
@@ -125,7 +124,8 @@ Search::Search(const Plant& plant, const std::vector<Measurement>& runs, const F
       plant_(plant),
       train_(train),
       held_(held),
-      range_(range_of(runs, plant, policy.excitation)) {
+      range_(range_of(runs, plant, policy.excitation)),
+      starts_(policy, budget) {
   for (const PlantEffect& effect : plant.effects) nuisances_.push_back(effect.number);
   for (const std::size_t effect : base_corrections(plant, range_)) {
     nuisances_.push_back(effect);
@@ -135,8 +135,8 @@ Search::Search(const Plant& plant, const std::vector<Measurement>& runs, const F
   const std::size_t stride = std::clamp<std::size_t>(train_.segments.size() / budget_.min_screening_segments,
                                                      1, budget_.max_screening_stride);
   choose_screening_subset(stride);
-  train_starts_ = estimate_initial_states(runs, train.segments, plant_);
-  held_starts_ = estimate_initial_states(runs, held.segments, plant_);
+  train_starts_ = estimate_initial_states(*train.runs, train.segments, plant_);
+  held_starts_ = estimate_initial_states(*held.runs, held.segments, plant_);
 }
 
 FitOptions Search::screening() const {
@@ -590,7 +590,7 @@ Hypothesis Search::with_pair(const Hypothesis& base, const Hypothesis& first, co
 }
 
 std::vector<std::vector<double>> Search::starts_of(std::size_t effect, const Hypothesis& base) const {
-  return effect_starts(effect, range_, train_, base.train.point, policy_, budget_);
+  return starts_.of(effect, range_, train_, base.train.point);
 }
 
 }  // namespace upright

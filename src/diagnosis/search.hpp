@@ -9,6 +9,7 @@
 
 #include "candidates.hpp"
 #include "decision.hpp"
+#include "effect_starts.hpp"
 #include "estimation/fit.hpp"
 #include "search_budget.hpp"
 #include "selection_policy.hpp"
@@ -46,7 +47,7 @@ std::vector<ParameterEstimate> estimates_of(std::size_t effect, const Hypothesis
 
 class Search {
  public:
-  /// `policy` and `budget` must outlive it.
+  /// `policy` and `budget` must outlive it. `runs`: of which `train` and `held` are parts, or thinned parts.
   Search(const Plant& plant, const std::vector<Measurement>& runs, const FitData& train, const FitData& held,
          const SelectionPolicy& policy, const SearchBudget& budget);
 
@@ -91,6 +92,8 @@ class Search {
   void refine(const Hypothesis& base, Hypothesis& hypothesis);
   /// The same without judging it, from the noise that it has.
   void refit(const Hypothesis& base, Hypothesis& hypothesis);
+  /// A hypothesis on other data, fitted to these.
+  Hypothesis refitted(const Hypothesis& other);
   /// The same hypothesis without one effect.
   Hypothesis without(const Hypothesis& base, std::size_t effect);
   /// The same hypothesis from initial states that are guessed from the data once more: those that suited a
@@ -167,6 +170,7 @@ class Search {
                               ///< whole fit
   std::vector<std::size_t> screening_places_;
   DataRange range_;
+  mutable EffectStarts starts_;
   std::vector<std::size_t> nuisances_;
   std::vector<PlantState<double>> train_starts_, held_starts_;
 };

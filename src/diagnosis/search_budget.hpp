@@ -11,6 +11,15 @@
 namespace upright {
 
 struct SearchBudget {
+  // Exploration: the search goes first through a part of the samples, where the record is finer than the
+  // motion.
+  /// [s] From sample to sample in an exploration: the longest step of the simulation in a fit, so that longer
+  /// periods save less. What is found there is judged on all samples.
+  double exploration_period_s = 4e-3;
+  /// [1] An exploration pays if the record has this many times as many samples. It replaces most fits of the
+  /// search, but its finds are fitted once more. Chosen.
+  double min_exploration_ratio = 3.0;
+
   // Screening: the part of the training data that is used first.
   /// [segments] The least number of screening segments. Runs differ, but the segments of a run are similar,
   /// so only every few are used. From twelve segments on this saves half of the work: six 10 s runs with two
@@ -78,6 +87,12 @@ struct SearchBudget {
   /// [1] The share of the search's bound that is granted after the bound was reached. The examination of the
   /// result takes about a tenth of a usual search.
   double examination_share = 0.25;
+
+  /// [s] From sample to sample in a quick diagnosis. At 100 Hz the motion of a pendulum of arm's length is
+  /// still followed; effects of a few milliseconds are not seen. Chosen.
+  double quick_period_s = 10e-3;
+  /// [segments] The least number of segments on which a quick diagnosis screens. Chosen.
+  std::size_t quick_screening_segments = 3;
 
   // Starts of a force that is periodic along the track.
   /// [samples] The samples of the residual force, evenly spaced. Chosen.

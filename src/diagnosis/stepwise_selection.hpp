@@ -21,6 +21,10 @@ class StepwiseSelection {
  public:
   StepwiseSelection(Search& search, const DiagnosisOptions& options, Diagnosis& record);
 
+  /// Searches on thinned data first, each time. `explorer` works on a search of these and must outlive this;
+  /// the data here have so many times as many samples.
+  void explore_with(StepwiseSelection& explorer, double sample_ratio);
+
   /// Fits the plant file as given: before everything else. Throws ConfigError when that cannot be simulated.
   /// This and what follows throw Interrupted and BoundReached; what was found until then stays readable.
   void begin();
@@ -35,6 +39,11 @@ class StepwiseSelection {
   /// something is `certainly_missing` of many data, as all of the training data show. Whether the model
   /// changed.
   bool find_thoroughly(bool certainly_missing);
+
+  /// Adopts what an exploration had found when the search ended before its time.
+  void adopt_unfinished();
+  /// This, or the exploration where it had found more when the search ended.
+  const StepwiseSelection& latest() const;
 
   /// After something was taken out for good: looks for what can stand in its place.
   void find_again();
@@ -54,9 +63,15 @@ class StepwiseSelection {
   /// What gained a fair share of what this one did, when it was added.
   const std::vector<std::size_t>& similar_effects(std::size_t effect) { return similar_effects_[effect]; }
   /// Where model and data disagreed before this one was added.
-  const std::string& where(std::size_t effect) { return where_[effect]; }
+  const std::string& where(std::size_t effect) const {
+    static const std::string nowhere;
+    const auto at = where_.find(effect);
+    return at == where_.end() ? nowhere : at->second;
+  }
   /// The best effects of the first round, each fitted by itself.
   std::vector<std::pair<std::size_t, Hypothesis>>& finalists() { return finalists_; }
+  /// What one of these saved, of the plant file as given.
+  double finalist_evidence(std::size_t effect) const { return finalist_evidence_.at(effect); }
 
  private:
   /// A candidate after a few steps on a part of the data, and what it saves beyond its price.
@@ -80,6 +95,19 @@ class StepwiseSelection {
   };
 
   std::vector<std::size_t> open_candidates() const;
+  /// Of these, those that may be accepted by what the exploration says.
+  std::vector<std::size_t> possible_candidates(const std::vector<std::size_t>& candidates) const;
+  /// Lets the explorer search in these rounds from what was found here, and adopts what it finds. The next
+  /// round.
+  int explore(int first_round, int last_round, bool with_low_noise);
+  /// The explorer continues from what was found here.
+  void lead_explorer();
+  /// Takes over what the explorer found, if these data bear it out. `with_low_noise`: as in select_forward.
+  bool adopt(bool with_low_noise);
+  /// The account of the explorer's search becomes a part of this one's.
+  void take_account();
+  /// Notes a candidate of the first round, in the place of an earlier note.
+  void note_candidate(std::size_t effect, double gain);
   /// Those that promise a share of what the best one does, some at least, and all that cannot promise. A
   /// promise is kept within a factor of a few (measured on the matrix), so that the best is among them.
   std::vector<std::size_t> promising_candidates(const Hypothesis& from,
@@ -174,8 +202,14 @@ class StepwiseSelection {
   std::map<std::size_t, std::vector<std::size_t>> similar_effects_;
   std::map<std::size_t, std::string> where_;
   std::vector<std::pair<std::size_t, Hypothesis>> finalists_;
+  std::map<std::size_t, double> finalist_evidence_;
   std::vector<std::pair<std::size_t, Hypothesis>> resembling_;  ///< screened, of the first round
   std::set<std::pair<std::size_t, std::size_t>> paired_;        ///< tried already
+  /// What each candidate promised or gained in the last round, where no effect was added to the model since.
+  std::map<std::size_t, double> last_gains_;
+  StepwiseSelection* explorer_ = nullptr;
+  double sample_ratio_ = 1.0;             ///< how many times as many samples there are here
+  std::map<std::size_t, double> limits_;  ///< of what candidates can gain here; empty: none is known
 };
 
 }  // namespace upright

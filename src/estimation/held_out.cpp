@@ -41,6 +41,12 @@ std::vector<std::size_t> choose_held_out(const std::vector<double>& excitation, 
 
 }  // namespace
 
+double sample_count(const FitData& data) {
+  double count = 0.0;
+  for (const Segment& s : data.segments) count += static_cast<double>(s.last - s.first + 1);
+  return count;
+}
+
 DataSplit split(const std::vector<Measurement>& runs, HeldOut which, double arm_m, double speed_window_s) {
   const std::vector<Segment> segments = cut_segments(runs);
   DataSplit result;

@@ -14,6 +14,9 @@ struct DataSplit {
   std::vector<std::size_t> held_out_runs;  ///< empty for a single run; a third of its segments is held out
 };
 
+/// The samples of its segments.
+double sample_count(const FitData& data);
+
 /// Which of each three runs, sorted by excitation, is held out: the middle one, which is similar to the
 /// others, or another one if the fit needs what only the middle one shows. (Of two runs the less excited one,
 /// or the other.) `end` is `middle` for several runs, and the last third of a single run.

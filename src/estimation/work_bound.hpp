@@ -20,17 +20,22 @@ class WorkBound {
   /// The bound, in samples processed.
   explicit WorkBound(double max_samples) : left_samples_(max_samples) {}
 
-  void count(double samples) { left_samples_ -= samples; }  ///< so many samples were processed
-  void grant(double samples) { left_samples_ = samples; }   ///< so many samples are left from now on
+  /// So many samples were processed.
+  void count(double samples) {
+    left_samples_ -= samples;
+    counted_samples_ += samples;
+  }
+  void grant(double samples) { left_samples_ = samples; }  ///< so many samples are left from now on
   /// Whether this much additional work would reach the bound.
   bool is_reached_with(double samples) const { return samples >= left_samples_; }
+  double counted_samples() const { return counted_samples_; }  ///< processed until now
   /// Throws BoundReached where the bound is reached.
   void check() const {
     if (is_reached_with(0.0)) throw BoundReached();
   }
 
  private:
-  double left_samples_;
+  double left_samples_, counted_samples_ = 0.0;
 };
 
 }  // namespace upright

@@ -182,8 +182,11 @@ struct Diagnosis {
   std::string residual;                           ///< description of the remaining residual
   std::vector<std::size_t> held_out_runs;         ///< runs that no fit saw
   std::vector<std::string> run_names;             ///< of all runs, in their order
-  std::vector<ResidualTrace> residual_before;     ///< on held-out segments, with the plant file as given
-  std::vector<ResidualTrace> residual_after;      ///< the same with the model found
+  /// What a quick diagnosis left out, in words; empty: it was a complete one.
+  std::vector<std::string> not_examined;
+  double work_samples = 0.0;                   ///< number of samples processed, counting repetitions
+  std::vector<ResidualTrace> residual_before;  ///< on held-out segments, with the plant file as given
+  std::vector<ResidualTrace> residual_after;   ///< the same with the model found
 };
 
 /// The round that added an effect: its trial, and at most three distinguishable effects with the next
@@ -205,6 +208,8 @@ struct DiagnosisOptions {
   /// A nonzero value interrupts the search within some tenths of a second. Null: no interruption.
   const std::atomic<int>* signal = nullptr;
   double search_bound = default_search_bound;  ///< in evaluations of each sample
+  /// Only what is certain, in a tenth of the time.
+  bool quick = false;
   /// Called from time to time with the progress (0 to 1) and the current activity.
   std::function<void(double, const std::string&)> progress;
   /// Reports progress, where anybody listens: `done` from 0 to 1.

@@ -314,8 +314,7 @@ class EventEngine {
   }
 
   bool linearises_in_middle() const {
-    return !std::is_same_v<S, double> && options_.quick_derivatives && !dynamics_.has_motor_lag() &&
-           !dynamics_.has_bristle_state();
+    return !std::is_same_v<S, double> && options_.quick_derivatives && !dynamics_.has_bristle_state();
   }
 
   /// Jacobian of the accelerations: columns cart_m, theta_rad, cart_mps, theta_radps.
@@ -331,13 +330,13 @@ class EventEngine {
     }
     return slopes;
   }
-  Slopes slopes_at(const PlantState<double>& middle, const PlantState<double>& rate) const {
+  Slopes slopes_at(const PlantState<double>& middle, const PlantState<double>& rate, double motor_v) const {
     constexpr double aside = 1e-6;
     Slopes slopes;
     const auto set = [&](std::size_t column, double PlantState<double>::*of) {
       PlantState<double> moved_aside = middle;
       moved_aside.*of += aside;
-      const PlantState<double> other = plain_.derivative(moved_aside, value_of(drive_), contacts_);
+      const PlantState<double> other = plain_.derivative(moved_aside, motor_v, contacts_);
       slopes.cart_mps2[column] = (other.cart_mps - rate.cart_mps) / aside;
       slopes.theta_radps2[column] = (other.theta_radps - rate.theta_radps) / aside;
     };
@@ -349,8 +348,21 @@ class EventEngine {
     return slopes;
   }
 
+  /// The motor's voltage over a step: its mean, which gives the same impulse, with the derivatives at this
+  /// length, and what it ends at.
+  struct StepVoltage {
+    S mean_v, end_v;
+  };
+  StepVoltage voltage_over(const S& h) const {
+    if (!dynamics_.has_motor_lag()) return {drive_, drive_};
+    const S lag_s = dynamics_.motor_time_constant_s(), gap_v = state_.motor_v - drive_;
+    const S lags = S(value_of(h)) / lag_s;
+    const S mean = (S(1.0) - elementary::exp(S(-lags))) / lags;
+    return {drive_ + gap_v * mean, drive_ + gap_v * elementary::exp(S(-h / lag_s))};
+  }
+
   /// Steps to `end`, with derivatives (dual numbers only): those of the motion linearised at the middle,
-  /// x(h) = x + (h + h^2 A / 2 + h^3 A^2 / 6) (A x + b).
+  /// x(h) = x + (h + h^2 A / 2 + h^3 A^2 / 6) (A x + b). A lagging motor counts with its mean voltage.
   void step_linearised(const PlantState<double>& end, const S& h) requires(!std::is_same_v<S, double>) {
     const PlantState<double> begin = plain_state(state_);
     // The Jacobian is evaluated at the middle, the derivatives are those at the beginning.
@@ -362,14 +374,16 @@ class EventEngine {
     halfway(&PlantState<double>::theta_rad, state_.theta_rad);
     halfway(&PlantState<double>::cart_mps, state_.cart_mps);
     halfway(&PlantState<double>::theta_radps, state_.theta_radps);
-    const PlantState<S> rate = dynamics_.derivative(state_, drive_, contacts_);
+    const StepVoltage voltage = voltage_over(h);
+    const PlantState<S> rate = dynamics_.derivative(state_, voltage.mean_v, contacts_);
     const PlantState<double> plain_rate = plain_state(rate);
     const double cart_moves = dynamics_.cart_locked() || cart_at_rest() ? 0.0 : 1.0;
     const double pivot_moves = !dynamics_.has_pendulum() || pivot_at_rest() ? 0.0 : 1.0;
     // Coordinates that started to move since the seeding have no derivatives.
     const bool all_seeded =
         seeded_ && state_.cart_mps.v[2] == cart_moves && state_.theta_radps.v[3] == pivot_moves;
-    const Slopes slopes = all_seeded ? seeded_slopes(rate) : slopes_at(middle, plain_rate);
+    const Slopes slopes =
+        all_seeded ? seeded_slopes(rate) : slopes_at(middle, plain_rate, value_of(voltage.mean_v));
     // Derivatives of the solution: rate is A x + b, `second` A (A x + b), `third` A A (A x + b).
     using Slope = decltype(S::v);
     const auto bend = [](const std::array<double, 4>& slope, const auto& x, const auto& theta, const auto& v,
@@ -389,8 +403,10 @@ class EventEngine {
                   plain_rate.theta_radps);
     };
     // The step length may have derivatives too.
-    const double v_rate = plain_rate.cart_mps + 0.5 * length * bent(slopes.cart_mps2);
-    const double omega_rate = plain_rate.theta_radps + 0.5 * length * bent(slopes.theta_radps2);
+    PlantState<double> late = plain_rate;
+    if (dynamics_.has_motor_lag()) late = plain_.derivative(middle, value_of(voltage.end_v), contacts_);
+    const double v_rate = late.cart_mps + 0.5 * length * bent(slopes.cart_mps2);
+    const double omega_rate = late.theta_radps + 0.5 * length * bent(slopes.theta_radps2);
     const auto set = [&](S& number, double value, const Slope& first, const Slope& second, const auto& third,
                          double rate_at_end) {
       number.a = value;
@@ -401,7 +417,7 @@ class EventEngine {
         pivot_moves * end.theta_radps);
     set(state_.cart_mps, end.cart_mps, rate.cart_mps.v, second_v, third_v, v_rate);
     set(state_.theta_radps, end.theta_radps, rate.theta_radps.v, second_omega, third_omega, omega_rate);
-    state_.motor_v = drive_;
+    state_.motor_v = voltage.end_v;
   }
 
   /// The same in plain numbers, from the present state.
