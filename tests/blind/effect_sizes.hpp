@@ -1,10 +1,10 @@
 // How large an effect is that is hidden in a rig.
 //
 // Sizes are set by the plant's own forces in these runs, not by what a diagnosis finds: a run of the believed
-// plant gives the motor's force, speed, travel and swing (root mean square of the run with the largest), and an
-// effect takes a share of them: 3, 10 or 25 percent of the motor's force for what acts on the cart; 1, 3 or
-// 10 percent of gravity's torque for what acts in the pivot; 3, 10 or 25 percent of the plant's time constant
-// for delays.
+// plant gives the motor's force, speed, travel and swing (root mean square of the run with the largest), and
+// an effect takes a share of them: 3, 10 or 25 percent of the motor's force for what acts on the cart; 1, 3
+// or 10 percent of gravity's torque for what acts in the pivot; 3, 10 or 25 percent of the plant's time
+// constant for delays.
 #pragma once
 
 #include <string>
