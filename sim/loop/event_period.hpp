@@ -36,8 +36,7 @@ class EventPeriod {
         sticks_(may_stick<Present> && physics_.cart_can_stick()),
         pivot_sticks_(physics_.pivot_can_stick()),
         cart_turns_(physics_.cart_has_kink()),
-        stiff_(parts.stiff_bristles),
-        three_stages_(parts.three_stages) {
+        stiff_(parts.stiff_bristles) {
     if (sticks_ && is_common_set<Present>) find_static_friction(Lanes(0.0), everywhere_);
   }
 
@@ -79,8 +78,6 @@ class EventPeriod {
     Step step{length_of(steps, begin, stay), {}, {}};
     if (stiff_)
       step_on_bristles(steps, begin, step);
-    else if (!lags() && three_stages_)
-      step_of_three_stages(steps, begin, step);
     else if (!lags())
       step.end = runge_kutta_4(rates_of(steps, steps.drive_v, steps.drive_v, step), steps.state, begin.rate,
                                step.length_s);
@@ -226,20 +223,6 @@ class EventPeriod {
     };
   }
 
-  /// Of plants that are slow beside the period.
-  void step_of_three_stages(const Steps& steps, const Begin& begin, Step& step) const {
-    if constexpr (inlines && may_stick<Present>) {
-      const auto rate = [&](const State& at, Stage) {
-        step.last = rate_of_cart(at, steps.drive_v, steps.modes.cart);
-        return step.last.of;
-      };
-      step.end = runge_kutta_3(rate, steps.state, begin.rate, step.length_s);
-    } else {
-      step.end = runge_kutta_3(rates_of(steps, steps.drive_v, steps.drive_v, step), steps.state, begin.rate,
-                               step.length_s);
-    }
-  }
-
   /// The voltages within the step give it the exact impulse; events are sought by the true accelerations at
   /// its ends.
   void step_of_lagging_motor(const Steps& steps, Step& step) const {
@@ -268,18 +251,15 @@ class EventPeriod {
   Rate rate_of(const State& state, const Lanes& motor_v, const LaneModes& modes) const {
     if constexpr (second) {
       if (pivot_sticks_) return rate_of_both(state, motor_v, modes);
-      return {called_rate_of_cart(state, motor_v, modes.cart), Lanes(0.0)};
+      return {rate_of_cart(state, motor_v, modes.cart), Lanes(0.0)};
     } else {
-      return called_rate_of_cart(state, motor_v, modes.cart);
+      return rate_of_cart(state, motor_v, modes.cart);
     }
   }
 
   /// One copy for the stages of a step, as in SmoothPeriod.
-  [[gnu::flatten, gnu::noinline]] CartRate called_rate_of_cart(const State& state, const Lanes& motor_v,
-                                                               const Lanes& direction) const {
-    return rate_of_cart(state, motor_v, direction);
-  }
-  CartRate rate_of_cart(const State& state, const Lanes& motor_v, const Lanes& direction) const {
+  [[gnu::flatten, gnu::noinline]] CartRate rate_of_cart(const State& state, const Lanes& motor_v,
+                                                        const Lanes& direction) const {
     if (!sticks_) return {unheld_rate(state, motor_v, direction), Lanes(0.0)};
     const auto balance = physics_.balance(state, motor_v);
     return {physics_.derivative_by_direction(state, balance, direction), physics_.cart_load(state, balance)};
@@ -394,7 +374,6 @@ class EventPeriod {
   std::conditional_t<second, LaneMotor, PromptMotor> motor_;
   bool sticks_, pivot_sticks_, cart_turns_;
   bool stiff_;                   ///< bristles relax too fast for the classical method
-  bool three_stages_;            ///< suffice
   StaticFriction everywhere_{};  ///< of the common sets, whose levels are the same at every place
 };
 

@@ -30,7 +30,6 @@ struct LaneParts {
   /// Each lane goes at its own pace from event to event; otherwise all lanes go in step.
   bool own_pace = false;
   bool stiff_bristles = false;  ///< they relax too fast for the classical method
-  bool three_stages = false;    ///< at its own pace: the plant is slow enough for steps of three stages
   /// At its own pace: the pendulum may stick in its pivot, or the motor lags.
   bool pivot_or_lag = false;
 };

@@ -79,21 +79,6 @@ bool has_stiff_bristles(const PlantModel<double>& model) {
              fastest_at_rest_radps;
 }
 
-/// Whether three stages suffice. Of a change of velocity at a rate r they lose the part (r h)^4 / 24 in a
-/// step h, at most this: then changes of some meters per second leave errors far below 1e-6.
-bool takes_three_stages(const PlantModel<double>& model, double period_s) {
-  constexpr double lost_part = 1e-7;
-  const Dynamics<double> physics(model);
-  if (physics.has_bristle_state()) return false;
-  const BaseParameters<double>& base = physics.base();
-  const double coupling = base.pendulum_mass_kg * base.length_to_com_m,
-               inertia = base.inertia_about_pivot_kgm2 -
-                         coupling * coupling / (base.cart_mass_kg + base.pendulum_mass_kg);
-  const double rate_radps =
-      fastest_rate_radps(model, true) + std::sqrt(coupling * std::abs(base.gravity_mps2) / inertia);
-  return std::pow(rate_radps * period_s, 4) < 24.0 * lost_part;
-}
-
 const LaneBuild& lanes_for(LaneRegisters registers) {
   static const LaneBuild wide = widest();
   return registers == LaneRegisters::wide ? wide : baseline;
@@ -136,11 +121,10 @@ LaneParts parts_of(const LoopSetup& setup, std::span<const LoopCase> cases) {
 /// effects treat parameters that are whole numbers (an exponent of 2, the kind of a table) specially, if all
 /// lanes have them. The effects, which all plants share, and the smoothing say whether a motor lags and a
 /// contact sticks; by lane are the constant of the lag and the levels of the friction.
-bool may_mix(const PlantModel<double>& one, const PlantModel<double>& other, double period_s) {
+bool may_mix(const PlantModel<double>& one, const PlantModel<double>& other) {
   if (one.smoothing != other.smoothing ||
       Dynamics<double>(one).input_delay_s() != Dynamics<double>(other).input_delay_s() ||
-      has_stiff_bristles(one) != has_stiff_bristles(other) ||
-      takes_three_stages(one, period_s) != takes_three_stages(other, period_s))
+      has_stiff_bristles(one) != has_stiff_bristles(other))
     return false;
   const auto is_whole = [](double number) { return number == std::round(number); };
   for (std::size_t i = 0; i < all_parameter_count; ++i) {
@@ -194,16 +178,13 @@ void run_plants_on_lanes(const LoopSetup& setup, std::span<const PlantModel<doub
   if (cases.empty()) return;
   LaneParts parts = parts_of(setup, cases);
   LoopSetup of_plants = setup;
-  const double period_s = setup.control.period_s();
   for (std::size_t first = 0, end = 0; first < plants.size(); first = end) {
-    for (end = first + 1; end < plants.size() && may_mix(plants[first], plants[end], period_s);) ++end;
+    for (end = first + 1; end < plants.size() && may_mix(plants[first], plants[end]);) ++end;
     const std::size_t count = end - first;
     of_plants.model = plants[first];
     parts.own_pace = lanes_refill(of_plants);
     const Dynamics<double> physics(of_plants.model);
     parts.pivot_or_lag = parts.own_pace && (physics.pivot_can_stick() || physics.has_motor_lag());
-    // Beside a pivot that sticks, three stages left errors of 1.2e-6.
-    parts.three_stages = parts.own_pace && !parts.pivot_or_lag && takes_three_stages(plants[first], period_s);
     parts.stiff_bristles = setup.sampled && has_stiff_bristles(plants[first]);
     lanes_for(registers).run(setup, parts, plants.subspan(first, count), cases,
                              results.subspan(first * cases.size(), count * cases.size()));

@@ -416,7 +416,8 @@ bool StepwiseSelection::exchange() {
     const std::size_t effect = found_[i];
     std::vector<std::size_t> others;
     for (const std::size_t other : similar_effects_[effect])
-      if (!is_found(other) && !exchanged_.contains({effect, other})) others.push_back(other);
+      if (!is_found(other) && !withdrawn_.contains(other) && !exchanged_.contains({effect, other}))
+        others.push_back(other);
     if (others.empty()) continue;
     options_.tell(0.8, "looking for a replacement of " + kind_of(effect));
     const Hypothesis without = search_.without(current_, effect);
@@ -473,6 +474,9 @@ std::vector<StepwiseSelection::Simpler> StepwiseSelection::simpler_forms() const
 
 bool StepwiseSelection::simplify() {
   for (const Simpler& form : simpler_forms()) {
+    if (std::any_of(form.others.begin(), form.others.end(),
+                    [&](const PlantEffect& other) { return withdrawn_.contains(other.number); }))
+      continue;
     if (!simplified_.insert({form.effect, found_.size()}).second) continue;
     options_.tell(0.8, "trying to simplify " + kind_of(form.effect));
     Hypothesis h = search_.exchanged(current_, form.effect, form.others);

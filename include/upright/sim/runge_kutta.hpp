@@ -1,5 +1,5 @@
-// Runge-Kutta methods on a plant's state, the classical one of order 4 and Kutta's of order 3, for any
-// scalar: double, dual numbers, lanes. Bristles with fast relaxation are integrated by its exponential form.
+// The classical Runge-Kutta method of order 4 on a plant's state, for any scalar: double, dual numbers,
+// lanes. Bristles with fast relaxation are integrated by its exponential form.
 #pragma once
 
 #include <array>
@@ -134,30 +134,6 @@ struct Relaxation {
 
 /// The node of a step at which a rate is evaluated. The caller evaluates that of the beginning.
 enum class Stage : std::uint8_t { middle, end };
-
-/// A state with these numbers, `number(member)`, and a held voltage.
-template <class S, class Number>
-PlantState<S> state_of(const PlantState<S>& held, const Number& number) {
-  using State = PlantState<S>;
-  return {number(&State::cart_m),
-          number(&State::theta_rad),
-          number(&State::cart_mps),
-          number(&State::theta_radps),
-          held.motor_v,
-          number(&State::bristle_m)};
-}
-
-/// Kutta's method of order 3, with nodes at the beginning, in the middle and at the end: see
-/// `runge_kutta_4`.
-template <class S, class Rate>
-PlantState<S> runge_kutta_3(const Rate& rate, const PlantState<S>& s, const PlantState<S>& first,
-                            const S& h) {
-  const PlantState<S> second = rate(moved(s, first, S(S(0.5) * h)), Stage::middle);
-  const PlantState<S> third =
-      rate(state_of(s, [&](auto of) { return s.*of + h * (S(2.0) * second.*of - first.*of); }), Stage::end);
-  const S sixth = h * S(1.0 / 6.0);
-  return state_of(s, [&](auto of) { return s.*of + sixth * (first.*of + S(4.0) * second.*of + third.*of); });
-}
 
 /// One step of length h from `s`. `first`: the rate at its beginning; `rate(state, Stage)`: at the other
 /// nodes. `bristles`: their motion, as `Relaxation` says it, null where no relaxation is fast.
