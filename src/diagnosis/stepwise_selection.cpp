@@ -136,7 +136,9 @@ Evidence StepwiseSelection::evidence_of(Change change, const Hypothesis& from, c
                                         const std::vector<std::size_t>& brought) const {
   Evidence e;
   e.change = change;
-  e.improvement = compare(from, to);
+  // One effect more, or less, has a t value over blocks too, which a residual that lasts does not raise.
+  const bool has_t_value = change == Change::add || change == Change::keep;
+  e.improvement = has_t_value ? compare(from, to, 1.0) : compare(from, to);
   if (!std::isfinite(to.train.objective)) return e;
   e.certainty = std::numeric_limits<double>::infinity();
   for (const std::size_t effect : brought) {
@@ -154,7 +156,7 @@ Decision StepwiseSelection::decided(Evidence& e, Hypothesis& h, std::size_t effe
         return decision;
       case MissingFit::equal_noise:
         equalise_noise(h);
-        e.at_equal_noise = compare(current_, h);
+        e.at_equal_noise = compare(current_, h, 1.0);
         break;
       case MissingFit::simulation:
         e.simulated_gap = search_.simulate(h).gap;
@@ -347,7 +349,7 @@ Decision StepwiseSelection::try_finalist(int round, bool with_low_noise, Finalis
     std::erase_if(finalists_, [&](const auto& earlier) { return earlier.first == finalist.effect; });
     finalists_.emplace_back(effect, h);
   }
-  if (round == 0) finalist_evidence_[effect] = compare(given_, h).train;
+  if (round == 0) finalist_evidence_[effect] = compare(given_, h, 1.0).train;
   Evidence e = evidence_of(Change::add, current_, h, {effect});
   e.penalty = penalty_of(effect);
   e.bends_another = bends_another(h, effect, &Search::is_admissible);
@@ -356,22 +358,18 @@ Decision StepwiseSelection::try_finalist(int round, bool with_low_noise, Finalis
   record_trial(round, effect, h, e.improvement);
   const Decision decision = decided(e, h, effect);
   record_.trials.back().rule = name_of(decision.rule);
+  const bool as_first_seen = decision.rule == Rule::held_out_in_doubt;
+  finalist.score = (as_first_seen ? e.improvement : compare(current_, h, 1.0)).train - penalty_of(effect);
   return decision;
 }
 
 std::size_t StepwiseSelection::choose(std::vector<Finalist>& accepted) {
-  // The data count as much as the best of them leaves room for.
-  const auto rate = [&] {
-    double dispersion = std::numeric_limits<double>::infinity();
-    for (const Finalist& b : accepted) dispersion = std::min(dispersion, b.hypothesis.train.dispersion);
-    double largest = -std::numeric_limits<double>::infinity();
-    for (Finalist& b : accepted) {
-      b.score = compare(current_, b.hypothesis, dispersion).train - penalty_of(b.effect);
-      largest = std::max(largest, b.score);
-    }
-    return largest;
+  const auto largest = [&] {
+    double score = -std::numeric_limits<double>::infinity();
+    for (const Finalist& b : accepted) score = std::max(score, b.score);
+    return score;
   };
-  const double to_reach = (1.0 - policy_.acceptance.close_score_share) * rate();
+  const double to_reach = (1.0 - policy_.acceptance.close_score_share) * largest();
   if (std::count_if(accepted.begin(), accepted.end(), [&](const Finalist& b) { return b.score > to_reach; }) >
       1)
     for (Finalist& b : accepted) {
@@ -379,13 +377,15 @@ std::size_t StepwiseSelection::choose(std::vector<Finalist>& accepted) {
       options_.tell(0.8, "completing the fit of " + kind_of(b.effect));
       Hypothesis further = b.hypothesis;
       search_.refine(b.hypothesis, further);
-      if (further.train.objective < b.hypothesis.train.objective) b.hypothesis = std::move(further);
+      const double gain = b.hypothesis.train.objective - further.train.objective;
+      if (!(gain > 0.0)) continue;
+      b.hypothesis = std::move(further);
+      b.score += gain;
     }
-  rate();
   std::vector<Contender> contenders;
   contenders.reserve(accepted.size());
   for (const Finalist& b : accepted)
-    contenders.push_back({b.effect, b.score, compare(current_, b.hypothesis).held});
+    contenders.push_back({b.effect, b.score, compare(current_, b.hypothesis, 1.0).held});
   return best_of(contenders, policy_.acceptance);
 }
 
