@@ -40,6 +40,7 @@ struct Contacts {
 template <class S>
 class Divisor {
  public:
+  /// Divides by this number.
   explicit Divisor(const S& value) : value_(value) {}
   /// The quotient.
   friend S operator/(const S& dividend, const Divisor& by) { return dividend / by.value_; }
