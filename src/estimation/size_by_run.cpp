@@ -10,6 +10,7 @@ namespace {
 
 std::vector<std::size_t> runs_of(const std::vector<Segment>& segments) {
   std::vector<std::size_t> runs;
+  runs.reserve(segments.size());
   for (const Segment& segment : segments) runs.push_back(segment.run);
   std::sort(runs.begin(), runs.end());
   runs.erase(std::unique(runs.begin(), runs.end()), runs.end());
