@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <sstream>
 
 #include "estimation/size_by_run.hpp"
@@ -119,14 +118,12 @@ RunDifference difference_of(std::size_t effect, const SizeByRun& sizes, const st
   RunDifference result;
   result.effect = effect;
   const Eigen::VectorXd variance = sizes.covariance.diagonal().cwiseMax(1e-300);
-  double smallest_tail = 0.5;
   for (std::size_t r = 0; r < sizes.runs.size(); ++r) {
     const auto at = static_cast<Eigen::Index>(r);
     const double off = normal_95 * std::sqrt(variance[at]);
     result.sizes.push_back({sizes.runs[r], sizes.value[at], sizes.value[at] - off, sizes.value[at] + off});
     const Contrast contrast = against_the_others(sizes, at);
     const double deviate = normal_deviate(contrast.distance / contrast.standard_error, sizes.freedom);
-    smallest_tail = std::min(smallest_tail, upper_tail(deviate));
     result.certainty = std::max(result.certainty, deviate);
   }
   result.certainty_of_help = certainty_of_help(sizes.value.array() - nothing, variance, policy);
