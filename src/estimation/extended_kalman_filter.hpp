@@ -3,7 +3,6 @@
 #pragma once
 
 #include <cmath>
-#include <limits>
 
 #include "linear_step.hpp"
 #include "upright/estimation/noise.hpp"
@@ -12,10 +11,35 @@
 
 namespace upright {
 
-/// Covariance, gains and innovation variances of the filter. Under the right model its innovations are white.
+/// The noise of one filter (S: double) or of several side by side (S: Lanes). The members are those of Noise.
+template <class S>
+struct FilterNoise {
+  S force, torque, coloured_force_n, coloured_torque_nm, correlation_s, sensors, jitter_s;
+  bool pushed;     ///< whether a filter has process noise
+  bool disturbed;  ///< whether a filter has coloured process noise
+};
+
+/// The noise of one filter.
+inline FilterNoise<double> noise_of_filter(const Noise& noise) {
+  const bool disturbed = noise.coloured_force_n > 0.0 || noise.coloured_torque_nm > 0.0;
+  return {noise.force,
+          noise.torque,
+          noise.coloured_force_n,
+          noise.coloured_torque_nm,
+          noise.correlation_s,
+          noise.sensors,
+          noise.jitter_s,
+          noise.force > 0.0 || noise.torque > 0.0 || disturbed,
+          disturbed};
+}
+
+/// Covariance, gains and innovation variances of one filter (S: double) or of several side by side that
+/// follow the same trajectory with different noise (S: Lanes). Under the right model the innovations are
+/// white.
+template <class S>
 class EkfCovariance {
  public:
-  EkfCovariance(const Measurement& run, const Plant& plant, const Noise& noise);
+  EkfCovariance(const Measurement& run, const Plant& plant, const FilterNoise<S>& noise);
 
   /// Propagates the covariance to the next sample.
   void predict(const LinearStep& step);
@@ -27,60 +51,71 @@ class EkfCovariance {
   /// correction.
   void update(const LinearStep& step, int channel);
 
-  double variance() const { return variance_; }
+  const S& variance() const { return variance_; }
   /// Of all states and disturbances.
-  const double* gain() const { return gain_; }
+  const S* gain() const { return gain_; }
   /// Whether the noise has a coloured part.
-  bool disturbed() const { return disturbed_; }
+  bool disturbed() const { return noise_.disturbed; }
   /// What of a disturbance remains after so long.
-  double keeps(double period_s) const;
+  S keeps(double period_s) const;
 
  private:
   static constexpr int states = LinearStep::states, all = states + LinearStep::disturbances;
 
   /// Dry friction under white force: a contact that rests in the model creeps randomly in reality.
   struct Creep {
-    double speed = 0.0;  ///< standard deviation; 0 at rest
-    double keeps = 0.0;  ///< share of a speed that remains one sample later
-    double moves_s = 0.0;
-    double rate_variance = 0.0, covariance = 0.0, place_variance = 0.0;
+    bool creeps = false;  ///< whether it does in a filter; in the others all that is added is zero
+    S keeps, moves_s;     ///< share of a speed that remains one sample later, and how long it lasts
+    S rate_variance, covariance, place_variance;  ///< added over the period
+    S stays;                                      ///< 1 where the contact rests in the filter too, else 0
+  };
+  /// A step along which contacts creep: the same as LinearStep where they do not.
+  struct CreepingStep {
+    S transition[states][states];
+    S by_force[2], by_torque[2];
+    double impulse[LinearStep::disturbances][2];
+    double period_s;
   };
 
   template <int Moving>
-  void correct(double c, int channel, double variance);
-  template <int Moving>
-  void propagate(const LinearStep& step);
-  void propagate(const LinearStep& step);
-  void push_by_disturbances(const LinearStep& step);
-  void decay_disturbances(const LinearStep& step);
-  void propagate_creeping(LinearStep step);
-  Creep creep_of(const LinearStep& step, int contact, double push) const;
+  void correct(double c, int channel, const S& variance);
+  template <int Moving, class Step>
+  void carry(const Step& step);
+  template <class Step>
+  void propagate(const Step& step);
+  template <class Step>
+  void push_by_disturbances(const Step& step);
+  template <class Step>
+  void decay_disturbances(const Step& step);
+  void propagate_creeping(const LinearStep& from);
+  Creep creep_of(const LinearStep& step, int contact, const S& push) const;
 
-  Noise noise_;
+  FilterNoise<S> noise_;
   bool present_[2];
   double sensor_variance_[2];
   bool bristles_;
-  bool disturbed_;
   bool active_ = false;
-  double p_[all][all] = {};
-  double gain_[all] = {}, variance_ = 1.0;
+  S p_[all][all];
+  S gain_[all], variance_{1.0};
 };
 
-/// Minus twice the log likelihood of innovations.
-struct Likelihood {
-  double chi_square = 0.0;
-  double log_variance = 0.0;
+/// Minus twice the log likelihood of innovations, of one filter or of several side by side.
+template <class S>
+struct LikelihoodOf {
+  S chi_square{0.0};
+  S log_variance{0.0};
   double samples = 0.0;
 
-  double objective() const { return chi_square + log_variance; }
+  S objective() const { return chi_square + log_variance; }
 
-  /// Adds one innovation. A value that is not finite makes it infinite.
-  void add(double innovation, double variance, double weight) {
-    constexpr double infinity = std::numeric_limits<double>::infinity();
-    chi_square += std::isfinite(innovation) ? weight * innovation * innovation / variance : infinity;
-    log_variance += weight * std::log(variance);
+  /// Adds one innovation.
+  void add(const S& innovation, const S& variance, double weight) {
+    using std::log;
+    chi_square += weight * innovation * innovation / variance;
+    log_variance += weight * log(variance);
     samples += weight;
   }
 };
+using Likelihood = LikelihoodOf<double>;
 
 }  // namespace upright

@@ -16,17 +16,17 @@ namespace {
 
 /// Gauss-Newton and the estimate of the noise in turn.
 void iterate(const FitData& data, const FitOptions& options, GaussNewton& solver) {
-  const auto objective_with = [&](const Noise& noise) {
-    return noise_objective(data, solver.point().plant, solver.linearised(), noise);
-  };
   const auto estimate = [&](const std::vector<double>& factors) {
     return estimate_noise(data, solver.linearised(), factors, options.coloured_noise, solver.point());
   };
   double objective = solver.evaluate();
-  if (options.alternative_noise &&
-      objective_with(*options.alternative_noise) < objective_with(solver.point().noise)) {
-    solver.point().noise = *options.alternative_noise;
-    objective = solver.evaluate();
+  if (options.alternative_noise) {
+    const std::vector<double> objectives = noise_objectives(
+        data, solver.point().plant, solver.linearised(), {solver.point().noise, *options.alternative_noise});
+    if (objectives[1] < objectives[0]) {
+      solver.point().noise = *options.alternative_noise;
+      objective = solver.evaluate();
+    }
   }
   if (options.noise_rounds == 0) solver.descend(objective);
   if (options.noise_at_end && std::isfinite(objective)) {
@@ -39,7 +39,7 @@ void iterate(const FitData& data, const FitOptions& options, GaussNewton& solver
     constexpr double settled = 2.0, no_matter = 0.5;
     const Noise former = solver.point().noise;
     // What was estimated before is near.
-    const double gain = round == 0 ? estimate({10.0, 2.0, 1.2, 1.04, 1.01}) : estimate({1.2, 1.04, 1.01});
+    const double gain = round == 0 ? estimate({10.0, 2.0, 1.2}) : estimate({1.2});
     if (round > 0 && solver.converged() && gain < no_matter) {
       solver.point().noise = former;
       break;

@@ -128,7 +128,7 @@ class SegmentLineariser {
         sensors_(sensor_gains(dynamics())),
         shown_of_speed_s_(shown_of_cart_speed_s(dynamics())),
         noise_input_(point.plant, run.cart_locked),
-        covariance_(run, point.plant, point.noise) {
+        covariance_(run, point.plant, noise_of_filter(point.noise)) {
     PlantState<Jet> state = without_bristles(start);
     state.bristle_m = Jet(start.bristle_m);
     start_segment(simulator_, run, segment, state);
@@ -301,8 +301,11 @@ class SegmentLineariser {
       for (std::size_t d = 0; d < disturbance_.size(); ++d)
         disturbance_[d] += covariance_.gain()[state_count + d] * e;
       if (normal == nullptr) continue;
+      if (!std::isfinite(e)) {
+        normal->likelihood.chi_square = std::numeric_limits<double>::infinity();
+        return false;
+      }
       normal->likelihood.add(e, covariance_.variance(), step.weight[channel]);
-      if (!std::isfinite(e)) return false;
       add_innovation(step, channel, outputs);
     }
     return true;
@@ -341,7 +344,7 @@ class SegmentLineariser {
   std::array<Row, 2> worth_less_;
   double shown_of_speed_s_;
   NoiseInput noise_input_;
-  EkfCovariance covariance_;
+  EkfCovariance<double> covariance_;
   std::array<Row, state_count> sensitivity_;                    ///< of the state that the filter estimates
   std::array<double, LinearStep::disturbances> disturbance_{};  ///< estimated force and torque
   std::array<Row, LinearStep::disturbances> disturbance_sensitivity_{Row::Zero(), Row::Zero()};

@@ -3,50 +3,79 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 
 #include "base/parallel.hpp"
 #include "extended_kalman_filter.hpp"
+#include "held_out.hpp"
+#include "sim/loop/lanes.hpp"
 #include "state_vector.hpp"
 
 namespace upright {
 
 namespace {
 
-/// Likelihood of a segment that is linearised, had the noise been another: to first order the filtered
+/// As many noises as there are lanes. Those that are missing are the last one again.
+FilterNoise<Lanes> noise_of_filters(const Noise* noises, std::size_t count) {
+  const auto lanes = [&](double Noise::*member) {
+    std::array<double, lane_count> values;
+    for (std::size_t i = 0; i < lane_count; ++i) values[i] = noises[std::min(i, count - 1)].*member;
+    return Lanes::load(values.data());
+  };
+  bool pushed = false, disturbed = false;
+  for (std::size_t i = 0; i < count; ++i) {
+    const FilterNoise<double> one = noise_of_filter(noises[i]);
+    pushed = pushed || one.pushed;
+    disturbed = disturbed || one.disturbed;
+  }
+  return {lanes(&Noise::force),
+          lanes(&Noise::torque),
+          lanes(&Noise::coloured_force_n),
+          lanes(&Noise::coloured_torque_nm),
+          lanes(&Noise::correlation_s),
+          lanes(&Noise::sensors),
+          lanes(&Noise::jitter_s),
+          pushed,
+          disturbed};
+}
+
+/// Objectives of a segment that is linearised, had the noise been another: to first order the filtered
 /// trajectory moves by what the other gains would have corrected.
-Likelihood likelihood_with_noise(const std::vector<LinearStep>& steps, const Measurement& run,
-                                 const Plant& plant, const Noise& noise) {
-  EkfCovariance covariance(run, plant, noise);
-  Likelihood sum;
-  double shift[state_count] = {}, moved[state_count], disturbance[LinearStep::disturbances] = {};
+Lanes objectives_with_noise(const std::vector<LinearStep>& steps, const Measurement& run, const Plant& plant,
+                            const FilterNoise<Lanes>& noise) {
+  EkfCovariance<Lanes> covariance(run, plant, noise);
+  LikelihoodOf<Lanes> sum;
+  Lanes shift[state_count], moved[state_count], disturbance[LinearStep::disturbances];
   for (std::size_t k = 0; k < steps.size(); ++k) {
     const LinearStep& step = steps[k];
     if (k > 0) {
       covariance.predict(step);
-      for (int d = 0; d < LinearStep::disturbances && covariance.disturbed(); ++d) {
-        for (int i = 0; i < 2; ++i) shift[2 + i] += step.impulse[d][i] * disturbance[d];
-        disturbance[d] *= covariance.keeps(step.period_s);
+      if (covariance.disturbed()) {
+        const Lanes keeps = covariance.keeps(step.period_s);
+        for (int d = 0; d < LinearStep::disturbances; ++d) {
+          for (int i = 0; i < 2; ++i) shift[2 + i] += step.impulse[d][i] * disturbance[d];
+          disturbance[d] = keeps * disturbance[d];
+        }
       }
       for (int i = 0; i < state_count; ++i) {
-        moved[i] = 0.0;
-        for (int j = 0; j < state_count; ++j) moved[i] += step.transition[i][j] * shift[j];
+        moved[i] = step.transition[i][0] * shift[0];
+        for (int j = 1; j < state_count; ++j) moved[i] += step.transition[i][j] * shift[j];
       }
       std::copy(moved, moved + state_count, shift);
     }
-    double update[state_count] = {};
+    Lanes update[state_count];
     for (int channel = 0; channel < 2; ++channel) {
       if (!covariance.present(channel)) continue;
       covariance.update(step, channel);
-      const double c = step.gain[channel];
-      const double e = step.residual[channel] - c * (shift[channel] + update[channel]);
+      const Lanes e = step.residual[channel] - step.gain[channel] * (shift[channel] + update[channel]);
       sum.add(e, covariance.variance(), step.weight[channel]);
       for (int i = 0; i < state_count; ++i) update[i] += covariance.gain()[i] * e;
       for (int d = 0; d < LinearStep::disturbances; ++d)
         disturbance[d] += covariance.gain()[state_count + d] * e;
     }
-    for (int i = 0; i < state_count; ++i) shift[i] += update[i] - step.correction[i];
+    for (int i = 0; i < state_count; ++i) shift[i] += update[i] - Lanes(step.correction[i]);
   }
-  return sum;
+  return sum.objective();
 }
 
 /// One number of the noise, of which the likelihood's maximum is sought.
@@ -56,8 +85,6 @@ struct NoiseParameter {
   double floor;
   bool used;
   double Noise::*white = nullptr;  ///< of a coloured part: the white part beside it
-  int tried_at = -1;               ///< after so many changes of the noise neither way was better
-  bool off = false;  ///< nothing, and better so then: the step from there is the same whatever the factor
 
   double moved(const Noise& noise, double move) const {
     const double now = noise.*value;
@@ -93,7 +120,8 @@ std::array<NoiseParameter, noise_parameter_count> noise_parameters(const FitData
                          shortest_correlation_s, coloured}};
 }
 
-/// A pattern search for the noise of a point.
+/// A pattern search for the noise of a point. Many noises cost little more than one, so each pass over the
+/// data looks at every way at once.
 class PatternSearch {
  public:
   PatternSearch(const FitData& data, const std::vector<LinearisedSegment>& linearised, bool coloured,
@@ -102,53 +130,107 @@ class PatternSearch {
         linearised_(linearised),
         point_(point),
         parameters_(noise_parameters(data, point.plant, coloured)),
-        objective_(objective_of(point.noise)) {}
+        objective_(objectives_of({point.noise}).front()) {}
 
   double objective() const { return objective_; }
 
-  /// Multiplies and divides each parameter by a factor until neither is better, three times round at most.
+  /// Multiplies and divides numbers of the noise by a factor until no way is better.
   void search(double factor) {
-    for (NoiseParameter& parameter : parameters_)
-      if (!parameter.off) parameter.tried_at = -1;
-    int so_far = -1;
-    for (int sweep = 0; sweep < 3 && changes_ != so_far; ++sweep) {
-      so_far = changes_;
-      for (NoiseParameter& parameter : parameters_) {
-        if (!parameter.used || parameter.tried_at == changes_ || means_nothing(parameter)) continue;
-        int moves = line_search(parameter, factor);
-        if (moves == 0) moves = line_search(parameter, 1.0 / factor);
-        parameter.tried_at = changes_ += moves;
-      }
+    for (int pass = 0; pass < max_passes; ++pass) {
+      look_around(factor);
+      if (!go_on(factor)) return;
     }
   }
 
+  /// To the vertices of parabolas through the objectives at both sides, as the last search() saw them.
+  void refine(double factor) {
+    Noise joint = point_.noise;
+    std::vector<Noise> noises;
+    for (std::size_t j = 0; j < parameters_.size(); ++j) {
+      const double down = below_[j] - objective_, up = above_[j] - objective_;
+      if (!(down > 0.0 && up > 0.0 && std::isfinite(down + up)) || point_.noise.*parameters_[j].value == 0.0)
+        continue;
+      const double move = std::pow(factor, 0.5 * (down - up) / (down + up));
+      joint.*parameters_[j].value = parameters_[j].moved(point_.noise, move);
+      noises.push_back(with(j, move));
+    }
+    if (noises.size() > 1) noises.push_back(joint);
+    take_best(noises);
+  }
+
  private:
+  /// A bound on the work of each factor. Most searches need two to four passes.
+  static constexpr int max_passes = 12;
+  /// Less is no fall.
+  static constexpr double falls = 1e-3;
+
   /// A correlation time of nothing.
   bool means_nothing(const NoiseParameter& parameter) const {
     return parameter.value == &Noise::correlation_s && point_.noise.coloured_force_n == 0.0 &&
            point_.noise.coloured_torque_nm == 0.0;
   }
 
-  double objective_of(const Noise& noise) const {
-    return noise_objective(data_, point_.plant, linearised_, noise);
+  Noise with(std::size_t j, double move) const {
+    Noise noise = point_.noise;
+    noise.*parameters_[j].value = parameters_[j].moved(noise, move);
+    return noise;
   }
 
-  /// Moves a parameter of the noise one way for as long as the objective falls; returns how often it did.
-  int line_search(NoiseParameter& parameter, double move) {
-    constexpr double falls = 1e-3;
-    for (int moves = 0;; ++moves) {
-      Noise next = point_.noise;
-      const double now = next.*parameter.value;
-      next.*parameter.value = parameter.moved(next, move);
-      if (next.*parameter.value == now) return moves;
-      const double reached = objective_of(next);
-      if (!(reached < objective_ - falls)) {
-        parameter.off = now == 0.0;
-        return moves;
+  std::vector<double> objectives_of(const std::vector<Noise>& noises) const {
+    return noise_objectives(data_, point_.plant, linearised_, noises);
+  }
+
+  /// The objectives with each number changed alone, one way and the other. Infinite where it cannot be.
+  void look_around(double factor) {
+    std::vector<Noise> noises;
+    std::vector<double*> places;
+    for (std::size_t j = 0; j < parameters_.size(); ++j) {
+      below_[j] = above_[j] = std::numeric_limits<double>::infinity();
+      if (!parameters_[j].used || means_nothing(parameters_[j])) continue;
+      for (const bool up : {false, true}) {
+        const Noise noise = with(j, up ? factor : 1.0 / factor);
+        if (noise.*parameters_[j].value == point_.noise.*parameters_[j].value) continue;
+        noises.push_back(noise);
+        places.push_back(up ? &above_[j] : &below_[j]);
       }
-      objective_ = reached;
-      point_.noise = next;
     }
+    const std::vector<double> objectives = objectives_of(noises);
+    for (std::size_t i = 0; i < places.size(); ++i) *places[i] = objectives[i];
+  }
+
+  /// Changes all numbers that are better changed together, and the best one alone, by several powers of the
+  /// factor. Whether that is better.
+  bool go_on(double factor) {
+    std::array<double, noise_parameter_count> moves{};
+    std::size_t best = 0, changed = 0;
+    const auto least = [&](std::size_t j) { return std::min(below_[j], above_[j]); };
+    for (std::size_t j = 0; j < parameters_.size(); ++j) {
+      if (!(least(j) < objective_ - falls)) continue;
+      moves[j] = above_[j] < below_[j] ? factor : 1.0 / factor;
+      if (changed++ == 0 || least(j) < least(best)) best = j;
+    }
+    if (changed == 0) return false;
+    std::vector<Noise> noises;
+    for (const int power : {1, 2, 3, 4}) {
+      Noise joint = point_.noise;
+      for (std::size_t j = 0; j < parameters_.size(); ++j)
+        if (moves[j] != 0.0)
+          joint.*parameters_[j].value = parameters_[j].moved(point_.noise, std::pow(moves[j], power));
+      noises.push_back(joint);
+      if (changed > 1) noises.push_back(with(best, std::pow(moves[best], power)));
+    }
+    return take_best(noises);
+  }
+
+  /// Takes the best of these if it is better than what is there.
+  bool take_best(const std::vector<Noise>& noises) {
+    if (noises.empty()) return false;
+    const std::vector<double> objectives = objectives_of(noises);
+    const auto best = std::min_element(objectives.begin(), objectives.end());
+    if (!(*best < objective_ - falls)) return false;
+    objective_ = *best;
+    point_.noise = noises[static_cast<std::size_t>(best - objectives.begin())];
+    return true;
   }
 
   const FitData& data_;
@@ -156,29 +238,69 @@ class PatternSearch {
   FitPoint& point_;
   std::array<NoiseParameter, noise_parameter_count> parameters_;
   double objective_;
-  int changes_ = 0;
+  std::array<double, noise_parameter_count> below_{}, above_{};  ///< of look_around()
 };
 
 }  // namespace
 
-double noise_objective(const FitData& data, const Plant& plant,
-                       const std::vector<LinearisedSegment>& linearised, const Noise& noise) {
-  std::vector<double> parts(data.segments.size());
-  parallel_for(parts.size(), [&](std::size_t s) {
-    parts[s] = likelihood_with_noise(linearised[s].steps, (*data.runs)[data.segments[s].run], plant, noise)
-                   .objective();
-  });
-  double sum = 0.0;
-  for (const double part : parts) sum += part;
-  return sum;
+std::vector<double> noise_objectives(const FitData& data, const Plant& plant,
+                                     const std::vector<LinearisedSegment>& linearised,
+                                     const std::vector<Noise>& noises) {
+  std::vector<double> sums(noises.size(), 0.0);
+  for (std::size_t first = 0; first < noises.size(); first += lane_count) {
+    const std::size_t count = std::min(lane_count, noises.size() - first);
+    const FilterNoise<Lanes> together = noise_of_filters(noises.data() + first, count);
+    std::vector<std::array<double, lane_count>> parts(data.segments.size());
+    parallel_for(parts.size(), [&](std::size_t s) {
+      parts[s] =
+          objectives_with_noise(linearised[s].steps, (*data.runs)[data.segments[s].run], plant, together)
+              .values();
+    });
+    for (const auto& part : parts)
+      for (std::size_t i = 0; i < count; ++i) sums[first + i] += part[i];
+  }
+  return sums;
 }
+
+namespace {
+
+/// Every few segments: enough samples for coarse steps of a few numbers.
+std::vector<std::size_t> some_segments(const FitData& data) {
+  constexpr double enough_samples = 5000.0;
+  const auto stride = static_cast<std::size_t>(std::max(sample_count(data) / enough_samples, 1.0));
+  std::vector<std::size_t> some;
+  for (std::size_t s = stride / 2; s < data.segments.size(); s += stride) some.push_back(s);
+  return some;
+}
+
+/// The coarse steps, with some of the segments only.
+void estimate_coarsely(const FitData& data, const std::vector<LinearisedSegment>& linearised,
+                       const std::vector<double>& factors, bool coloured, FitPoint& point) {
+  FitData part = data;
+  part.segments.clear();
+  std::vector<LinearisedSegment> linearised_part;
+  for (const std::size_t s : some_segments(data)) {
+    part.segments.push_back(data.segments[s]);
+    linearised_part.push_back(linearised[s]);
+  }
+  PatternSearch pattern(part, linearised_part, coloured, point);
+  for (const double factor : factors) pattern.search(factor);
+}
+
+}  // namespace
 
 double estimate_noise(const FitData& data, const std::vector<LinearisedSegment>& linearised,
                       const std::vector<double>& factors, bool coloured, FitPoint& point) {
+  const Noise former = point.noise;
+  const std::vector<double> coarse(factors.begin(), factors.end() - 1);
+  if (!coarse.empty()) estimate_coarsely(data, linearised, coarse, coloured, point);
+  const double before = noise_objectives(data, point.plant, linearised, {former}).front();
   PatternSearch pattern(data, linearised, coloured, point);
-  const double before = pattern.objective();
-  for (const double factor : factors) pattern.search(factor);
-  return before - pattern.objective();
+  pattern.search(factors.back());
+  pattern.refine(factors.back());
+  if (pattern.objective() < before) return before - pattern.objective();
+  point.noise = former;
+  return 0.0;
 }
 
 }  // namespace upright

@@ -7,12 +7,14 @@
 
 namespace upright {
 
-/// Minus twice the log likelihood of the data with another noise.
-double noise_objective(const FitData& data, const Plant& plant,
-                       const std::vector<LinearisedSegment>& linearised, const Noise& noise);
+/// Minus twice the log likelihood of the data with each of these noises, side by side in SIMD lanes.
+std::vector<double> noise_objectives(const FitData& data, const Plant& plant,
+                                     const std::vector<LinearisedSegment>& linearised,
+                                     const std::vector<Noise>& noises);
 
-/// Maximum likelihood estimate of the noise of a point, by a pattern search with these factors, which become
-/// finer; its coloured part only if wanted. Returns the fall of the objective.
+/// Maximum likelihood estimate of the noise of a point: a pattern search with these factors, each finer than
+/// the one before, and a step to the vertex of parabolas at the end. The coloured part is estimated only if
+/// wanted. Returns the fall of the objective.
 double estimate_noise(const FitData& data, const std::vector<LinearisedSegment>& linearised,
                       const std::vector<double>& factors, bool coloured, FitPoint& point);
 

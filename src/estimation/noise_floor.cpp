@@ -17,29 +17,50 @@ namespace {
 using State = Eigen::Matrix<double, state_count, 1>;
 using Transition = Eigen::Matrix<double, state_count, state_count, Eigen::RowMajor>;
 
-/// Least squares of the initial state over residuals, to take out what a fit of it would.
+/// What a fit of the initial state takes out of the residuals of a segment: the same for all draws.
 class InitialStateFit {
  public:
-  void add(const State& row, double residual, double weight) {
-    information_ += weight * row * row.transpose();
-    score_ += weight * residual * row;
-  }
-  State solve() const {
-    const State scale =
-        information_.diagonal().unaryExpr([](double v) { return v > 0.0 ? 1.0 / std::sqrt(v) : 0.0; });
-    Transition unit = scale.asDiagonal() * information_ * scale.asDiagonal();
+  InitialStateFit(const std::vector<LinearStep>& steps, const std::array<bool, 2>& present) {
+    Transition since_start = Transition::Identity(), information = Transition::Zero();
+    for (const LinearStep& step : steps) {
+      since_start = Eigen::Map<const Transition>(&step.transition[0][0]) * since_start;
+      for (int channel = 0; channel < 2; ++channel) {
+        if (!present[static_cast<std::size_t>(channel)]) continue;
+        const State row = step.gain[channel] * since_start.row(channel).transpose();
+        const double weight = step.weight[channel] / step.variance[channel];
+        information += weight * row * row.transpose();
+        rows_.push_back(row);
+        weights_.push_back(weight);
+        count_ += step.weight[channel];
+      }
+    }
+    scale_ = information.diagonal().unaryExpr([](double v) { return v > 0.0 ? 1.0 / std::sqrt(v) : 0.0; });
+    Transition unit = scale_.asDiagonal() * information * scale_.asDiagonal();
     unit.diagonal().array() += 1e-9;
-    return scale.asDiagonal() * State(unit.ldlt().solve(State(scale.asDiagonal() * score_)));
+    solver_.compute(unit);
   }
+
+  /// The weighted sum of squares that is left of these residuals, in the order of steps and channels.
+  double left_of(const std::vector<double>& residuals) const {
+    State score = State::Zero();
+    for (std::size_t k = 0; k < residuals.size(); ++k) score += weights_[k] * residuals[k] * rows_[k];
+    const State fitted = scale_.asDiagonal() * State(solver_.solve(State(scale_.asDiagonal() * score)));
+    double sum = 0.0;
+    for (std::size_t k = 0; k < residuals.size(); ++k) {
+      const double left = residuals[k] - rows_[k].dot(fitted);
+      sum += weights_[k] * left * left;
+    }
+    return sum;
+  }
+  /// How many measurements there are, weighted.
+  double count() const { return count_; }
 
  private:
-  Transition information_ = Transition::Zero();
-  State score_ = State::Zero();
-};
-
-struct Shown {
-  State row;  ///< d residual / d initial state
-  double residual, weight;
+  std::vector<State> rows_;  ///< derivatives of the residuals with respect to the initial state
+  std::vector<double> weights_;
+  State scale_;
+  Eigen::LDLT<Transition> solver_;
+  double count_ = 0.0;
 };
 
 /// Pushes with the coloured disturbances over a period, and draws those of the next one.
@@ -56,46 +77,26 @@ void advance_coloured(const LinearStep& step, const Noise& noise, double (&colou
   }
 }
 
-/// One draw of the noise along a segment: the sum of squares that is left, and of how many numbers.
-std::array<double, 2> draw(const std::vector<LinearStep>& steps, const std::array<bool, 2>& present,
-                           const Noise& noise, std::mt19937_64& random) {
+/// One draw of the noise along a segment: the residuals that it causes.
+void draw(const std::vector<LinearStep>& steps, const std::array<bool, 2>& present, const Noise& noise,
+          std::mt19937_64& random, std::vector<double>& residuals) {
   std::normal_distribution<double> normal;
   State error = State::Zero();
   double coloured[] = {noise.coloured_force_n * normal(random), noise.coloured_torque_nm * normal(random)};
-  Transition since_start = Transition::Identity();
-  InitialStateFit start;
-  std::vector<Shown> all;
+  residuals.clear();
   for (const LinearStep& step : steps) {
     const double root = std::sqrt(step.period_s);
     const double force = noise.force * root * normal(random), torque = noise.torque * root * normal(random);
     error[2] += step.by_force[0] * force + step.by_torque[0] * torque;
     error[3] += step.by_force[1] * force + step.by_torque[1] * torque;
     advance_coloured(step, noise, coloured, error, [&] { return normal(random); });
-    const Eigen::Map<const Transition> transition(&step.transition[0][0]);
-    error = transition * error;
-    since_start = transition * since_start;
+    error = State(Eigen::Map<const Transition>(&step.transition[0][0]) * error);
     for (int channel = 0; channel < 2; ++channel) {
       if (!present[static_cast<std::size_t>(channel)]) continue;
       const double sensor = noise.sensors * std::sqrt(step.variance[channel]) * normal(random);
-      const double weight = step.weight[channel] / step.variance[channel];
-      const Shown shown{step.gain[channel] * since_start.row(channel).transpose(),
-                        step.gain[channel] * error[channel] + sensor, weight};
-      start.add(shown.row, shown.residual, shown.weight);
-      all.push_back(shown);
+      residuals.push_back(step.gain[channel] * error[channel] + sensor);
     }
   }
-  const State fitted = start.solve();
-  std::array<double, 2> sums{};
-  std::size_t k = 0;
-  for (const LinearStep& step : steps)
-    for (int channel = 0; channel < 2; ++channel) {
-      if (!present[static_cast<std::size_t>(channel)]) continue;
-      const Shown& shown = all[k++];
-      const double left = shown.residual - shown.row.dot(fitted);
-      sums[0] += shown.weight * left * left;
-      sums[1] += step.weight[channel];
-    }
-  return sums;
 }
 
 }  // namespace
@@ -104,22 +105,27 @@ SimulationFloor simulation_floor(const FitData& data, const FitPoint& point, std
   FitPoint plain = point;
   plain.noise = sensors_only(plain.noise);
   const std::vector<std::vector<LinearStep>> steps = linearise(data, plain);
-  std::vector<double> sums(draws, 0.0);
+  const auto present = [&](std::size_t s) {
+    const Measurement& run = (*data.runs)[data.segments[s].run];
+    return std::array<bool, 2>{run.has_cart(), run.has_theta() && point.plant.pendulum.has_value()};
+  };
+  std::vector<InitialStateFit> fits;
+  fits.reserve(steps.size());
   double count = 0.0;
+  for (std::size_t s = 0; s < steps.size(); ++s) {
+    fits.emplace_back(steps[s], present(s));
+    count += fits.back().count();
+  }
+  if (!(count > 0.0)) return {};
+  std::vector<double> sums(draws, 0.0);
   parallel_for(draws, [&](std::size_t i) {
     std::mt19937_64 random(i + 1);
-    double counted = 0.0;
+    std::vector<double> residuals;
     for (std::size_t s = 0; s < steps.size(); ++s) {
-      const Measurement& run = (*data.runs)[data.segments[s].run];
-      const std::array<double, 2> drawn =
-          draw(steps[s], {run.has_cart(), run.has_theta() && point.plant.pendulum.has_value()}, point.noise,
-               random);
-      sums[i] += drawn[0];
-      counted += drawn[1];
+      draw(steps[s], present(s), point.noise, random, residuals);
+      sums[i] += fits[s].left_of(residuals);
     }
-    if (i == 0) count = counted;
   });
-  if (!(count > 0.0)) return {};
   std::sort(sums.begin(), sums.end());
   const auto as_rms = [&](double sum) { return std::max(1.0, std::sqrt(sum / count)); };
   return {as_rms(sums[draws / 2]), as_rms(sums[draws - 1])};
