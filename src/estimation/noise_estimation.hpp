@@ -13,7 +13,7 @@ std::vector<double> noise_objectives(const FitData& data, const Plant& plant,
                                      const std::vector<Noise>& noises);
 
 /// Maximum likelihood estimate of the noise of a point: a pattern search with these factors, each finer than
-/// the one before, and a step to the vertex of parabolas at the end. The coloured part is estimated only if
+/// the one before, and Newton steps at the end. The coloured part is estimated only if
 /// wanted. Returns the fall of the objective.
 double estimate_noise(const FitData& data, const std::vector<LinearisedSegment>& linearised,
                       const std::vector<double>& factors, bool coloured, FitPoint& point);
