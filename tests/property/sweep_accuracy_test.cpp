@@ -214,6 +214,20 @@ TEST(SweepAccuracyOfBristles, StiffOnesHoldTheBarOn240RandomRuns) {
   std::printf("stiff bristles: worst error %.1e rad\n", worst);
 }
 
+TEST(SweepAccuracyOfPivots, LargerSmoothedFrictionIsNotForLanes) {
+  LoopSetup setup;
+  setup.sampled = true;
+  for (const bool larger : {false, true}) {
+    Plant plant = read_plant_file(std::string(UPRIGHT_SOURCE_DIR) + "/config/plants/exponential.yaml");
+    plant.set("pivot_coulomb_friction", {larger ? 0.051 : 0.05});
+    setup.model = make_model<double>(plant);
+    setup.model.smoothing = 100.0;
+    EXPECT_EQ(lanes_can_run(setup), !larger);
+    setup.model.smoothing = 0.0;
+    EXPECT_TRUE(lanes_can_run(setup));
+  }
+}
+
 /// Friction near rest of any strength, over velocities down to where lanes step by the classical method.
 TEST(SweepAccuracyOfStribeck, AnyHoldsTheBarOn240RandomRuns) {
   std::mt19937_64 random(24);
@@ -252,6 +266,7 @@ const Friction everywhere[] = {{"smooth", "exponential", 100.0},
 const Friction sampled_only[] = {
     {"pivot_smooth", "exponential", 100.0, "pivot_coulomb_friction", {0.01}},
     {"large_pivot_smooth", "exponential", 100.0, "pivot_coulomb_friction", {0.03}},
+    {"largest_pivot_smooth", "exponential", 100.0, "pivot_coulomb_friction", {0.05}},
     {"lag_smooth", "exponential", 100.0, "motor_lag", {0.001}},
     {"lag_stick_slip", "exponential", 0.0, "motor_lag", {0.0004}},
     {"lag_bristles", "dynamic", 0.0, "motor_lag", {0.001}},
