@@ -21,6 +21,7 @@
 #include "lane_model.hpp"
 #include "lane_motor.hpp"
 #include "lane_relaxation.hpp"
+#include "series_step.hpp"
 #include "upright/sim/runge_kutta.hpp"
 
 namespace upright {
@@ -32,10 +33,12 @@ class EventPeriod {
  public:
   EventPeriod(const LaneParts& parts, const PlantModel<Lanes>& model, const Present& present)
       : physics_(model, present),
+        series_(constants_of(model), present),
         motor_(model),
         sticks_(may_stick<Present> && physics_.cart_can_stick()),
         pivot_sticks_(physics_.pivot_can_stick()),
         cart_turns_(physics_.cart_has_kink()),
+        by_series_(sticks_ && parts.short_series),
         stiff_(parts.stiff_bristles) {
     if (sticks_ && is_common_set<Present>) find_static_friction(Lanes(0.0), everywhere_);
   }
@@ -73,6 +76,8 @@ class EventPeriod {
 
   /// One step in every lane that is within a period.
   [[gnu::flatten]] void advance(Steps& steps) const {
+    if constexpr (may_step_by_series)
+      if (by_series_) return advance_by_series(steps);
     const LaneMask stay = steps.taken >= Lanes(max_steps);
     const Begin begin = begin_of(steps);
     Step step{length_of(steps, begin, stay), {}, {}};
@@ -154,6 +159,11 @@ class EventPeriod {
 
   /// Inlined where it pays: into the common loops.
   static constexpr bool inlines = is_common_set<Present> && !second;
+  /// Of the common loops, those with bristles have corners where the cart begins to move.
+  static constexpr bool may_step_by_series = inlines && may_stick<Present>;
+  struct NoSeries {
+    NoSeries(const PlantModel<LaneConstant>& /*model*/, const Present& /*present*/) {}
+  };
   Begin begin_of(Steps& steps) const {
     if constexpr (inlines)
       return begin_of_inlined(steps);
@@ -174,13 +184,13 @@ class EventPeriod {
       steps.modes.cart = select(steps.settles, sign_of(begin.rate.cart_mps), steps.modes.cart);
       return begin;
     }
-    const auto balance = physics_.balance(at, motor_v);
+    const auto balance = physics_.cart_balance(at, motor_v);
     if (any(at.cart_mps == Lanes(0.0))) {
       if constexpr (is_common_set<Present>)
         static_cast<StaticFriction&>(begin) = everywhere_;
       else
         find_static_friction(at.cart_m, begin);
-      const Lanes load = physics_.cart_load(at, balance);
+      const Lanes& load = balance.load;
       begin.excess_n = excess_of(load, begin.forward_n, begin.backward_n);
       const Lanes moves = select(begin.excess_n > Lanes(0.0), sign_of(load), Lanes(0.0));
       steps.modes.cart = select(steps.settles, moves, steps.modes.cart);
@@ -192,6 +202,86 @@ class EventPeriod {
   void find_static_friction(const Lanes& cart_m, StaticFriction& friction) const {
     friction.forward_n = physics_.cart_dry_level(cart_m, Lanes(0.0), Lanes(1.0));
     friction.backward_n = physics_.cart_dry_level(cart_m, Lanes(0.0), Lanes(-1.0));
+  }
+
+  /// One step in every lane that is within a period, by Taylor series.
+  [[gnu::flatten, gnu::noinline]] void advance_by_series(Steps& steps) const {
+    const Lanes zero(0.0);
+    SeriesMotion motion(series_, steps.state, steps.drive_v);
+    Lanes& mode = steps.modes.cart;
+    if (any(steps.settles)) {
+      const Lanes& load = motion.load_n.value;
+      const Lanes excess = excess_of(load, everywhere_.forward_n, everywhere_.backward_n);
+      mode = select(steps.settles, select(excess > zero, sign_of(load), zero), mode);
+    }
+    motion.develop(series_, steps.drive_v, mode);
+    Lanes h = motion.exact_part_of(smaller(steps.left_s, steps.longest_s));
+    Lanes v = motion.cart_mps_after(h);
+    const Lanes slowed = steps.state.cart_mps + h * motion.cart_mps2.value;
+    const Lanes load = motion.load_n_after(h);
+    const Lanes excess = excess_of(load, everywhere_.forward_n, everywhere_.backward_n);
+    const LaneMask active = h > zero, resting = mode == zero;
+    // Past a stop at the end, or with the present deceleration.
+    const LaneMask stops = smaller(mode * v, mode * slowed) < zero;
+    const LaneMask meets = active & (stops | (resting & (excess > zero)));
+    steps.settles = active & !active;
+    Lanes retry_s = zero;
+    if (any(meets)) {
+      const SeriesMeeting met = meeting_of(steps, motion, meets, h, load);
+      h = met.length_s;
+      v = select(met.stops, zero, v);
+      if (any(met.slides_less)) v = select(met.slides_less, motion.cart_mps_after(h), v);
+      mode = select(met.stops | met.rests, zero, select(met.breaks, sign_of(load), mode));
+      const LaneMask stay = steps.taken >= Lanes(max_steps);
+      steps.settles = met.stops & !stay;
+      retry_s = select(met.retries, met.retry_s, zero);
+      steps.taken = steps.taken + select(meets, Lanes(1.0), zero);
+    }
+    motion.move(steps.state, h);
+    steps.state.cart_mps = v;
+    steps.left_s = steps.left_s - h;
+    steps.longest_s = select(retry_s > zero, retry_s, steps.left_s);
+    const LaneMask next = (steps.left_s == zero) & (steps.late_s > zero);
+    if (any(next)) {
+      hold(steps, next, steps.late_v, steps.late_s);
+      steps.late_s = select(next, zero, steps.late_s);
+    }
+  }
+
+  /// What lanes that meet an event within a step of at most this length do. `load`: on the cart at its end.
+  [[gnu::always_inline]] SeriesMeeting meeting_of(const Steps& steps, const SeriesMotion& motion,
+                                                  const LaneMask& meets, const Lanes& longest_s,
+                                                  const Lanes& load) const {
+    const Lanes zero(0.0);
+    const Lanes& mode = steps.modes.cart;
+    const LaneMask resting = mode == zero;
+    const Lanes side = sign_of(load);
+    const Lanes held = select(side > zero, everywhere_.forward_n, everywhere_.backward_n);
+    const LaneSeries<3>&a = motion.cart_mps2, &l = motion.load_n;
+    const auto coarse_resting = CoarseLanes::narrowed(resting);
+    const CoarseLanes coarse_side(side), coarse_mode(mode);
+    const auto of = [&](const CoarseLanes& moving, const CoarseLanes& rest) {
+      return select(coarse_resting, -(coarse_side * rest), coarse_mode * moving);
+    };
+    const EventPolynomial g{select(resting, larger(held - side * l.value, zero), mode * steps.state.cart_mps),
+                            select(resting, -(side * l.more[0].widened()), mode * a.value),
+                            of(0.5f * a.more[0], l.more[1]), of((1.0f / 3.0f) * a.more[1], l.more[2]),
+                            of(0.25f * a.more[2], CoarseLanes(0.0f))};
+    const EventTime event = first_zero(g, longest_s);
+    const LaneMask stay = steps.taken >= Lanes(max_steps);
+    SeriesMeeting met{};
+    met.rests = meets & !resting & (steps.state.cart_mps == zero) & (g.slope <= zero);
+    const LaneMask moves = meets & !resting & !met.rests;
+    met.stops = moves & (event.found | stay);
+    met.breaks = meets & resting & event.found & !stay;
+    const Lanes at_s =
+        select(met.breaks, smaller(event.at_s + Lanes(LaneMeeting::late_breakaway_s), longest_s), event.at_s);
+    const LaneMask past = event.left < zero;
+    met.retries = past & ((moves & !met.stops) | (meets & resting & !event.found & !stay));
+    met.retry_s = Lanes(0.5) * event.at_s;
+    met.slides_less = meets & !resting & !met.stops;
+    met.length_s = select(meets & !(resting & stay), select(met.retries | met.rests, zero, at_s), longest_s);
+    return met;
   }
 
   Begin begin_of_both(Steps& steps) const {
@@ -261,8 +351,8 @@ class EventPeriod {
   [[gnu::flatten, gnu::noinline]] CartRate rate_of_cart(const State& state, const Lanes& motor_v,
                                                         const Lanes& direction) const {
     if (!sticks_) return {unheld_rate(state, motor_v, direction), Lanes(0.0)};
-    const auto balance = physics_.balance(state, motor_v);
-    return {physics_.derivative_by_direction(state, balance, direction), physics_.cart_load(state, balance)};
+    const auto balance = physics_.cart_balance(state, motor_v);
+    return {physics_.derivative_by_direction(state, balance, direction), balance.load};
   }
 
   [[gnu::flatten, gnu::noinline]] BothRate rate_of_both(const State& state, const Lanes& motor_v,
@@ -371,8 +461,10 @@ class EventPeriod {
   }
 
   Dynamics<Lanes, Present> physics_;
+  std::conditional_t<may_step_by_series, Dynamics<LaneConstant, Present>, NoSeries> series_;
   std::conditional_t<second, LaneMotor, PromptMotor> motor_;
   bool sticks_, pivot_sticks_, cart_turns_;
+  bool by_series_;               ///< in place of the classical method
   bool stiff_;                   ///< bristles relax too fast for the classical method
   StaticFriction everywhere_{};  ///< of the common sets, whose levels are the same at every place
 };

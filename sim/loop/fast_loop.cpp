@@ -225,7 +225,7 @@ class SampledRuns {
     for (;;) {
       const Mask arrived = narrowed(Period::arrived(steps_), begun_ <= periods_);
       if (any(arrived)) {
-        seen_.take(arrived, begun_ * period_s, steps_.state);
+        seen_.take(arrived, begun_ * period_s, steps_.state, command_);
         begun_ = select(arrived, begun_ + one, begun_);
         if (!end_runs()) return;
         control(narrowed(arrived, (begun_ > Lanes(0.0)) & (begun_ <= periods_)));

@@ -30,6 +30,7 @@ struct LaneParts {
   /// Each lane goes at its own pace from event to event; otherwise all lanes go in step.
   bool own_pace = false;
   bool stiff_bristles = false;  ///< they relax too fast for the classical method
+  bool short_series = false;    ///< few terms of a Taylor series tell the motion over a period
   /// At its own pace: the pendulum may stick in its pivot, or the motor lags.
   bool pivot_or_lag = false;
 };

@@ -12,7 +12,10 @@ template <>
 class Divisor<Lanes> {
  public:
   explicit Divisor(const Lanes& value) : inverse_(inverse(value)) {}
-  friend Lanes operator/(const Lanes& dividend, const Divisor& by) { return dividend * by.inverse_; }
+  template <class T>
+  friend T operator/(const T& dividend, const Divisor& by) {
+    return dividend * by.inverse_;
+  }
 
  private:
   Lanes inverse_;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <bit>
+#include <cmath>
 #include <span>
 
 #include "lane_model.hpp"
@@ -18,14 +19,16 @@ class LaneResults {
   void begin(std::size_t lane) {
     alive_ |= 1u << lane;
     fall_time_s_[lane] = std::numeric_limits<double>::quiet_NaN();
-    for (Lanes* zero : {&previous_theta_, &previous_s_, &cart_max_}) put(*zero, lane, 0.0);
+    for (Lanes* zero : {&previous_theta_, &previous_s_, &cart_max_, &squares_v2_, &periods_})
+      put(*zero, lane, 0.0);
     for (Lanes* low : {&theta_low_, &cart_low_}) put(*low, lane, infinite);
     for (Lanes* high : {&theta_high_, &cart_high_}) put(*high, lane, -infinite);
   }
 
-  /// Records the motion of these lanes, each at its time. Fallen lanes are reset to rest upright.
+  /// Records the motion of these lanes, each at its time, and the voltage before it. Fallen lanes are reset
+  /// to rest upright.
   template <class Mask>
-  void take(const Mask& lanes, const Lanes& time_s, PlantState<Lanes>& state) {
+  void take(const Mask& lanes, const Lanes& time_s, PlantState<Lanes>& state, const Lanes& voltage_v) {
     const LaneMask fallen = lanes & !(absolute(state.theta_rad) < Lanes(fell_above_rad_));
     if (any(fallen)) drop_fallen(fallen.bits(), time_s, state);
     previous_theta_ = select(lanes, state.theta_rad, previous_theta_);
@@ -37,6 +40,8 @@ class LaneResults {
     theta_high_ = select(late, larger(theta_high_, state.theta_rad), theta_high_);
     cart_low_ = select(late, smaller(cart_low_, state.cart_m), cart_low_);
     cart_high_ = select(late, larger(cart_high_, state.cart_m), cart_high_);
+    squares_v2_ = select(late, squares_v2_ + voltage_v * voltage_v, squares_v2_);
+    periods_ = select(late, periods_ + Lanes(1.0), periods_);
   }
 
   /// Bit i: the run of lane i has not fallen.
@@ -56,6 +61,7 @@ class LaneResults {
     const auto value = [i](const Lanes& lanes) { return lanes.values()[i]; };
     result.theta_amplitude_rad = 0.5 * value(theta_high_ - theta_low_);
     result.cart_amplitude_m = 0.5 * value(cart_high_ - cart_low_);
+    result.voltage_rms_v = std::sqrt(value(squares_v2_) / value(periods_));
     result.end = {value(state.cart_m),      value(state.theta_rad), value(state.cart_mps),
                   value(state.theta_radps), value(state.motor_v),   value(state.bristle_m)};
     return result;
@@ -92,6 +98,7 @@ class LaneResults {
   std::array<double, lane_count> fall_time_s_{}, fallen_cart_m_{};
   std::array<PlantState<double>, lane_count> fallen_{};
   Lanes previous_theta_, previous_s_, cart_max_;
+  Lanes squares_v2_, periods_;  ///< of the last third
   Lanes theta_low_{infinite}, theta_high_{-infinite}, cart_low_{infinite}, cart_high_{-infinite};
 };
 

@@ -19,6 +19,8 @@
 #pragma GCC diagnostic pop
 
 // Left to itself the compiler calls these through memory, which takes longer than what they do.
+#include "upright/model/elementary.hpp"
+
 #define UPRIGHT_LANES_INLINE [[gnu::always_inline]] inline
 
 namespace upright {
@@ -213,6 +215,10 @@ class Lanes {
       lanes.part_[i] = lanes_detail::gathered(numbers, places.data() + i * Batch::size);
     return lanes;
   }
+  /// By register.
+  using Parts = std::array<Batch, lanes_detail::parts>;
+  explicit Lanes(const Parts& parts) : part_(parts) {}
+  const Parts& parts() const { return part_; }
   void store(double* numbers) const {
     for (std::size_t i = 0; i < part_.size(); ++i) part_[i].store_unaligned(numbers + i * Batch::size);
   }
@@ -285,6 +291,17 @@ class Lanes {
   }
   UPRIGHT_LANES_INLINE friend Lanes sin(const Lanes& a) { return map(a, lanes_detail::sine); }
   UPRIGHT_LANES_INLINE friend Lanes cos(const Lanes& a) { return map(a, lanes_detail::cosine); }
+  UPRIGHT_LANES_INLINE friend elementary::SineAndCosine<Lanes> both_of(const Lanes& angle) {
+    if (!any(absolute(angle) > Lanes(lanes_detail::direct_angle)))
+      return {map(angle, lanes_detail::sine_polynomial), map(angle, lanes_detail::cosine_polynomial)};
+    elementary::SineAndCosine<Lanes> both{Lanes(uninitialised{}), Lanes(uninitialised{})};
+    for (std::size_t i = 0; i < angle.part_.size(); ++i) {
+      const lanes_detail::Reduced r = lanes_detail::reduced(angle.part_[i]);
+      both.sine.part_[i] = r.sign * lanes_detail::sine_polynomial(r.angle);
+      both.cosine.part_[i] = r.sign * lanes_detail::cosine_polynomial(r.angle);
+    }
+    return both;
+  }
   UPRIGHT_LANES_INLINE friend Lanes exp(const Lanes& a) { return map(a, lanes_detail::exponential); }
   UPRIGHT_LANES_INLINE friend Lanes tanh(const Lanes& a) { return map(a, lanes_detail::hyperbolic_tangent); }
   UPRIGHT_LANES_INLINE friend Lanes log(const Lanes& a) {
@@ -321,7 +338,7 @@ class Lanes {
     return result;
   }
 
-  std::array<Batch, lanes_detail::parts> part_;
+  Parts part_;
 };
 
 }  // namespace upright

@@ -29,10 +29,17 @@ PlantState<double> released_at(double theta_rad) {
 class Watcher {
  public:
   Watcher(const LoopSetup& setup, const LoopObserver& observer)
-      : range_(setup.window_begin_s()), observer_(observer) {}
+      : sampled_(setup.sampled),
+        window_begin_s_(setup.window_begin_s()),
+        range_(window_begin_s_),
+        observer_(observer) {}
 
   void take(double time_s, const PlantState<double>& state, double voltage_v) {
     range_.take(time_s, state.theta_rad, state.cart_m);
+    if (time_s >= window_begin_s_) {
+      squares_v2_ += voltage_v * voltage_v;
+      periods_ += 1.0;
+    }
     if (observer_) observer_(time_s, state, voltage_v);
   }
 
@@ -42,11 +49,15 @@ class Watcher {
     const bool finite = std::isfinite(engine.state().theta_rad) && std::isfinite(engine.state().cart_m);
     if (engine.halted() || !finite) result.fall_time_s = engine.time_s();
     range_.into(result);
+    if (sampled_ && !result.fell()) result.voltage_rms_v = std::sqrt(squares_v2_ / periods_);
     result.end = engine.state();
     return result;
   }
 
  private:
+  bool sampled_;
+  double window_begin_s_;
+  double squares_v2_ = 0.0, periods_ = 0.0;  ///< of the window
   MotionRange range_;
   const LoopObserver& observer_;
 };

@@ -45,7 +45,10 @@ struct LoopResult {
   /// Half of peak to peak over the last third; for a run that fell, the largest absolute value.
   double theta_amplitude_rad = 0.0;
   double cart_amplitude_m = 0.0;  ///< half of the range of the cart within the window [m]
-  PlantState<double> end;         ///< final state
+  /// Root mean square of the commanded voltage over the last third, of a sampled loop that did not fall;
+  /// NaN: of another.
+  double voltage_rms_v = std::numeric_limits<double>::quiet_NaN();
+  PlantState<double> end;  ///< final state
 
   bool fell() const { return fall_time_s == fall_time_s; }  ///< whether the pendulum fell
 };

@@ -1,4 +1,5 @@
 // `upright optimise`: gains with the smallest mean cost over the drawn plants of a sweep.
+#include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <iostream>
@@ -32,14 +33,16 @@ struct OptimiseArguments {
 std::string cost_text(const RunCost& cost) {
   return "cost of a run: " + exact_text(cost.fall) + " if it falls, else " + exact_text(cost.cart_per_m) +
          " per m of cart amplitude + " + exact_text(cost.angle_per_rad) +
-         " per rad of angle amplitude (half of peak to peak over the last third)";
+         " per rad of angle amplitude (half of peak to peak over the last third)" +
+         (cost.per_v > 0.0 ? " + " + exact_text(cost.per_v) + " per V rms over the last third" : "");
 }
 
 Json json_of(const MeanCost& mean) {
   return {{"cost", mean.cost},
           {"share_falls", mean.share_falls},
           {"cart_amplitude_m", finite_or_null(mean.cart_amplitude_m)},
-          {"theta_amplitude_rad", finite_or_null(mean.theta_amplitude_rad)}};
+          {"theta_amplitude_rad", finite_or_null(mean.theta_amplitude_rad)},
+          {"voltage_rms_v", finite_or_null(mean.voltage_rms_v)}};
 }
 
 Json json_of(const std::vector<LinearMargin>& margins) {
@@ -68,7 +71,10 @@ Json json_of(const Optimisation& found, const OptimiseArguments& arguments) {
           {"numbers", numbers},
           {"margins", {{"before", json_of(found.margins_before)}, {"after", json_of(found.margins_after)}}},
           {"run_cost",
-           {{"fall", cost.fall}, {"cart_per_m", cost.cart_per_m}, {"angle_per_rad", cost.angle_per_rad}}},
+           {{"fall", cost.fall},
+            {"cart_per_m", cost.cart_per_m},
+            {"angle_per_rad", cost.angle_per_rad},
+            {"per_v", cost.per_v}}},
           {"written_to", arguments.out.empty() ? Json(nullptr) : Json(arguments.out)}};
 }
 
@@ -76,9 +82,11 @@ void print_costs(const char* plants, const MeanCost& before, const MeanCost& aft
   std::printf("%s\n", plants);
   const auto line = [](const char* when, const MeanCost& mean) {
     std::printf(
-        "  %-7s cost %8.4f, %5.1f percent of the runs fall, the others: cart %7.2f mm, angle %6.3f degree\n",
+        "  %-7s cost %8.4f, %5.1f percent of the runs fall, the others: cart %7.2f mm, angle %6.3f degree",
         when, mean.cost, 100.0 * mean.share_falls, 1e3 * mean.cart_amplitude_m,
         57.29577951308232 * mean.theta_amplitude_rad);
+    if (std::isfinite(mean.voltage_rms_v)) std::printf(", %.2f V rms", mean.voltage_rms_v);
+    std::printf("\n");
   };
   line("before", before);
   line("after", after);
@@ -161,6 +169,11 @@ void add_optimise(CommandLine& line) {
   command
       .option("--angle-cost", request.cost.angle_per_rad,
               "Cost per radian of the pendulum's amplitude, of a run that does not fall [1/rad] (default: 1)")
+      .in(Range::not_negative());
+  command
+      .option("--voltage-cost", request.cost.per_v,
+              "Cost per volt (root mean square of the command over the last third), of a run that does not "
+              "fall, in sampled loops [1/V] (default: 0)")
       .in(Range::not_negative());
   command
       .option("--evaluations", request.evaluations, "Largest number of gains that are tried (default: 200)")

@@ -64,7 +64,7 @@ ControlConfig with_factors(ControlConfig control, const std::vector<Tuned>& numb
 
 /// Sums over the runs of one plant.
 struct PlantSums {
-  double cost = 0.0, cart_m = 0.0, theta_rad = 0.0;
+  double cost = 0.0, cart_m = 0.0, theta_rad = 0.0, voltage_v = 0.0;
   std::size_t falls = 0;
 };
 
@@ -78,7 +78,9 @@ PlantSums sums_of(std::span<const LoopResult> runs, const RunCost& cost) {
     }
     sums.cart_m += run.cart_amplitude_m;
     sums.theta_rad += run.theta_amplitude_rad;
+    sums.voltage_v += run.voltage_rms_v;
     sums.cost += cost.cart_per_m * run.cart_amplitude_m + cost.angle_per_rad * run.theta_amplitude_rad;
+    if (cost.per_v > 0.0) sums.cost += cost.per_v * run.voltage_rms_v;
   }
   return sums;
 }
@@ -163,6 +165,7 @@ MeanCost mean_cost(const SweepConfig& config, const RunCost& cost) {
     falls += static_cast<double>(plant.falls);
     mean.cart_amplitude_m += plant.cart_m;
     mean.theta_amplitude_rad += plant.theta_rad;
+    mean.voltage_rms_v += plant.voltage_v;
   }
   const double all = runs * static_cast<double>(sums.size());
   mean.cost /= all;
@@ -170,6 +173,7 @@ MeanCost mean_cost(const SweepConfig& config, const RunCost& cost) {
   const double standing = falls < all ? all - falls : std::numeric_limits<double>::quiet_NaN();
   mean.cart_amplitude_m /= standing;
   mean.theta_amplitude_rad /= standing;
+  mean.voltage_rms_v /= standing;
   return mean;
 }
 
@@ -178,6 +182,10 @@ Optimisation optimise_gains(const SweepConfig& config, const OptimisationRequest
     throw ConfigError(
         "the sweep has no uncertainty, so that there are no plants to optimise for: add uncertainty: "
         "{percent, samples, seed} to its file");
+  if (request.cost.per_v > 0.0 && !config.setup.sampled)
+    throw ConfigError(
+        "the voltage of a continuous loop has no cost: set loop: sampled in the sweep file, or leave out "
+        "--voltage-cost");
   const std::vector<Tuned> numbers = tuned_numbers(config.setup.control, config.setup.sampled);
   if (numbers.empty())
     throw ConfigError(config.gain_file.string() +

@@ -11,11 +11,13 @@
 
 namespace upright {
 
-/// What a run costs: a fall, or the amplitudes over the last third of a run that does not fall.
+/// What a run costs: a fall, or the amplitudes and the voltage over the last third of a run that does not
+/// fall.
 struct RunCost {
   double fall = 1.0;           ///< of a run that falls
   double cart_per_m = 10.0;    ///< of half the peak-to-peak motion of the cart [1/m]
   double angle_per_rad = 1.0;  ///< of half the peak-to-peak motion of the pendulum [1/rad]
+  double per_v = 0.0;          ///< of the root mean square of the commanded voltage, of sampled loops [1/V]
 };
 
 /// The mean over starts, delays and plants.
@@ -23,7 +25,8 @@ struct MeanCost {
   double cost = 0.0;
   double share_falls = 0.0;
   double cart_amplitude_m = 0.0, theta_amplitude_rad = 0.0;  ///< of the runs that do not fall; NaN: all do
-  std::vector<double> of_plant;                              ///< the cost by plant
+  double voltage_rms_v = 0.0;  ///< of them, the mean of the root mean squares; NaN: also of continuous loops
+  std::vector<double> of_plant;  ///< the cost by plant
 };
 /// With the gains, plants and seed of `config`. Uses all processors; the result does not depend on them.
 MeanCost mean_cost(const SweepConfig& config, const RunCost& cost);
@@ -55,7 +58,8 @@ struct Optimisation {
   bool is_better() const;
 };
 
-/// Searches from the gain file of the sweep. Throws ConfigError where the sweep has no `uncertainty`.
+/// Searches from the gain file of the sweep. Throws ConfigError where the sweep has no `uncertainty`, or
+/// where the voltage of a continuous loop is to cost.
 Optimisation optimise_gains(const SweepConfig& config, const OptimisationRequest& request);
 
 }  // namespace upright

@@ -214,6 +214,48 @@ TEST(SweepAccuracyOfBristles, StiffOnesHoldTheBarOn240RandomRuns) {
   std::printf("stiff bristles: worst error %.1e rad\n", worst);
 }
 
+TEST(SweepAccuracyOfPivots, LargerSmoothedFrictionIsNotForLanes) {
+  LoopSetup setup;
+  setup.sampled = true;
+  for (const bool larger : {false, true}) {
+    Plant plant = read_plant_file(std::string(UPRIGHT_SOURCE_DIR) + "/config/plants/exponential.yaml");
+    plant.set("pivot_coulomb_friction", {larger ? 0.051 : 0.05});
+    setup.model = make_model<double>(plant);
+    setup.model.smoothing = 100.0;
+    EXPECT_EQ(lanes_can_run(setup), !larger);
+    setup.model.smoothing = 0.0;
+    EXPECT_TRUE(lanes_can_run(setup));
+  }
+}
+
+/// Friction near rest of any strength, over velocities down to where lanes step by the classical method.
+TEST(SweepAccuracyOfStribeck, AnyHoldsTheBarOn240RandomRuns) {
+  std::mt19937_64 random(24);
+  std::uniform_real_distribution<double> part(0.0, 1.0);
+  const auto log_uniform = [&](double low, double high) { return low * std::pow(high / low, part(random)); };
+  for (int i = 0; i < 240; ++i) {
+    Plant plant = read_plant_file(std::string(UPRIGHT_SOURCE_DIR) + "/config/plants/exponential.yaml");
+    plant.set("stribeck_friction", {log_uniform(0.05, 1.0), log_uniform(0.015, 0.3), 2.0});
+    plant.set("coulomb_friction", {log_uniform(0.05, 1.0)});
+    LoopSetup setup;
+    setup.model = make_model<double>(plant);
+    setup.control.gains = {70.7107, 304.9273, 143.3152, 61.0833};
+    setup.sampled = true;
+    setup.amplifier_limit_v = 15.0;
+    setup.duration_s = 0.5;
+    const LoopCase start[] = {{0.005 + 0.05 * part(random), 0.014 * part(random)}};
+    ASSERT_TRUE(lanes_can_run(setup));
+    LoopResult lane[1];
+    run_on_lanes(setup, start, lane);
+    EngineOptions tight;
+    tight.max_step_s = 2e-5;
+    const PlantState<double> truth = event_engine_end(setup, start[0], tight);
+    SCOPED_TRACE(plant_text(plant));
+    EXPECT_NEAR(lane[0].end.theta_rad, truth.theta_rad, bar);
+    EXPECT_NEAR(lane[0].end.cart_m, truth.cart_m, bar);
+  }
+}
+
 const std::vector<double> table = {0.0, -0.6, 0.6,  0.3,  0.1,  -0.2, 0.1,  0.3,
                                    0.2, 0.0,  -0.2, -0.3, -0.1, 0.2,  -0.1, -0.3};
 const Friction everywhere[] = {{"smooth", "exponential", 100.0},
@@ -224,6 +266,7 @@ const Friction everywhere[] = {{"smooth", "exponential", 100.0},
 const Friction sampled_only[] = {
     {"pivot_smooth", "exponential", 100.0, "pivot_coulomb_friction", {0.01}},
     {"large_pivot_smooth", "exponential", 100.0, "pivot_coulomb_friction", {0.03}},
+    {"largest_pivot_smooth", "exponential", 100.0, "pivot_coulomb_friction", {0.05}},
     {"lag_smooth", "exponential", 100.0, "motor_lag", {0.001}},
     {"lag_stick_slip", "exponential", 0.0, "motor_lag", {0.0004}},
     {"lag_bristles", "dynamic", 0.0, "motor_lag", {0.001}},

@@ -68,19 +68,33 @@ class GainOptimisation : public ::testing::Test {
   fs::path file_;
 };
 
+/// Of the commands after two thirds of a run.
+double rms_v_of(const LoopSetup& setup, const LoopCase& start) {
+  double squares_v2 = 0.0;
+  int periods = 0;
+  run_with_events(setup, start, [&](double time_s, const PlantState<double>&, double voltage_v) {
+    if (time_s < setup.window_begin_s()) return;
+    squares_v2 += voltage_v * voltage_v;
+    ++periods;
+  });
+  return std::sqrt(squares_v2 / periods);
+}
+
 /// From the runs one by one, on the event engine.
 TEST_F(GainOptimisation, CostIsTheMeanOverStartsDelaysAndPlants) {
   const SweepConfig config = sweep("  uncertainty: {percent: 5, samples: 3, seed: 4}\n");
-  const RunCost cost{2.0, 7.0, 3.0};
-  double sum = 0.0;
+  RunCost cost{2.0, 7.0, 3.0};
+  double sum = 0.0, volts = 0.0;
   int falls = 0;
   LoopSetup setup = config.setup;
   for (std::uint32_t plant = 0; plant < 3; ++plant) {
     setup.model = make_model<double>(config.uncertainty->plants->draw(4, plant));
     for (const double delay_s : config.delay_s)
       for (const double theta0_rad : config.theta0_rad) {
-        const LoopResult run = run_with_events(setup, {theta0_rad, delay_s});
+        const LoopCase start{theta0_rad, delay_s};
+        const LoopResult run = run_with_events(setup, start);
         sum += run.fell() ? 2.0 : 7.0 * run.cart_amplitude_m + 3.0 * run.theta_amplitude_rad;
+        if (!run.fell()) volts += rms_v_of(setup, start);
         if (run.fell()) ++falls;
       }
   }
@@ -90,6 +104,11 @@ TEST_F(GainOptimisation, CostIsTheMeanOverStartsDelaysAndPlants) {
   EXPECT_LT(falls, 12);
   EXPECT_NEAR(mean.cost, sum / 12.0, 1e-3 * sum / 12.0);
   EXPECT_EQ(mean.of_plant.size(), 3u);
+  // The steps of encoders make the voltage differ between engines for good after the first other count.
+  const double rms_v = volts / (12.0 - falls);
+  EXPECT_NEAR(mean.voltage_rms_v, rms_v, 1e-2 * rms_v);
+  cost.per_v = 0.5;
+  EXPECT_NEAR(mean_cost(config, cost).cost - mean.cost, 0.5 * volts / 12.0, 1e-2 * volts / 12.0);
 }
 
 TEST_F(GainOptimisation, FindsGainsThatAreBetterOnFreshPlants) {
@@ -121,6 +140,25 @@ TEST_F(GainOptimisation, TunesTheForceNoiseOfAKalmanFilter) {
   EXPECT_FALSE(found.control.state_estimator.cart_resolution_m) << "what the rig decides stays with the rig";
   EXPECT_LE(found.after.cost, found.before.cost);
   EXPECT_EQ(found.margins_before.size(), 2u);
+}
+
+/// The same search with and without a cost of the voltage.
+TEST_F(GainOptimisation, AVoltageThatCostsIsSmaller) {
+  const SweepConfig config = sweep("  uncertainty: {percent: 5, samples: 6, seed: 1}\n");
+  OptimisationRequest request;
+  request.evaluations = 40;
+  const Optimisation free = optimise_gains(config, request);
+  request.cost.per_v = 0.05;
+  const Optimisation dear = optimise_gains(config, request);
+  EXPECT_LT(dear.fresh_after.voltage_rms_v, free.fresh_after.voltage_rms_v);
+}
+
+TEST_F(GainOptimisation, TheVoltageOfAContinuousLoopHasNoCost) {
+  SweepConfig config = sweep("  uncertainty: {percent: 5, samples: 1, seed: 1}\n");
+  config.setup.sampled = false;
+  OptimisationRequest request;
+  request.cost.per_v = 1.0;
+  EXPECT_THROW(optimise_gains(config, request), ConfigError);
 }
 
 TEST_F(GainOptimisation, NeedsPlants) {

@@ -150,13 +150,7 @@ class Dynamics {
   /// Level of dry friction of the cart in direction +1 or -1 at a speed >= 0: the friction while sliding,
   /// and at speed 0 the largest static friction.
   S cart_dry_level(const S& x, const S& speed, const S& direction) const {
-    S level(0.0);
-    for_each_effect([&]<std::size_t I>() {
-      using E = EffectAt<I>;
-      if constexpr (has_cart_level<E, S>)
-        if (present_.template has<I>()) level = level + E::cart_dry_level(p<I>(), x, speed, direction);
-    });
-    return positive_part(level);
+    return dry_level(x, speed, direction);
   }
 
   /// Largest torque of dry friction in the pivot [N m].
@@ -177,25 +171,11 @@ class Dynamics {
 
   /// The motor force and all smooth forces on the cart, without dry friction and bristles.
   S cart_smooth_force(const PlantState<S>& state, const S& motor_v) const {
-    S force = motor_force(state, motor_v);
-    for_each_effect([&]<std::size_t I>() {
-      using E = EffectAt<I>;
-      if constexpr (requires { E::cart_force(p<I>(), state.cart_m, state.cart_mps); })
-        if (present_.template has<I>()) force = force + E::cart_force(p<I>(), state.cart_m, state.cart_mps);
-    });
-    return force;
+    return smooth_force(state, motor_v);
   }
 
   /// Torque about the pivot without dry friction [N m].
-  S pivot_smooth_torque(const S& omega) const {
-    S torque(0.0);
-    for_each_effect([&]<std::size_t I>() {
-      using E = EffectAt<I>;
-      if constexpr (requires { E::pivot_torque(p<I>(), omega); })
-        if (present_.template has<I>()) torque = torque + E::pivot_torque(p<I>(), omega);
-    });
-    return torque;
-  }
+  S pivot_smooth_torque(const S& omega) const { return smooth_torque(omega); }
 
   /// Time derivative of the state for a given voltage at the motor (after the complete actuator chain).
   /// The derivative of motor_v is zero: the lag is linear, and engines integrate it exactly.
@@ -254,32 +234,73 @@ class Dynamics {
     return {s, c, cart_smooth_force(state, motor_v), pivot_smooth_torque(state.theta_radps)};
   }
 
-  /// As `cart_load`, of a cart at rest.
-  S cart_load(const PlantState<S>& state, const Balance& at) const {
-    const S turn = gravity_torque_ * at.sine + at.torque;
-    return at.force +
-           coupling_ * (at.sine * state.theta_radps * state.theta_radps - at.cosine * turn / inertia_);
+  /// The same of a cart whose contact is the only one. The motion may be of another scalar T than the plant,
+  /// as its Taylor series in time is.
+  template <class T>
+  struct CartBalance {
+    T load;   ///< the force that holds the cart if it rests [N]
+    T turn;   ///< acceleration of the pendulum on a resting cart [rad/s^2]
+    T lever;  ///< by how much an acceleration of the cart turns the pendulum back [rad/m]
+    T mass;   ///< that a force on the cart accelerates [kg]
+  };
+  /// For plants with a pendulum.
+  template <class T>
+  CartBalance<T> cart_balance(const PlantState<T>& state, const elementary::SineAndCosine<T>& angle,
+                              const S& motor_v) const {
+    const T torque = gravity_torque_ * angle.sine + smooth_torque(state.theta_radps);
+    const T turn = torque / inertia_, coupling = coupling_ * angle.cosine, lever = coupling / inertia_;
+    const T force =
+        smooth_force(state, motor_v) + coupling_ * (angle.sine * (state.theta_radps * state.theta_radps));
+    return {force - coupling * turn, turn, lever, total_mass_ - coupling * lever};
+  }
+  /// The same in one call.
+  CartBalance<S> cart_balance(const PlantState<S>& state, const S& motor_v) const {
+    return cart_balance(state, elementary::sine_and_cosine(state.theta_rad), motor_v);
   }
 
-  /// As `derivative`, with the mode of the cart's contact as a number: -1 or 1 slides in that direction, 0
-  /// sticks.
-  PlantState<S> derivative_by_direction(const PlantState<S>& state, const Balance& at,
+  /// Of the cart and of the pendulum.
+  template <class T>
+  struct Accelerations {
+    T cart_mps2;     ///< [m/s^2]
+    T theta_radps2;  ///< [rad/s^2]
+  };
+  /// With the mode of the cart's contact as a number: -1 or 1 slides in that direction, 0 sticks.
+  template <class T>
+  Accelerations<T> accelerations(const PlantState<T>& state, const CartBalance<T>& at,
+                                 const S& direction) const {
+    const T speed = positive_part(T(direction * state.cart_mps));
+    const T level = dry_level(state.cart_m, speed, T(direction));
+    const T cart_mps2 = select(direction == S(0.0), T(0.0), T((at.load - direction * level) / at.mass));
+    return {cart_mps2, at.turn - at.lever * cart_mps2};
+  }
+
+  /// As `derivative`, with the mode of the cart's contact as a number.
+  PlantState<S> derivative_by_direction(const PlantState<S>& state, const CartBalance<S>& at,
                                         const S& direction) const {
-    const S level = cart_dry_level(state.cart_m, positive_part(S(direction * state.cart_mps)), direction);
+    const Accelerations<S> found = accelerations(state, at, direction);
     PlantState<S> rate{};
-    accelerate(state, at.sine, at.cosine, at.force - level * direction, at.torque, false, false, rate);
-    const auto rests = direction == S(0.0);
-    rate.cart_mps = select(rests, S(0.0), rate.cart_mps);
-    rate.cart_m = select(rests, S(0.0), state.cart_mps);
+    rate.cart_m = state.cart_mps;
     rate.theta_rad = state.theta_radps;
-    const S turn = (gravity_torque_ * at.sine + at.torque) / inertia_;
-    rate.theta_radps = select(rests, turn, rate.theta_radps);
+    rate.cart_mps = found.cart_mps2;
+    rate.theta_radps = found.theta_radps2;
     return rate;
   }
   /// The same in one call.
   PlantState<S> derivative_by_direction(const PlantState<S>& state, const S& motor_v,
                                         const S& direction) const {
-    return derivative_by_direction(state, balance(state, motor_v), direction);
+    return derivative_by_direction(state, cart_balance(state, motor_v), direction);
+  }
+
+  /// Whether few terms of its Taylor series in time tell the motion of a sliding cart over a millisecond, as
+  /// far as its effects say that.
+  bool has_short_series() const {
+    bool all = true;
+    for_each_effect([&]<std::size_t I>() {
+      using E = EffectAt<I>;
+      if constexpr (requires { E::has_short_series(p<I>()); })
+        if (present_.template has<I>()) all = all && E::has_short_series(p<I>());
+    });
+    return all;
   }
 
   /// As `derivative`, of a cart on bristles that moves in this direction: the motion continues smoothly a
@@ -409,6 +430,48 @@ class Dynamics {
   }
 
  private:
+  /// False: known at compile time not to be present, so that its equations need not know the scalar.
+  template <std::size_t I>
+  static constexpr bool may_have() {
+    if constexpr (std::is_same_v<Present, EffectSet>)
+      return true;
+    else
+      return Present::template has<I>();
+  }
+
+  template <class T>
+  T dry_level(const T& x, const T& speed, const T& direction) const {
+    T level(0.0);
+    for_each_effect([&]<std::size_t I>() {
+      using E = EffectAt<I>;
+      if constexpr (may_have<I>() && has_cart_level<E, S>)
+        if (present_.template has<I>()) level = level + E::cart_dry_level(p<I>(), x, speed, direction);
+    });
+    return positive_part(level);
+  }
+
+  template <class T>
+  T smooth_force(const PlantState<T>& state, const S& motor_v) const {
+    T force = base_.force_per_volt_n * motor_v - base_.back_emf_n_per_mps * state.cart_mps;
+    for_each_effect([&]<std::size_t I>() {
+      using E = EffectAt<I>;
+      if constexpr (may_have<I>() && requires { E::cart_force(p<I>(), S(), S()); })
+        if (present_.template has<I>()) force = force + E::cart_force(p<I>(), state.cart_m, state.cart_mps);
+    });
+    return force;
+  }
+
+  template <class T>
+  T smooth_torque(const T& omega) const {
+    T torque(0.0);
+    for_each_effect([&]<std::size_t I>() {
+      using E = EffectAt<I>;
+      if constexpr (may_have<I>() && requires { E::pivot_torque(p<I>(), S()); })
+        if (present_.template has<I>()) torque = torque + E::pivot_torque(p<I>(), omega);
+    });
+    return torque;
+  }
+
   S drive_deflection_m(const PlantState<S>& state) const {
     S deflection(0.0);
     for_each_effect([&]<std::size_t I>() {

@@ -64,14 +64,16 @@ SineAndCosine<S> sine_and_cosine(const S& x) {
   if constexpr (Dual<S>) {
     const auto [s, c] = sine_and_cosine(x.a);
     return {S(s, c * x.v), S(c, -s * x.v)};
+  } else if constexpr (requires { both_of(x); }) {
+    return both_of(x);  // at little more than the cost of one
   } else {
     return {sin(x), cos(x)};
   }
 }
 
-/// The same for other scalars, with derivatives.
+/// The same for other scalars, with derivatives. Inlined where lanes need it several times with one argument.
 template <Composed S>
-S exp(const S& x) {
+[[gnu::always_inline]] inline S exp(const S& x) {
   if constexpr (Dual<S>) {
     const double e = exp(x.a);
     return S(e, e * x.v);

@@ -22,8 +22,8 @@ struct CoulombFriction {
       parameters};
 
   /// Its share of the dry level [N].
-  template <class S>
-  static S cart_dry_level(const S* p, const S& /*x*/, const S& /*speed*/, const S& /*direction*/) {
+  template <class P, class S>
+  static S cart_dry_level(const P* p, const S& /*x*/, const S& /*speed*/, const S& /*direction*/) {
     return p[0];
   }
 };

