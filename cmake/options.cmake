@@ -6,6 +6,11 @@ target_compile_options(upright_options INTERFACE -Wall -Wextra -Wpedantic -Wshad
 if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND CMAKE_CXX_COMPILER_VERSION VERSION_LESS 13)
   target_compile_options(upright_options INTERFACE -Wno-maybe-uninitialized)
 endif()
+# g++ searches its memory for garbage each time it has doubled, from 128 MB on. Most of it stays in use until the end: without
+# the search below 4 GiB, more than any unit takes (2.5 GB), a unit takes a tenth less processor time.
+if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
+  target_compile_options(upright_options INTERFACE "SHELL:--param ggc-min-heapsize=4194304")
+endif()
 # A voltage, a simulated motion and a log have the same bits on every machine of an architecture: all is compiled for its
 # baseline, and no product is fused into a sum. Only lanes and fits are compiled for more (UPRIGHT_WIDE_ARCH).
 target_compile_options(upright_options INTERFACE -ffp-contract=off)

@@ -1,6 +1,5 @@
 #include "force_description.hpp"
 
-#include <Eigen/QR>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -76,9 +75,9 @@ CurveEquations beyond_known(const CurveEquations& equations, const CurveNodes& n
     for (Eigen::Index j = 0; j < terms.cols(); ++j) terms(i, j) = row[static_cast<std::size_t>(j)];
   }
   const Eigen::MatrixXd coupled = equations.information * terms;
-  const Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> solver(terms.transpose() * coupled);
-  return {equations.information - coupled * solver.solve(coupled.transpose()),
-          equations.score - coupled * solver.solve(terms.transpose() * equations.score)};
+  const auto [by_information, by_score] =
+      least_squares(terms.transpose() * coupled, coupled.transpose(), terms.transpose() * equations.score);
+  return {equations.information - coupled * by_information, equations.score - coupled * by_score};
 }
 
 /// The data that a curve is found in: the segments of a fit, linearised, and their motion.

@@ -1,10 +1,11 @@
 #include "random_curve.hpp"
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <cmath>
 #include <cstdlib>
 #include <numbers>
+
+#include "model/dense_algebra.hpp"
 
 namespace upright {
 
@@ -32,10 +33,9 @@ struct PrincipalAxes {
 
   PrincipalAxes(const CurveEquations& equations, const CurveNodes& nodes, double length) {
     const Eigen::MatrixXd factor = correlation(nodes, length).llt().matrixL();
-    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> axes(factor.transpose() * equations.information *
-                                                              factor);
-    values = factor * axes.eigenvectors();
-    information = axes.eigenvalues().cwiseMax(0.0);
+    const SymmetricEigen axes = symmetric_eigen(factor.transpose() * equations.information * factor);
+    values = factor * axes.vectors;
+    information = axes.values.cwiseMax(0.0);
     score = values.transpose() * equations.score;
   }
 

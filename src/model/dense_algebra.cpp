@@ -36,6 +36,24 @@ Eigen::VectorXcd solve(const MatrixXcd& a, const Eigen::VectorXcd& b) {
   return a.partialPivLu().solve(b);
 }
 
+VectorXd solve(const MatrixXd& a, const VectorXd& b) {
+  return a.partialPivLu().solve(b);
+}
+
+MatrixXcd solve_from_right(const MatrixXcd& a, const MatrixXcd& b) {
+  return a.transpose().partialPivLu().solve(b.transpose()).transpose();
+}
+
+std::pair<MatrixXd, MatrixXd> solve_both(const MatrixXd& a, const MatrixXd& b, const MatrixXd& c) {
+  const Eigen::PartialPivLU<MatrixXd> factored(a);
+  return {factored.solve(b), factored.solve(c)};
+}
+
+std::pair<MatrixXd, VectorXd> least_squares(const MatrixXd& a, const MatrixXd& b, const VectorXd& c) {
+  const Eigen::CompleteOrthogonalDecomposition<MatrixXd> factored(a);
+  return {factored.solve(b), factored.solve(c)};
+}
+
 MatrixXd solve_symmetric(const MatrixXd& a, const MatrixXd& b) {
   return a.ldlt().solve(b);
 }

@@ -4,6 +4,7 @@
 
 #include <Eigen/Core>
 #include <optional>
+#include <utility>
 
 namespace upright {
 
@@ -29,6 +30,16 @@ Eigen::MatrixXd pseudo_inverse(const Eigen::MatrixXd& matrix);
 
 /// Solution x of a x = b for a regular n x n matrix.
 Eigen::VectorXcd solve(const Eigen::MatrixXcd& a, const Eigen::VectorXcd& b);
+Eigen::VectorXd solve(const Eigen::MatrixXd& a, const Eigen::VectorXd& b);
+/// Solution x of x a = b for a regular n x n matrix.
+Eigen::MatrixXcd solve_from_right(const Eigen::MatrixXcd& a, const Eigen::MatrixXcd& b);
+/// Solutions x of a x = b and y of a y = c, with one factorisation.
+std::pair<Eigen::MatrixXd, Eigen::MatrixXd> solve_both(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b,
+                                                       const Eigen::MatrixXd& c);
+
+/// The shortest x and y that minimise |a x - b| and |a y - c|, with one complete orthogonal decomposition.
+std::pair<Eigen::MatrixXd, Eigen::VectorXd> least_squares(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b,
+                                                          const Eigen::VectorXd& c);
 
 /// Solution x of a x = b for a symmetric n x n matrix that is positive or negative semidefinite.
 Eigen::MatrixXd solve_symmetric(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b);

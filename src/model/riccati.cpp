@@ -1,10 +1,10 @@
 #include "riccati.hpp"
 
-#include <Eigen/Dense>
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <complex>
 
+#include "dense_algebra.hpp"
 #include "linear_plant.hpp"
 #include "upright/base/error.hpp"
 
@@ -57,7 +57,7 @@ MatrixXd solve_lyapunov(const MatrixXd& f, const MatrixXd& w) {
       if (i == j) system.block(i * n, i * n, n, n) += f.transpose();
     }
   const VectorXd right = -Eigen::Map<const VectorXd>(w.data(), n * n);
-  const VectorXd solution = system.partialPivLu().solve(right);
+  const VectorXd solution = solve(system, right);
   return symmetric_part(Eigen::Map<const MatrixXd>(solution.data(), n, n));
 }
 
@@ -105,7 +105,7 @@ RiccatiSolution solve_continuous_riccati(const MatrixXd& a, const VectorXd& b, c
            "the matrix pair (A, b) is not stabilizable or (A, Q) is not detectable, so the Hamiltonian "
            "matrix has eigenvalues on the imaginary axis");
   const ComplexMatrix top = schur.u.topLeftCorner(n, n), bottom = schur.u.bottomLeftCorner(n, n);
-  const ComplexMatrix x = top.transpose().partialPivLu().solve(bottom.transpose()).transpose();
+  const ComplexMatrix x = solve_from_right(top, bottom);
   RiccatiSolution solution;
   solution.x = symmetric_part(x.real());
   finish_continuous(solution, a, b, q, r);
@@ -120,16 +120,14 @@ DiscreteRiccatiSolution solve_discrete_riccati(const MatrixXd& a, const MatrixXd
                                                const MatrixXd& s, const MatrixXd& r) {
   check(a, b, q, r);
   const Index n = a.rows();
-  const Eigen::LDLT<MatrixXd> weight(r);
-  MatrixXd f = a - b * weight.solve(s.transpose());
-  MatrixXd g = symmetric_part(b * weight.solve(b.transpose()));
-  MatrixXd h = symmetric_part(q - s * weight.solve(s.transpose()));
+  MatrixXd f = a - b * solve_symmetric(r, s.transpose());
+  MatrixXd g = symmetric_part(b * solve_symmetric(r, b.transpose()));
+  MatrixXd h = symmetric_part(q - s * solve_symmetric(r, s.transpose()));
   constexpr int max_doublings = 60;
   constexpr double converged = 1e-15;
   bool done = false;
   for (int i = 0; i < max_doublings && !done; ++i) {
-    const Eigen::PartialPivLU<MatrixXd> lu(MatrixXd::Identity(n, n) + g * h);
-    const MatrixXd w_f = lu.solve(f), w_g = lu.solve(g);
+    const auto [w_f, w_g] = solve_both(MatrixXd::Identity(n, n) + g * h, f, g);
     const MatrixXd grown = f.transpose() * h * w_f;
     done = grown.cwiseAbs().maxCoeff() <= converged * h.cwiseAbs().maxCoeff();
     g = symmetric_part(g + f * w_g * f.transpose());
@@ -141,7 +139,7 @@ DiscreteRiccatiSolution solve_discrete_riccati(const MatrixXd& a, const MatrixXd
   DiscreteRiccatiSolution solution;
   solution.x = h;
   const MatrixXd cross = b.transpose() * h * a + s.transpose();
-  solution.gain = (r + b.transpose() * h * b).ldlt().solve(cross);
+  solution.gain = solve_symmetric(r + b.transpose() * h * b, cross);
   const MatrixXd moved = a.transpose() * h * a;
   const MatrixXd remainder = moved + q - cross.transpose() * solution.gain - h;
   solution.residual =
