@@ -149,12 +149,10 @@ class PatternSearch {
   /// time of a disturbance hardly change the objective if they change together, where search() goes no
   /// further.
   void refine(double factor) {
-    // search() has just looked around here.
-    take_newton_step(factor);
-    if (!coloured_) return;
-    for (int step = 1; step < max_newton_steps; ++step) {
+    const int steps = coloured_ ? max_newton_steps : 1;
+    for (int step = 0; step < steps; ++step) {
       const double before = objective_;
-      look_around(factor);
+      if (looked_at_ != objective_) look_around(factor);
       if (!take_newton_step(factor) || before - objective_ < no_matter) return;
     }
   }
@@ -164,7 +162,7 @@ class PatternSearch {
   static constexpr int max_passes = 12;
   /// Less is no fall.
   static constexpr double falls = 1e-3;
-  /// A bound on the work. One step is enough without a coloured part.
+  /// A bound on the work beside a coloured part. Without one a single step is enough.
   static constexpr int max_newton_steps = 6;
   /// [minus twice the log likelihood] A Newton step that brings less is the last one.
   static constexpr double no_matter = 0.05;
@@ -201,6 +199,7 @@ class PatternSearch {
     }
     const std::vector<double> objectives = objectives_of(noises);
     for (std::size_t i = 0; i < places.size(); ++i) *places[i] = objectives[i];
+    looked_at_ = objective_;
   }
 
   /// Changes all numbers that are better changed together, and the best one alone, by several powers of the
@@ -306,6 +305,7 @@ class PatternSearch {
   std::array<NoiseParameter, noise_parameter_count> parameters_;
   double objective_;
   std::array<double, noise_parameter_count> below_{}, above_{};  ///< of look_around()
+  double looked_at_ = std::numeric_limits<double>::quiet_NaN();  ///< the objective there
 };
 
 }  // namespace
@@ -326,6 +326,8 @@ std::vector<double> noise_objectives(const FitData& data, const Plant& plant,
     for (const auto& part : parts)
       for (std::size_t i = 0; i < count; ++i) sums[first + i] += part[i];
   }
+  for (double& sum : sums)
+    if (!std::isfinite(sum)) sum = std::numeric_limits<double>::infinity();
   return sums;
 }
 

@@ -7,7 +7,8 @@
 
 namespace upright {
 
-/// Minus twice the log likelihood of the data with each of these noises, side by side in SIMD lanes.
+/// Minus twice the log likelihood of the data with each of these noises, side by side in SIMD lanes. Infinite
+/// where it is not finite.
 std::vector<double> noise_objectives(const FitData& data, const Plant& plant,
                                      const std::vector<LinearisedSegment>& linearised,
                                      const std::vector<Noise>& noises);
