@@ -267,6 +267,8 @@ class PatternSearch {
   /// The best of several steps that are damped more or less. Whether it is better than none.
   bool take_newton_step(double factor) {
     constexpr double longest = 8.0;  // powers of the factor: the model is not valid further away
+    // Finer powers say nothing, and would bring each processor's rounding into the noise.
+    constexpr double parts = 64.0;
     const QuadraticModel model = quadratic_model(factor);
     if (model.numbers.empty()) return false;
     std::vector<Noise> noises;
@@ -279,8 +281,8 @@ class PatternSearch {
       for (Eigen::Index a = 0; a < step.size(); ++a) {
         if (!std::isfinite(step[a])) continue;
         const NoiseParameter& parameter = parameters_[model.numbers[static_cast<std::size_t>(a)]];
-        moved.*parameter.value =
-            parameter.moved(moved, std::pow(factor, std::clamp(step[a], -longest, longest)));
+        const double power = std::round(parts * std::clamp(step[a], -longest, longest)) / parts;
+        moved.*parameter.value = parameter.moved(moved, std::pow(factor, power));
       }
       noises.push_back(moved);
     }
