@@ -33,7 +33,7 @@ class EventPeriod {
  public:
   EventPeriod(const LaneParts& parts, const PlantModel<Lanes>& model, const Present& present)
       : physics_(model, present),
-        series_(constants_of(model), present),
+        series_(with_numbers_of<LaneConstant>(model), present),
         motor_(model),
         sticks_(may_stick<Present> && physics_.cart_can_stick()),
         pivot_sticks_(physics_.pivot_can_stick()),

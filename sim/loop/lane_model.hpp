@@ -33,18 +33,24 @@ inline void put_on_lane(PlantModel<Lanes>& lanes, std::size_t lane, const PlantM
   for (std::size_t i = 0; i < all_parameter_count; ++i) put(lanes.parameters[i], lane, model.parameters[i]);
 }
 
-inline PlantModel<Lanes> on_lanes(const PlantModel<double>& model) {
-  PlantModel<Lanes> lanes;
-  lanes.base = {model.base.cart_mass_kg,      model.base.pendulum_mass_kg,
+/// The same plant with numbers of another scalar.
+template <class To, class From>
+PlantModel<To> with_numbers_of(const PlantModel<From>& model) {
+  PlantModel<To> other;
+  other.base = {model.base.cart_mass_kg,      model.base.pendulum_mass_kg,
                 model.base.length_to_com_m,   model.base.inertia_about_pivot_kgm2,
                 model.base.gravity_mps2,      model.base.force_per_volt_n,
                 model.base.back_emf_n_per_mps};
-  lanes.has_pendulum = model.has_pendulum;
-  lanes.cart_locked = model.cart_locked;
-  lanes.present = model.present;
-  lanes.smoothing = model.smoothing;
-  for (std::size_t i = 0; i < all_parameter_count; ++i) lanes.parameters[i] = model.parameters[i];
-  return lanes;
+  other.has_pendulum = model.has_pendulum;
+  other.cart_locked = model.cart_locked;
+  other.present = model.present;
+  other.smoothing = model.smoothing;
+  for (std::size_t i = 0; i < all_parameter_count; ++i) other.parameters[i] = model.parameters[i];
+  return other;
+}
+
+inline PlantModel<Lanes> on_lanes(const PlantModel<double>& model) {
+  return with_numbers_of<Lanes>(model);
 }
 
 /// The voltages at the motors over a period: the early one for its first part, if the plant's input delay has

@@ -18,9 +18,9 @@
 #include <xsimd/xsimd.hpp>
 #pragma GCC diagnostic pop
 
-// Left to itself the compiler calls these through memory, which takes longer than what they do.
 #include "upright/model/elementary.hpp"
 
+// Left to itself the compiler calls these through memory, which takes longer than what they do.
 #define UPRIGHT_LANES_INLINE [[gnu::always_inline]] inline
 
 namespace upright {

@@ -11,21 +11,6 @@
 
 namespace upright {
 
-/// The same plant, as series need its numbers.
-inline PlantModel<LaneConstant> constants_of(const PlantModel<Lanes>& model) {
-  PlantModel<LaneConstant> constants;
-  constants.base = {model.base.cart_mass_kg,      model.base.pendulum_mass_kg,
-                    model.base.length_to_com_m,   model.base.inertia_about_pivot_kgm2,
-                    model.base.gravity_mps2,      model.base.force_per_volt_n,
-                    model.base.back_emf_n_per_mps};
-  constants.has_pendulum = model.has_pendulum;
-  constants.cart_locked = model.cart_locked;
-  constants.present = model.present;
-  constants.smoothing = model.smoothing;
-  for (std::size_t i = 0; i < all_parameter_count; ++i) constants.parameters[i] = model.parameters[i];
-  return constants;
-}
-
 /// The motion from a state, until an event.
 class SeriesMotion {
  public:

@@ -365,8 +365,9 @@ double estimate_noise(const FitData& data, const std::vector<LinearisedSegment>&
   const Noise former = point.noise;
   const std::vector<double> coarse(factors.begin(), factors.end() - 1);
   if (!coarse.empty()) estimate_coarsely(data, linearised, coarse, coloured, point);
-  const double before = noise_objectives(data, point.plant, linearised, {former}).front();
   PatternSearch pattern(data, linearised, coloured, point);
+  const double before = coarse.empty() ? pattern.objective()
+                                       : noise_objectives(data, point.plant, linearised, {former}).front();
   pattern.search(factors.back());
   pattern.refine(factors.back());
   if (pattern.objective() < before) return before - pattern.objective();
