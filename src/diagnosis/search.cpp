@@ -7,6 +7,7 @@
 #include <numeric>
 
 #include "belief.hpp"
+#include "estimation/significant_digits.hpp"
 #include "model/dense_algebra.hpp"
 #include "phases.hpp"
 #include "plausibility.hpp"
@@ -525,7 +526,9 @@ Hypothesis Search::fitted_to_all_runs(const Hypothesis& h) const {
   result.simulation.reset();
   result.train = fit(all, point, h.free, FitOptions{});
   result.valid = std::isfinite(result.train.objective);
-  return result.valid ? result : h;
+  if (!result.valid) return h;
+  round_to_significant_digits(result.train, result.free);
+  return result;
 }
 
 Hypothesis Search::with_effect_free(const Hypothesis& h, std::size_t effect, double share_of_typical) const {
