@@ -114,18 +114,18 @@ template <class Present, bool sticks>
 class ContinuousRuns {
  public:
   ContinuousRuns(const LoopSetup& setup, const PlantModel<Lanes>& model, const Present& present,
-                 std::span<const LoopCase> cases, std::span<LoopResult> results)
+                 LoopSource& source)
       : setup_(setup),
         chain_(model),
         physics_(model, present),
         feedback_(setup.control.gains, chain_),
         input_delay_s_(chain_.input_delay_s().values()[0]),
-        cases_(cases),
-        results_(results) {
-    for (std::size_t lane = 0; lane < lane_count; ++lane) take_next(lane);
+        source_(source) {
+    for (std::size_t lane = 0; lane < lane_count; ++lane) rest(lane);
   }
 
   void run() {
+    fill();
     while (active_ != 0) step();
   }
 
@@ -400,7 +400,7 @@ class ContinuousRuns {
         const double middle = 0.5 * (low + high);
         (std::abs(along(&State::theta_rad, middle)) < setup_.fell_above_rad ? low : high) = middle;
       }
-      LoopResult& result = results_[case_of_[i]];
+      LoopResult result;
       result.fall_time_s = value(begin_s, i) + high * step;
       result.theta_amplitude_rad = setup_.fell_above_rad;
       result.cart_amplitude_m = std::max(value(cart_max_, i), std::abs(along(&State::cart_m, high)));
@@ -410,6 +410,7 @@ class ContinuousRuns {
                     along(&State::theta_radps, high),
                     0.0,
                     has_bristles ? along(&State::bristle_m, high) : 0.0};
+      source_.take(number_of_[i], result);
     }
   }
 
@@ -419,6 +420,7 @@ class ContinuousRuns {
     each(y_, [&](Lanes State::*of) { return select(mine, end.*of, y_.*of); });
     each(k1_, [&](Lanes State::*of) { return select(mine, k7.*of, k1_.*of); });
     const Values times = end_s.values();
+    const std::uint32_t before = active_;
     for (std::uint32_t lanes = accepted; lanes != 0; lanes &= lanes - 1) {
       const auto i = static_cast<std::size_t>(std::countr_zero(lanes));
       time_s_[i] = times[i];
@@ -440,14 +442,14 @@ class ContinuousRuns {
         stop_s_[i] = next_stop(i);
       }
       if ((fallen_ & bit) != 0) {
-        take_next(i);
+        rest(i);
         continue;
       }
       history_.forget_before(i, time_s_[i] - delay_s_[i]);
       if (arrived) {
         if (time_s_[i] >= setup_.duration_s - Stops::same_s) {
           finish(i);
-          take_next(i);
+          rest(i);
           continue;
         }
         stop_s_[i] = next_stop(i);
@@ -455,6 +457,7 @@ class ContinuousRuns {
       choose_step(i, wanted_s);
     }
     event_ = fallen_ = 0;
+    if (active_ != before) fill();
   }
 
   double next_stop(std::size_t i) {
@@ -477,44 +480,45 @@ class ContinuousRuns {
 
   void finish(std::size_t i) {
     const auto value = [i](const Lanes& a) { return a.values()[i]; };
-    LoopResult& result = results_[case_of_[i]];
-    result = {};
+    LoopResult result;
     result.theta_amplitude_rad = 0.5 * (value(theta_high_) - value(theta_low_));
     result.cart_amplitude_m = 0.5 * (value(cart_high_) - value(cart_low_));
     result.end = {value(y_.cart_m),   value(y_.theta_rad), value(y_.cart_mps), value(y_.theta_radps), 0.0,
                   value(y_.bristle_m)};
+    source_.take(number_of_[i], result);
   }
 
-  /// Gives a lane the next run, or rest.
-  void take_next(std::size_t i) {
-    const std::uint32_t bit = 1u << i;
-    each(y_, [&](Lanes State::*of) {
-      Lanes changed = y_.*of;
-      put(changed, i, 0.0);
-      return changed;
-    });
-    each(k1_, [&](Lanes State::*of) {
-      Lanes changed = k1_.*of;
-      put(changed, i, 0.0);
-      return changed;
-    });
+  /// Gives lanes without a run the next ones, as far as there are.
+  void fill() {
+    LoopRun run;
+    for (std::uint32_t idle = ~active_ & every_lane; idle != 0 && source_.next(run); idle &= idle - 1)
+      begin(static_cast<std::size_t>(std::countr_zero(idle)), run);
+  }
+
+  void rest(std::size_t i) {
+    for (State* state : {&y_, &k1_})
+      each(*state, [&](Lanes State::*of) {
+        Lanes changed = state->*of;
+        put(changed, i, 0.0);
+        return changed;
+      });
+    active_ &= ~(1u << i);
+    stale_ &= ~(1u << i);
     time_s_[i] = 0.0;
-    if (next_ >= cases_.size()) {
-      active_ &= ~bit;
-      stale_ &= ~bit;
-      step_s_[i] = first_step_s;
-      delay_s_[i] = 0.0;
-      history_.start_without(i);
-      return;
-    }
-    case_of_[i] = next_++;
-    const LoopCase& start = cases_[case_of_[i]];
-    active_ |= bit;
-    stale_ |= bit;
-    delay_s_[i] = start.delay_s + input_delay_s_;
+    step_s_[i] = first_step_s;
+    delay_s_[i] = 0.0;
+    history_.start_without(i);
+  }
+
+  /// Begins a run in a lane at rest.
+  void begin(std::size_t i, const LoopRun& run) {
+    number_of_[i] = run.number;
+    active_ |= 1u << i;
+    stale_ |= 1u << i;
+    delay_s_[i] = run.start.delay_s + input_delay_s_;
     if (!(delay_s_[i] > shortest_delay_s)) delay_s_[i] = 0.0;
     any_undelayed_ = any_undelayed_ || delay_s_[i] == 0.0;
-    put(y_.theta_rad, i, start.theta0_rad);
+    put(y_.theta_rad, i, run.start.theta0_rad);
     if (delay_s_[i] > 0.0)
       history_.start(i, 0.0, feedback_(y_).values()[i]);
     else
@@ -533,6 +537,7 @@ class ContinuousRuns {
     choose_step(i, first_step_s);
   }
 
+  static constexpr std::uint32_t every_lane = (1u << lane_count) - 1u;
   static constexpr bool has_bristles = may_have_bristles<Present>;
 
   const LoopSetup& setup_;
@@ -540,8 +545,7 @@ class ContinuousRuns {
   Dynamics<Lanes, Present> physics_;
   FeedbackLine feedback_;
   double input_delay_s_;
-  std::span<const LoopCase> cases_;
-  std::span<LoopResult> results_;
+  LoopSource& source_;
 
   State y_{}, k1_{};
   LaneHistory history_;
@@ -551,8 +555,7 @@ class ContinuousRuns {
   std::array<EventBudget, lane_count> budget_;
   std::array<Stops, lane_count> stops_;
   Lanes theta_low_, theta_high_, cart_low_, cart_high_, cart_max_;
-  std::array<std::size_t, lane_count> case_of_{};
-  std::size_t next_ = 0;
+  std::array<std::size_t, lane_count> number_of_{};
   std::uint32_t active_ = 0, stale_ = 0, event_ = 0, fallen_ = 0;
   bool any_undelayed_ = false;
 };
@@ -560,14 +563,14 @@ class ContinuousRuns {
 }  // namespace
 
 void UPRIGHT_LANES::run_continuous_on_lanes(const LoopSetup& setup, const PlantModel<double>& plant,
-                                            std::span<const LoopCase> cases, std::span<LoopResult> results) {
+                                            LoopSource& source) {
   const PlantModel<Lanes> model = on_lanes(plant);
   const bool sticks = Dynamics<Lanes>(model).cart_can_stick();
   with_effects(plant.present, [&](const auto& present) {
     using Present = std::decay_t<decltype(present)>;
     if constexpr (may_stick<Present>)
-      if (sticks) return ContinuousRuns<Present, true>(setup, model, present, cases, results).run();
-    ContinuousRuns<Present, false>(setup, model, present, cases, results).run();
+      if (sticks) return ContinuousRuns<Present, true>(setup, model, present, source).run();
+    ContinuousRuns<Present, false>(setup, model, present, source).run();
   });
 }
 

@@ -25,9 +25,8 @@ namespace {
 template <class Mask>
 class LaneDelay {
  public:
-  /// For runs with delays up to the longest of `cases`.
-  LaneDelay(std::span<const LoopCase> cases, double period_s)
-      : period_s_(period_s), ring_(longest_of(cases, period_s) + 1) {}
+  LaneDelay(double longest_delay_s, double period_s)
+      : period_s_(period_s), ring_(DelayLine(longest_delay_s, period_s).whole_periods() + 1) {}
 
   /// Gives one lane this delay.
   void take(std::size_t lane, double delay_s) {
@@ -48,12 +47,6 @@ class LaneDelay {
   }
 
  private:
-  static std::size_t longest_of(std::span<const LoopCase> cases, double period_s) {
-    std::size_t longest = 0;
-    for (const LoopCase& run : cases)
-      longest = std::max(longest, DelayLine(run.delay_s, period_s).whole_periods());
-    return longest;
-  }
   Lanes back(std::uint32_t more) const {
     return same_ ? ring_.ago(whole_[0] + more) : ring_.ago(whole_, more);
   }
@@ -187,47 +180,38 @@ class SmoothPeriod {
   return lanes & to;
 }
 
-/// Runs of several plants from several starts, numbered by plant and then by start.
-struct LaneRuns {
-  std::span<const PlantModel<double>> plants;
-  std::span<const LoopCase> cases;
-  std::span<LoopResult> results;
-  std::size_t first_case = 0;  ///< number of the first of these cases among all of the call
-
-  std::size_t count() const { return plants.size() * cases.size(); }
-  std::size_t plant_of(std::size_t run) const { return run / cases.size(); }
-  std::size_t case_of(std::size_t run) const { return run % cases.size(); }
-};
-
 /// Sampled loops. Lanes go in step, or each at its own pace: then whichever has come to the end of its period
 /// is controlled, and one whose run has ended takes the next run.
 template <class Present, class Period>
 class SampledRuns {
  public:
-  SampledRuns(const LoopSetup& setup, const LaneParts& parts, const Present& present, const LaneRuns& runs)
+  SampledRuns(const LoopSetup& setup, const LaneParts& parts, const Present& present,
+              std::span<const PlantModel<double>> plants, LoopSource& source)
       : setup_(setup),
         parts_(parts),
         present_(present),
-        runs_(runs),
-        model_(on_lanes(runs.plants[0])),
+        plants_(plants),
+        source_(source),
+        model_(on_lanes(plants[0])),
         chain_(model_),
         period_(parts, model_, present),
-        observer_(setup, parts),
-        delay_(runs.cases, setup.control.period_s()),
+        observer_(setup, parts, source.longest_delay_s()),
+        delay_(source.longest_delay_s(), setup.control.period_s()),
         input_(chain_, setup.control.period_s()),
         seen_(setup),
         periods_(std::round(setup.duration_s * setup.control.sample_rate_hz)),
         begun_(periods_ + Lanes(1.0)) {}
 
-  void run() {
+  /// False: the source had none.
+  bool run() {
+    if (!fill()) return false;
     const Lanes one(1.0), period_s(setup_.control.period_s());
-    for (std::size_t lane = 0; lane < lane_count; ++lane) take_next(lane);
     for (;;) {
       const Mask arrived = narrowed(Period::arrived(steps_), begun_ <= periods_);
       if (any(arrived)) {
         seen_.take(arrived, begun_ * period_s, steps_.state, command_);
         begun_ = select(arrived, begun_ + one, begun_);
-        if (!end_runs()) return;
+        if (!end_runs()) return true;
         control(narrowed(arrived, (begun_ > Lanes(0.0)) & (begun_ <= periods_)));
       }
       period_.advance(steps_);
@@ -237,58 +221,59 @@ class SampledRuns {
  private:
   using Mask = typename Period::Mask;
   static constexpr bool in_step = std::is_same_v<Mask, EveryLane>;
+  static constexpr std::uint32_t every_lane = (1u << lane_count) - 1u;
 
   /// Ends the runs that have fallen or gone through all their periods. False: none is left.
   bool end_runs() {
     const std::uint32_t late = (begun_ > periods_).bits();
-    if constexpr (in_step) {
-      if (seen_.alive() != 0 && late == 0) return true;
-      for (std::size_t lane = 0; lane < std::min(lane_count, runs_.count()); ++lane) finish(lane);
-      return false;
+    if (in_step && seen_.alive() != 0 && late == 0) return true;
+    std::uint32_t ended = in_step ? used_ : used_ & (late | ~seen_.alive());
+    if (ended == 0) return true;
+    for (; ended != 0; ended &= ended - 1) finish(static_cast<std::size_t>(std::countr_zero(ended)));
+    return !in_step && fill();
+  }
+
+  /// Gives lanes without a run the next ones, as far as there are. In step, the others go along with the last
+  /// one. False: no lane has a run.
+  [[gnu::noinline]] bool fill() {
+    LoopRun run;
+    std::uint32_t idle = ~used_ & every_lane;
+    for (; idle != 0 && source_.next(run); idle &= idle - 1) {
+      const auto lane = static_cast<std::size_t>(std::countr_zero(idle));
+      place(lane, run);
+      used_ |= 1u << lane;
+      seen_.begin(lane);
     }
-    for (std::uint32_t ended = used_ & (late | ~seen_.alive()); ended != 0; ended &= ended - 1) {
-      const auto lane = static_cast<std::size_t>(std::countr_zero(ended));
-      finish(lane);
-      take_next(lane);
-    }
+    if constexpr (in_step)
+      for (; idle != 0 && used_ != 0; idle &= idle - 1)
+        place(static_cast<std::size_t>(std::countr_zero(idle)), run);
     return used_ != 0;
   }
 
+  /// The lane rests then.
   [[gnu::noinline]] void finish(std::size_t lane) {
-    runs_.results[run_of_[lane]] = seen_.finish(lane, steps_.state);
+    source_.take(run_of_[lane], seen_.finish(lane, steps_.state));
+    used_ &= ~(1u << lane);
+    put(begun_, lane, periods_.values()[lane] + 1.0);
   }
 
-  /// Gives a lane the next run, or rest. In step, lanes without a run go along with the last one.
-  [[gnu::noinline]] void take_next(std::size_t lane) {
-    const std::uint32_t bit = 1u << lane;
-    if (next_ == runs_.count() && !in_step) {
-      used_ &= ~bit;
-      put(begun_, lane, periods_.values()[lane] + 1.0);
-      return;
-    }
-    const bool extra = next_ == runs_.count();
-    const std::size_t run = extra ? next_ - 1 : next_++;
-    const LoopCase& start = runs_.cases[runs_.case_of(run)];
-    const std::size_t plant = runs_.plant_of(run);
-    if (plant != plant_of_[lane]) become(lane, plant);
-    if (!extra) {
-      used_ |= bit;
-      seen_.begin(lane);
-    }
-    run_of_[lane] = run;
-    observer_.take_case(lane, runs_.first_case + runs_.case_of(run));
-    delay_.take(lane, start.delay_s);
+  /// Puts a lane to the start of this run.
+  void place(std::size_t lane, const LoopRun& run) {
+    if (run.plant != plant_of_[lane]) become(lane, run.plant);
+    run_of_[lane] = run.number;
+    observer_.take_delay(lane, run.start.delay_s);
+    delay_.take(lane, run.start.delay_s);
     PlantState<Lanes>& state = steps_.state;
     for (Lanes* number :
          {&state.cart_m, &state.cart_mps, &state.theta_radps, &state.motor_v, &state.bristle_m, &begun_})
       put(*number, lane, 0.0);
-    put(state.theta_rad, lane, start.theta0_rad);
+    put(state.theta_rad, lane, run.start.theta0_rad);
   }
 
   /// Gives a lane this plant.
   void become(std::size_t lane, std::size_t plant) {
     plant_of_[lane] = plant;
-    put_on_lane(model_, lane, runs_.plants[plant]);
+    put_on_lane(model_, lane, plants_[plant]);
     chain_ = Dynamics<Lanes>(model_);
     period_ = Period(parts_, model_, present_);
   }
@@ -319,7 +304,8 @@ class SampledRuns {
   const LoopSetup& setup_;
   const LaneParts& parts_;
   const Present& present_;
-  LaneRuns runs_;
+  std::span<const PlantModel<double>> plants_;
+  LoopSource& source_;
   PlantModel<Lanes> model_;
   Dynamics<Lanes> chain_;
   Period period_;
@@ -330,25 +316,20 @@ class SampledRuns {
   typename Period::Steps steps_;
   Lanes periods_, begun_, command_;
   std::array<std::size_t, lane_count> run_of_{}, plant_of_{};
-  std::size_t next_ = 0;
   std::uint32_t used_ = 0;  ///< bit i: lane i has a run
 };
 
 template <class Present>
-void run_with(const LoopSetup& setup, const LaneParts& parts, const Present& present, const LaneRuns& runs) {
+void run_with(const LoopSetup& setup, const LaneParts& parts, const Present& present,
+              std::span<const PlantModel<double>> plants, LoopSource& source) {
   if constexpr (may_stick<Present> || may_have_bristles<Present>)
-    if (parts.own_pace)
-      return SampledRuns<Present, EventPeriod<Present, false>>(setup, parts, present, runs).run();
-  // One plant and one group after the other: smooth lanes share their substeps.
-  for (std::size_t plant = 0; plant < runs.plants.size(); ++plant)
-    for (std::size_t first = 0; first < runs.cases.size(); first += lane_count) {
-      const std::size_t count = std::min(lane_count, runs.cases.size() - first);
-      SampledRuns<Present, SmoothPeriod<Present>>(
-          setup, parts, present,
-          {runs.plants.subspan(plant, 1), runs.cases.subspan(first, count),
-           runs.results.subspan(plant * runs.cases.size() + first, count), first})
-          .run();
+    if (parts.own_pace) {
+      SampledRuns<Present, EventPeriod<Present, false>>(setup, parts, present, plants, source).run();
+      return;
     }
+  // One group after the other: smooth lanes share their substeps.
+  while (SampledRuns<Present, SmoothPeriod<Present>>(setup, parts, present, plants, source).run()) {
+  }
 }
 
 }  // namespace
@@ -360,15 +341,14 @@ std::size_t runs_side_by_side() {
 }
 
 void run(const LoopSetup& setup, const LaneParts& parts, std::span<const PlantModel<double>> plants,
-         std::span<const LoopCase> cases, std::span<LoopResult> results) {
-  const LaneRuns runs{plants, cases, results};
-  if (setup.sampled && parts.pivot_or_lag)
-    SampledRuns<EffectSet, EventPeriod<EffectSet, true>>(setup, parts, plants[0].present, runs).run();
-  else if (setup.sampled)
-    with_effects(plants[0].present, [&](const auto& present) { run_with(setup, parts, present, runs); });
+         LoopSource& source) {
+  const EffectSet& present = plants[0].present;
+  if (!setup.sampled)
+    run_continuous_on_lanes(setup, plants[0], source);
+  else if (parts.pivot_or_lag)
+    SampledRuns<EffectSet, EventPeriod<EffectSet, true>>(setup, parts, present, plants, source).run();
   else
-    for (std::size_t i = 0; i < plants.size(); ++i)
-      run_continuous_on_lanes(setup, plants[i], cases, results.subspan(i * cases.size(), cases.size()));
+    with_effects(present, [&](const auto& known) { run_with(setup, parts, known, plants, source); });
 }
 
 }  // namespace UPRIGHT_LANES

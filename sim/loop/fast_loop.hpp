@@ -5,6 +5,7 @@
 #include <span>
 
 #include "loop_run.hpp"
+#include "loop_source.hpp"
 
 namespace upright {
 
@@ -36,6 +37,11 @@ void run_on_lanes(const LoopSetup& setup, std::span<const LoopCase> cases, std::
 /// then by start. Lanes that refill take different plants at once.
 void run_plants_on_lanes(const LoopSetup& setup, std::span<const PlantModel<double>> plants,
                          std::span<const LoopCase> cases, std::span<LoopResult> results,
+                         LaneRegisters registers = LaneRegisters::wide);
+
+/// The same for the runs of a source, until it has no more. A lane that has ended a run takes the next one at
+/// once. Where `lanes_refill` is false, a result depends on the runs that the source gives together.
+void run_source_on_lanes(const LoopSetup& setup, LoopSource& source,
                          LaneRegisters registers = LaneRegisters::wide);
 
 /// Whether each lane goes at its own pace, and takes the next run of a call as soon as one has ended. Then a

@@ -5,11 +5,11 @@
 
 #include <optional>
 #include <span>
-#include <vector>
 
 #include "control/kalman_step.hpp"
-#include "control/predictor_step.hpp"
+#include "lane_predictions.hpp"
 #include "loop_run.hpp"
+#include "loop_source.hpp"
 #include "upright/model/dynamics.hpp"
 
 namespace upright {
@@ -23,10 +23,7 @@ struct LaneEstimator {
 /// What the controllers know of their plants.
 struct LaneParts {
   std::optional<LaneEstimator> estimator;
-  /// Predictors of different delays, the model of their plant, and which of them each run has.
-  std::vector<FeedbackPrediction> predictions;
-  PlantModel<double> predicted;
-  std::vector<std::size_t> prediction_of;  ///< by start
+  LanePredictions* predictions = nullptr;  ///< null: the delay is not compensated
   /// Each lane goes at its own pace from event to event; otherwise all lanes go in step.
   bool own_pace = false;
   bool stiff_bristles = false;  ///< they relax too fast for the classical method
@@ -40,8 +37,9 @@ struct LaneParts {
 #define UPRIGHT_DECLARE_LANES(name)                                                                    \
   namespace name {                                                                                     \
   std::size_t runs_side_by_side();                                                                     \
+  /* Until the source has no more. Several plants only where each lane goes at its own pace. */        \
   void run(const LoopSetup& setup, const LaneParts& parts, std::span<const PlantModel<double>> plants, \
-           std::span<const LoopCase> cases, std::span<LoopResult> results);                            \
+           LoopSource& source);                                                                        \
   }
 
 namespace upright {

@@ -1,12 +1,9 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
-#include <map>
 #include <string_view>
 
-#include "control/estimate_predictor.hpp"
 #include "control/kalman_filter.hpp"
-#include "control/predictor.hpp"
 #include "fast_loop.hpp"
 #include "lane_builds.hpp"
 
@@ -18,7 +15,7 @@ namespace {
 struct LaneBuild {
   std::size_t (*runs_side_by_side)();
   void (*run)(const LoopSetup& setup, const LaneParts& parts, std::span<const PlantModel<double>> plants,
-              std::span<const LoopCase> cases, std::span<LoopResult> results);
+              LoopSource& source);
 };
 
 constexpr LaneBuild baseline{baseline_lanes::runs_side_by_side, baseline_lanes::run};
@@ -95,38 +92,54 @@ bool has_short_series(const PlantModel<double>& model) {
   return Dynamics<double>(model).has_short_series();
 }
 
-FeedbackPrediction prediction_of(const ModelParts& parts, const Gains& gains, PlantModel<double>& predicted) {
-  if (const auto* predictor = dynamic_cast<const Predictor*>(parts.compensator.get())) {
-    predicted = predictor->model();
-    return predictor->feedback(gains);
-  }
-  const auto& predictor = dynamic_cast<const EstimatePredictor&>(*parts.compensator);
-  predicted = predictor.model();
-  return predictor.feedback(gains,
-                            dynamic_cast<const KalmanFilter&>(*parts.estimator).step().rejecting_v_per_n);
+bool compensates(const LoopSetup& setup) {
+  return setup.make_parts && setup.control.compensation.kind != CompensationKind::none;
 }
 
-LaneParts parts_of(const LoopSetup& setup, std::span<const LoopCase> cases) {
-  LaneParts made;
-  if (!setup.make_parts) return made;
-  ControlConfig control = setup.control;
-  if (control.has_state_estimator()) {
-    const ModelParts parts = setup.make_parts(control);
-    const auto& filter = dynamic_cast<const KalmanFilter&>(*parts.estimator);
-    made.estimator = {filter.step(), filter.model()};
-  }
-  if (control.compensation.kind == CompensationKind::none) return made;
-  std::map<double, std::size_t> of_delay;
-  for (const LoopCase& run : cases) {
-    const auto [at, fresh] = of_delay.try_emplace(run.delay_s, made.predictions.size());
-    if (fresh) {
-      control.delay_s = run.delay_s;
-      made.predictions.push_back(prediction_of(setup.make_parts(control), control.gains, made.predicted));
-    }
-    made.prediction_of.push_back(at->second);
-  }
-  return made;
+std::optional<LaneEstimator> estimator_of(const LoopSetup& setup) {
+  if (!setup.make_parts || !setup.control.has_state_estimator()) return {};
+  const ModelParts parts = setup.make_parts(setup.control);
+  const auto& filter = dynamic_cast<const KalmanFilter&>(*parts.estimator);
+  return LaneEstimator{filter.step(), filter.model()};
 }
+
+/// Sets how lanes run this plant.
+void choose_steps(const LoopSetup& setup, const PlantModel<double>& model, LaneParts& parts) {
+  LoopSetup of_plant = setup;
+  of_plant.model = model;
+  parts.own_pace = lanes_refill(of_plant);
+  const Dynamics<double> physics(model);
+  parts.pivot_or_lag = parts.own_pace && (physics.pivot_can_stick() || physics.has_motor_lag());
+  parts.stiff_bristles = setup.sampled && has_stiff_bristles(model);
+  // At slower rates, periods are longer than a millisecond.
+  parts.short_series = has_short_series(model) && setup.control.period_s() <= longest_series_s;
+}
+
+/// Runs of several plants from several starts, numbered by plant and then by start.
+class ListedRuns final : public LoopSource {
+ public:
+  ListedRuns(std::size_t plants, std::span<const LoopCase> cases, std::span<LoopResult> results)
+      : plants_(plants), cases_(cases), results_(results) {}
+
+  bool next(LoopRun& run) override {
+    if (next_ == plants_ * cases_.size()) return false;
+    run = {next_, cases_[next_ % cases_.size()], next_ / cases_.size()};
+    ++next_;
+    return true;
+  }
+  void take(std::size_t number, const LoopResult& result) override { results_[number] = result; }
+  double longest_delay_s() const override {
+    return std::max_element(cases_.begin(), cases_.end(),
+                            [](const LoopCase& a, const LoopCase& b) { return a.delay_s < b.delay_s; })
+        ->delay_s;
+  }
+
+ private:
+  std::size_t plants_;
+  std::span<const LoopCase> cases_;
+  std::span<LoopResult> results_;
+  std::size_t next_ = 0;
+};
 
 /// Whether lanes may have these two plants at once. The input delay is the same in all lanes, and some
 /// effects treat parameters that are whole numbers (an exponent of 2, the kind of a table) specially, if all
@@ -190,21 +203,29 @@ void run_plants_on_lanes(const LoopSetup& setup, std::span<const PlantModel<doub
                          std::span<const LoopCase> cases, std::span<LoopResult> results,
                          LaneRegisters registers) {
   if (cases.empty()) return;
-  LaneParts parts = parts_of(setup, cases);
-  LoopSetup of_plants = setup;
+  LaneParts parts;
+  parts.estimator = estimator_of(setup);
+  LanePredictions predictions(setup);
+  if (compensates(setup)) parts.predictions = &predictions;
   for (std::size_t first = 0, end = 0; first < plants.size(); first = end) {
-    for (end = first + 1; end < plants.size() && may_mix(plants[first], plants[end]);) ++end;
+    choose_steps(setup, plants[first], parts);
+    const bool mix = setup.sampled && parts.own_pace;
+    for (end = first + 1; mix && end < plants.size() && may_mix(plants[first], plants[end]);) ++end;
     const std::size_t count = end - first;
-    of_plants.model = plants[first];
-    parts.own_pace = lanes_refill(of_plants);
-    const Dynamics<double> physics(of_plants.model);
-    parts.pivot_or_lag = parts.own_pace && (physics.pivot_can_stick() || physics.has_motor_lag());
-    parts.stiff_bristles = setup.sampled && has_stiff_bristles(plants[first]);
-    // At slower rates, periods are longer than a millisecond.
-    parts.short_series = has_short_series(plants[first]) && setup.control.period_s() <= longest_series_s;
-    lanes_for(registers).run(setup, parts, plants.subspan(first, count), cases,
-                             results.subspan(first * cases.size(), count * cases.size()));
+    ListedRuns runs(count, cases, results.subspan(first * cases.size(), count * cases.size()));
+    lanes_for(registers).run(setup, parts, plants.subspan(first, count), runs);
   }
 }
+
+void run_source_on_lanes(const LoopSetup& setup, LoopSource& source, LaneRegisters registers) {
+  LaneParts parts;
+  parts.estimator = estimator_of(setup);
+  LanePredictions predictions(setup);
+  if (compensates(setup)) parts.predictions = &predictions;
+  choose_steps(setup, setup.model, parts);
+  lanes_for(registers).run(setup, parts, std::span(&setup.model, 1), source);
+}
+
+LoopSource::~LoopSource() = default;
 
 }  // namespace upright

@@ -125,20 +125,24 @@ class LaneKalmanFilter {
 template <class Mask>
 class LaneObserver {
  public:
-  LaneObserver(const LoopSetup& setup, const LaneParts& parts)
-      : parts_(parts),
+  /// No run has a longer delay than `longest_delay_s`.
+  LaneObserver(const LoopSetup& setup, const LaneParts& parts, double longest_delay_s)
+      : predictions_(parts.predictions),
+        longest_periods_(longest_delay_s / setup.control.period_s()),
         gains_(setup.control.gains),
         cart_(make_estimator_step(setup.control.estimator, setup.control.period_s()),
               setup.cart_resolution_m),
         pendulum_(make_estimator_step(setup.control.estimator, setup.control.period_s()),
                   setup.angle_resolution_rad) {
     if (parts.estimator) filter_.emplace(*parts.estimator);
-    if (!parts.predictions.empty()) predictor_.emplace(parts.predicted, parts.predictions);
   }
 
-  /// Says which run this lane has next.
-  void take_case(std::size_t lane, std::size_t number) {
-    if (predictor_) predictor_->take(lane, parts_.predictions[parts_.prediction_of[number]]);
+  /// Says which delay the next run of this lane has.
+  void take_delay(std::size_t lane, double delay_s) {
+    if (predictions_ == nullptr) return;
+    const FeedbackPrediction& prediction = predictions_->at(delay_s);
+    if (!predictor_) predictor_.emplace(predictions_->plant(), prediction, longest_periods_);
+    predictor_->take(lane, prediction);
   }
 
   /// At the start of the runs of these lanes, before their first period. Returns what the delay holds.
@@ -192,7 +196,8 @@ class LaneObserver {
 
   static LaneMask every() { return Lanes(0.0) == Lanes(0.0); }
 
-  const LaneParts& parts_;
+  LanePredictions* predictions_;
+  double longest_periods_;
   Gains gains_;
   LaneSensor cart_, pendulum_;
   std::optional<LaneKalmanFilter<Mask>> filter_;

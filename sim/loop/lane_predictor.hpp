@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <cmath>
 #include <optional>
 #include <vector>
 
@@ -94,18 +95,17 @@ class LanePredictor {
  public:
   using State = std::array<Lanes, predicted_states>;
 
-  /// `predictions`: all that a lane may have, of different delays.
-  LanePredictor(const PlantModel<double>& model, const std::vector<FeedbackPrediction>& predictions)
-      : common_(predictions[0]),
+  /// `of`: any prediction that a lane may have. No delay has more periods than `longest_periods`.
+  LanePredictor(const PlantModel<double>& model, const FeedbackPrediction& of, double longest_periods)
+      : common_(of),
         actuator_(on_lanes(model)),
-        window_(longest_of(predictions)),
-        filters_(common_.filter.m1 != 0.0 || common_.filter.m0 != 0.0 ||
-                 std::any_of(predictions.begin(), predictions.end(),
-                             [](const FeedbackPrediction& of) { return of.now != 0.0; })) {}
+        window_(most_weights(of, longest_periods)),
+        filters_(of.filter.m1 != 0.0 || of.filter.m0 != 0.0) {}
 
   /// Gives one lane this prediction.
   void take(std::size_t lane, const FeedbackPrediction& of) {
     window_.weigh(lane, of.on_their_way);
+    filters_ = filters_ || of.now != 0.0;
     for (std::size_t k = 0; k < predicted_states; ++k) put(known_[k], lane, of.known[k]);
     put(constant_v_, lane, of.constant_v);
     put(now_, lane, of.now);
@@ -161,10 +161,10 @@ class LanePredictor {
   }
 
  private:
-  static std::size_t longest_of(const std::vector<FeedbackPrediction>& predictions) {
-    std::size_t longest = 0;
-    for (const FeedbackPrediction& of : predictions) longest = std::max(longest, of.on_their_way.size());
-    return longest;
+  /// One for each period that a delay is longer than that of `of`, which has `free_periods`, rounded up.
+  static std::size_t most_weights(const FeedbackPrediction& of, double longest_periods) {
+    const double longer = std::ceil(longest_periods) - static_cast<double>(of.free_periods);
+    return of.on_their_way.size() + 1 + static_cast<std::size_t>(std::max(longer, 0.0));
   }
 
   void filter(const LaneMask& lanes) {

@@ -3,13 +3,12 @@
 #include <algorithm>
 #include <cmath>
 #include <fstream>
-#include <limits>
-#include <set>
 
 #include "design/delay_margin.hpp"
 #include "model/linear_plant.hpp"
 #include "sweep_journal.hpp"
 #include "sweep_stages.hpp"
+#include "transition_search.hpp"
 #include "upright/base/error.hpp"
 #include "upright/base/yaml_reader.hpp"
 
@@ -34,140 +33,30 @@ Outcome SweepRun::outcome(double stable_below_rad) const {
 
 namespace {
 
-constexpr double nowhere = std::numeric_limits<double>::quiet_NaN();
-
 bool earlier(const LoopCase& a, const LoopCase& b) {
   return a.theta0_rad != b.theta0_rad ? a.theta0_rad < b.theta0_rad : a.delay_s < b.delay_s;
 }
 
-/// Where the outcome of one starting angle becomes `from` or worse: between `low_s` (not yet) and `high_s`.
-struct Bracket {
-  std::size_t angle = 0;
-  Outcome from = Outcome::fell;
-  double low_s = nowhere;
-  double high_s = nowhere;
+std::vector<StartSearch> searches_of_list(const SweepConfig& config) {
+  std::vector<StartSearch> searches;
+  for (const double theta0 : config.theta0_rad) searches.emplace_back(config, theta0);
+  return searches;
+}
 
-  bool open(double tolerance_s) const {
-    return !std::isnan(low_s) && !std::isnan(high_s) && high_s - low_s > tolerance_s * (1.0 + 1e-9);
-  }
-};
+/// `grid`: its runs, by angle and then delay.
+std::vector<StartSearch> searches_of_grid(const SweepConfig& config, std::span<const SweepRun> grid) {
+  std::vector<StartSearch> searches;
+  const std::size_t delays = config.delay_s.size();
+  for (std::size_t a = 0; a < config.theta0_rad.size(); ++a)
+    searches.emplace_back(config, grid.subspan(a * delays, delays));
+  return searches;
+}
 
-class TransitionSearch {
- public:
-  TransitionSearch(const SweepConfig& config, SweepStages& stages) : config_(config), stages_(stages) {}
-
-  /// Brackets from the whole grid, `runs` by angle and then delay.
-  void bracket_on_grid(const std::vector<SweepRun>& runs) {
-    const std::size_t delays = config_.delay_s.size();
-    for (std::size_t a = 0; a < config_.theta0_rad.size(); ++a)
-      for (const Outcome from : {Outcome::oscillating, Outcome::fell}) {
-        Bracket bracket{a, from, nowhere, nowhere};
-        for (std::size_t d = 0; d < delays; ++d) {
-          if (runs[a * delays + d].outcome(config_.stable_below_rad) >= from) {
-            bracket.high_s = config_.delay_s[d];
-            if (d > 0) bracket.low_s = config_.delay_s[d - 1];
-            break;
-          }
-        }
-        brackets_.push_back(bracket);
-      }
-  }
-
-  /// Brackets by halving the list of delays; returns the runs made for it. False: stopped.
-  bool bracket_by_halving(std::vector<SweepRun>& runs) {
-    struct Range {
-      std::ptrdiff_t low, high;
-    };
-    const auto delays = static_cast<std::ptrdiff_t>(config_.delay_s.size());
-    for (std::size_t a = 0; a < config_.theta0_rad.size(); ++a)
-      for (const Outcome from : {Outcome::oscillating, Outcome::fell})
-        brackets_.push_back({a, from, nowhere, nowhere});
-    std::vector<Range> ranges(brackets_.size(), {-1, delays});
-    const auto middle = [&](const Range& range) { return (range.low + range.high) / 2; };
-    const auto step = [&](const std::vector<SweepRun>& made) {
-      for (std::size_t b = 0; b < brackets_.size(); ++b) {
-        if (ranges[b].high - ranges[b].low <= 1) continue;
-        const SweepRun* run = find(made, case_at(brackets_[b], delay_at(middle(ranges[b]))));
-        (is_past(*run, brackets_[b]) ? ranges[b].high : ranges[b].low) = middle(ranges[b]);
-      }
-    };
-    while (true) {
-      std::vector<LoopCase> cases;
-      for (std::size_t b = 0; b < brackets_.size(); ++b)
-        if (ranges[b].high - ranges[b].low > 1)
-          cases.push_back(case_at(brackets_[b], delay_at(middle(ranges[b]))));
-      if (cases.empty()) break;
-      if (!make(cases, runs, step)) return false;
-    }
-    for (std::size_t b = 0; b < brackets_.size(); ++b) {
-      if (ranges[b].high < delays) brackets_[b].high_s = delay_at(ranges[b].high);
-      if (ranges[b].low >= 0) brackets_[b].low_s = delay_at(ranges[b].low);
-    }
-    return true;
-  }
-
-  /// Bisection of all brackets together. False: stopped.
-  bool refine(std::vector<SweepRun>& runs) {
-    const auto middle = [](const Bracket& b) { return 0.5 * (b.low_s + b.high_s); };
-    while (true) {
-      std::vector<LoopCase> cases;
-      for (const Bracket& bracket : brackets_)
-        if (bracket.open(transition_tolerance_s)) cases.push_back(case_at(bracket, middle(bracket)));
-      if (cases.empty()) return true;
-      const auto step = [&](const std::vector<SweepRun>& made) {
-        for (Bracket& bracket : brackets_) {
-          if (!bracket.open(transition_tolerance_s)) continue;
-          const double delay = middle(bracket);
-          (is_past(*find(made, case_at(bracket, delay)), bracket) ? bracket.high_s : bracket.low_s) = delay;
-        }
-      };
-      if (!make(cases, runs, step)) return false;
-    }
-  }
-
-  std::vector<Transition> transitions() const {
-    std::vector<Transition> all;
-    for (std::size_t a = 0; a < config_.theta0_rad.size(); ++a)
-      all.push_back({config_.theta0_rad[a], brackets_[2 * a].high_s, brackets_[2 * a + 1].high_s});
-    return all;
-  }
-
- private:
-  double delay_at(std::ptrdiff_t index) const { return config_.delay_s[static_cast<std::size_t>(index)]; }
-  LoopCase case_at(const Bracket& bracket, double delay_s) const {
-    return {config_.theta0_rad[bracket.angle], delay_s};
-  }
-  bool is_past(const SweepRun& run, const Bracket& bracket) const {
-    return run.outcome(config_.stable_below_rad) >= bracket.from;
-  }
-
-  static const SweepRun* find(const std::vector<SweepRun>& runs, const LoopCase& wanted) {
-    const auto it =
-        std::lower_bound(runs.begin(), runs.end(), wanted,
-                         [](const SweepRun& run, const LoopCase& c) { return earlier(run.start, c); });
-    return &*it;
-  }
-
-  /// Makes the runs (each once), hands them on sorted, and adds them to `runs`.
-  template <class Step>
-  bool make(std::vector<LoopCase>& cases, std::vector<SweepRun>& runs, const Step& step) {
-    std::sort(cases.begin(), cases.end(), earlier);
-    cases.erase(std::unique(cases.begin(), cases.end(),
-                            [](const LoopCase& a, const LoopCase& b) {
-                              return a.theta0_rad == b.theta0_rad && a.delay_s == b.delay_s;
-                            }),
-                cases.end());
-    const std::vector<SweepRun> made = stages_.run(cases);
-    if (stages_.interrupted()) return false;
-    step(made);
-    runs.insert(runs.end(), made.begin(), made.end());
-    return true;
-  }
-
-  const SweepConfig& config_;
-  SweepStages& stages_;
-  std::vector<Bracket> brackets_;
-};
+std::vector<Transition> transitions_of(const std::vector<StartSearch>& searches) {
+  std::vector<Transition> all;
+  for (const StartSearch& search : searches) all.push_back(search.transition());
+  return all;
+}
 
 void sort_runs(std::vector<SweepRun>& runs) {
   std::stable_sort(runs.begin(), runs.end(),
@@ -282,11 +171,10 @@ void refuse_unstable(const SweepConfig& config, const std::vector<LinearMargin>&
 std::vector<Transition> find_transitions(const SweepConfig& config, SweepExecutor& executor) {
   const SweepOptions options;
   SweepStages stages(config, options, executor, nullptr);
-  TransitionSearch search(config, stages);
+  std::vector<StartSearch> searches = searches_of_list(config);
   std::vector<SweepRun> runs;
-  search.bracket_by_halving(runs);
-  search.refine(runs);
-  return search.transitions();
+  stages.search(searches, runs);
+  return transitions_of(searches);
 }
 
 SweepResult run_sweep(const SweepConfig& config, const std::filesystem::path& folder,
@@ -297,21 +185,22 @@ SweepResult run_sweep(const SweepConfig& config, const std::filesystem::path& fo
   const std::string mode = options.transitions_only ? "# transitions only\n" : "";
   SweepJournal journal(folder / journal_name, mode + config.resolved_text);
   SweepStages stages(config, options, executor, &journal);
-  TransitionSearch search(config, stages);
+  std::vector<StartSearch> searches;
   SweepResult result;
-  std::vector<SweepRun> refining;
   const bool over_plants = config.uncertainty && !options.transitions_only;
   if (over_plants) stages.expect_plants(grid_cases(config));
   bool whole = true;
   if (options.transitions_only) {
-    whole = search.bracket_by_halving(result.runs) && search.refine(result.runs);
+    searches = searches_of_list(config);
+    whole = stages.search(searches, result.runs);
   } else {
     result.runs = stages.run(grid_cases(config));
     whole = !stages.interrupted();
     sort_runs(result.runs);
     if (whole) {
-      search.bracket_on_grid(result.runs);
-      whole = search.refine(refining);
+      searches = searches_of_grid(config, result.runs);
+      std::vector<SweepRun> between;
+      whole = stages.search(searches, between);
     }
   }
   if (whole && over_plants) {
@@ -323,7 +212,7 @@ SweepResult run_sweep(const SweepConfig& config, const std::filesystem::path& fo
   result.interrupted = !whole;
   if (!whole) return result;
   sort_runs(result.runs);
-  result.transitions = search.transitions();
+  result.transitions = transitions_of(searches);
   journal.check();
   write_file(folder / "sweep.yaml", mode + config.resolved_text);
   write_file(folder / "margins.csv", margins_csv(margins));

@@ -29,17 +29,30 @@ double processor_time_s() {
   return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
 }
 
-/// Size of the groups of so many runs. Where a run does not depend on its group, all are of about the same
-/// size.
-std::size_t even_group(const SweepConfig& config, std::size_t runs) {
-  const std::size_t size = runs_per_call(config);
-  if (size == sweep_group_size(config) || runs == 0) return size;
-  return parts(runs, parts(runs, size));
+/// Size of groups of about the same size, at most `largest`.
+std::size_t evenly(std::size_t all, std::size_t largest) {
+  return all == 0 ? largest : parts(all, parts(all, largest));
 }
 
-std::span<const LoopCase> group_of(const std::vector<LoopCase>& cases, std::size_t size, std::size_t number) {
+/// Size of the groups of so many runs.
+std::size_t even_group(const SweepConfig& config, std::size_t runs) {
+  const std::size_t size = runs_per_call(config);
+  return size == sweep_group_size(config) ? size : evenly(runs, size);
+}
+
+template <class T>
+std::span<T> group_of(std::span<T> all, std::size_t size, std::size_t number) {
   const std::size_t first = number * size;
-  return std::span(cases).subspan(first, std::min(size, cases.size() - first));
+  return all.subspan(first, std::min(size, all.size() - first));
+}
+std::span<const LoopCase> group_of(const std::vector<LoopCase>& cases, std::size_t size, std::size_t number) {
+  return group_of(std::span(cases), size, number);
+}
+
+std::size_t open_in(std::span<const StartSearch> searches) {
+  std::size_t open = 0;
+  for (const StartSearch& search : searches) open += search.open();
+  return open;
 }
 
 }  // namespace
@@ -58,15 +71,61 @@ std::vector<SweepRun> SweepStages::run(const std::vector<LoopCase>& cases) {
   const auto group = [&](std::size_t g) { return group_of(cases, size_of_group, g); };
   const auto size = [&](std::size_t g) { return group(g).size(); };
   known_ += cases.size();
-  make({stage_++, parts(cases.size(), size_of_group), [&](std::size_t g) { return plain_task(group(g)); },
-        size, size,
-        [&](std::size_t g, const SweepNumbers& result) {
-          const std::vector<SweepRun> made = runs_of(result);
-          if (!are_of(made, group(g))) return false;
-          std::copy(made.begin(), made.end(), runs.begin() + static_cast<std::ptrdiff_t>(g * size_of_group));
-          return true;
-        }});
+  const auto take = [&](std::size_t g, const SweepNumbers& result) {
+    const std::vector<SweepRun> made = runs_of(result);
+    if (!are_of(made, group(g))) return false;
+    std::copy(made.begin(), made.end(), runs.begin() + static_cast<std::ptrdiff_t>(g * size_of_group));
+    return true;
+  };
+  const auto task_of = [&](std::size_t g) { return plain_task(group(g)); };
+  make({stage_++, parts(cases.size(), size_of_group), task_of, size, size, take});
   return interrupted_ ? std::vector<SweepRun>() : runs;
+}
+
+bool SweepStages::search(std::vector<StartSearch>& searches, std::vector<SweepRun>& runs) {
+  if (!lanes_search(config_)) return search_in_rounds(searches, runs);
+  const std::size_t starts = evenly(searches.size(), starts_per_search(config_));
+  const std::size_t tasks = parts(searches.size(), starts);
+  const auto group = [&](std::size_t task) { return group_of(std::span(searches), starts, task); };
+  // How many runs a search needs is known at its end. Until then there is one for each open bracket.
+  std::vector<std::size_t> runs_of_task(tasks);
+  known_ += open_in(searches);
+  const auto take = [&](std::size_t task, const SweepNumbers& result) {
+    const std::vector<SweepRun> made = runs_of(result);
+    const std::span<StartSearch> mine = group(task);
+    const std::size_t open = open_in(mine);
+    if (!follow({mine.begin(), mine.end()}, made, mine)) return false;
+    runs_of_task[task] = made.size();
+    known_ = known_ + made.size() - open;
+    runs.insert(runs.end(), made.begin(), made.end());
+    return true;
+  };
+  const auto task_of = [&](std::size_t task) { return search_task(group(task)); };
+  const auto size = [&](std::size_t task) { return group(task).size(); };
+  make({stage_++, tasks, task_of, size, [&](std::size_t task) { return runs_of_task[task]; }, take});
+  return !interrupted_;
+}
+
+/// All searches go in step, first through the list: what comes of a run may depend on those beside it.
+bool SweepStages::search_in_rounds(std::vector<StartSearch>& searches, std::vector<SweepRun>& runs) {
+  for (const bool on_list : {true, false})
+    while (true) {
+      std::vector<LoopCase> cases;
+      std::vector<std::size_t> of;
+      for (std::size_t s = 0; s < searches.size(); ++s) {
+        const std::size_t before = cases.size();
+        while (const std::optional<LoopCase> wanted = searches[s].next(on_list)) cases.push_back(*wanted);
+        std::sort(cases.begin() + static_cast<std::ptrdiff_t>(before), cases.end(),
+                  [](const LoopCase& a, const LoopCase& b) { return a.delay_s < b.delay_s; });
+        of.resize(cases.size(), s);
+      }
+      if (cases.empty()) break;
+      const std::vector<SweepRun> made = run(cases);
+      if (interrupted_) return false;
+      for (std::size_t i = 0; i < made.size(); ++i) searches[of[i]].take(made[i]);
+      runs.insert(runs.end(), made.begin(), made.end());
+    }
+  return true;
 }
 
 void SweepStages::expect_plants(const std::vector<LoopCase>& cases) {

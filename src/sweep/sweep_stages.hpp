@@ -4,6 +4,7 @@
 
 #include "sweep.hpp"
 #include "sweep_journal.hpp"
+#include "transition_search.hpp"
 
 namespace upright {
 
@@ -15,6 +16,9 @@ class SweepStages {
 
   /// The runs of these cases, in their order; empty when stopped.
   std::vector<SweepRun> run(const std::vector<LoopCase>& cases);
+
+  /// Takes searches to their ends, and adds the runs made for them. False: stopped.
+  bool search(std::vector<StartSearch>& searches, std::vector<SweepRun>& runs);
 
   /// Says that `count_plants` will be called with these cases: the progress is of all runs then.
   void expect_plants(const std::vector<LoopCase>& cases);
@@ -34,6 +38,7 @@ class SweepStages {
     Take take;
   };
   void make(const Stage& stage);
+  bool search_in_rounds(std::vector<StartSearch>& searches, std::vector<SweepRun>& runs);
 
   const SweepConfig& config_;
   const SweepOptions& options_;

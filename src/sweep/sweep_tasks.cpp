@@ -12,7 +12,9 @@ namespace {
 /// Lanes that go on with the next run when one ends waste less with more runs for each of them.
 constexpr std::size_t refill_of_lanes = 4;
 
-// A task: its first plant, its number of plants (0: the plant of the file), and its starts.
+// A task: its first plant, its number of plants (0: the plant of the file), and its starts. With
+// `searches_mark` for a number of plants: searches.
+constexpr double searches_mark = -1.0;
 constexpr std::size_t header_numbers = 2, case_numbers = 2, run_numbers = 5, count_numbers = 2;
 
 bool runs_on_lanes(const SweepConfig& config, const LoopSetup& setup) {
@@ -75,7 +77,77 @@ SweepNumbers count_plants(const SweepConfig& config, const SweepNumbers& task) {
   return result;
 }
 
+/// Runs that searches want, of each in turn.
+class SearchedRuns final : public LoopSource {
+ public:
+  SearchedRuns(const SweepConfig& config, const SweepNumbers& task) : config_(config) {
+    for (std::size_t at = header_numbers; at + StartSearch::numbers <= task.size();
+         at += StartSearch::numbers)
+      searches_.emplace_back(config, std::span(task).subspan(at).first<StartSearch::numbers>());
+  }
+
+  bool next(LoopRun& run) override {
+    for (std::size_t i = 0; i < searches_.size(); ++i) {
+      const std::size_t search = turn_;
+      turn_ = turn_ + 1 == searches_.size() ? 0 : turn_ + 1;
+      if (const std::optional<LoopCase> wanted = searches_[search].next()) {
+        run = {runs_.size(), *wanted};
+        runs_.push_back({*wanted});
+        search_of_.push_back(search);
+        return true;
+      }
+    }
+    return false;
+  }
+  void take(std::size_t number, const LoopResult& result) override {
+    runs_[number] = run_of(runs_[number].start, result);
+    searches_[search_of_[number]].take(runs_[number]);
+  }
+  double longest_delay_s() const override { return config_.delay_s.back(); }
+
+  /// In an order that does not depend on when they ended.
+  std::vector<SweepRun> sorted() {
+    std::vector<SweepRun> runs = runs_;
+    std::sort(runs.begin(), runs.end(), [](const SweepRun& a, const SweepRun& b) {
+      return a.start.theta0_rad != b.start.theta0_rad ? a.start.theta0_rad < b.start.theta0_rad
+                                                      : a.start.delay_s < b.start.delay_s;
+    });
+    return runs;
+  }
+
+ private:
+  const SweepConfig& config_;
+  std::vector<StartSearch> searches_;
+  std::vector<SweepRun> runs_;          ///< by number
+  std::vector<std::size_t> search_of_;  ///< by number of a run
+  std::size_t turn_ = 0;
+};
+
+std::vector<SweepRun> search(const SweepConfig& config, const SweepNumbers& task) {
+  SearchedRuns runs(config, task);
+  run_source_on_lanes(config.setup, runs, registers_of(config));
+  return runs.sorted();
+}
+
 }  // namespace
+
+SweepNumbers search_task(std::span<const StartSearch> searches) {
+  SweepNumbers task{0.0, searches_mark};
+  for (const StartSearch& search : searches) {
+    const auto numbers = search.as_numbers();
+    task.insert(task.end(), numbers.begin(), numbers.end());
+  }
+  return task;
+}
+
+bool lanes_search(const SweepConfig& config) {
+  return runs_on_lanes(config, config.setup) && lanes_refill(config.setup);
+}
+
+std::size_t starts_per_search(const SweepConfig& config) {
+  constexpr std::size_t brackets = 2;  // each wants a run at a time
+  return runs_per_call(config) / brackets;
+}
 
 SweepNumbers plain_task(std::span<const LoopCase> cases) {
   return task_of(cases, 0.0, 0.0);
@@ -88,7 +160,8 @@ SweepNumbers plants_task(std::span<const LoopCase> cases, std::uint32_t first_pl
 SweepNumbers compute_task(const SweepConfig& config, const SweepNumbers& task) {
   if (task[1] > 0.0) return count_plants(config, task);
   SweepNumbers result;
-  for (const SweepRun& run : run_sweep_group(config, cases_of(task)))
+  for (const SweepRun& run :
+       task[1] == searches_mark ? search(config, task) : run_sweep_group(config, cases_of(task)))
     result.insert(result.end(), {run.start.theta0_rad, run.start.delay_s, run.fall_time_s,
                                  run.theta_amplitude_rad, run.cart_amplitude_m});
   return result;
@@ -152,7 +225,7 @@ std::size_t sweep_group_size(const SweepConfig& config) {
 
 std::size_t runs_per_call(const SweepConfig& config) {
   const std::size_t group = sweep_group_size(config);
-  const bool more = config.setup.sampled && runs_on_lanes(config, config.setup) && lanes_refill(config.setup);
+  const bool more = config.setup.sampled && lanes_search(config);
   return more ? refill_of_lanes * group : group;
 }
 
