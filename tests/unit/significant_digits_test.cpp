@@ -12,7 +12,7 @@
 namespace upright {
 namespace {
 
-TEST(SignificantDigits, LastDigitIsAtMostAHundredthOfTheStandardError) {
+TEST(SignificantDigits, LastDigitIsAHundredthOfTheErrorAtMost) {
   EXPECT_EQ(rounded_to_significant_digits(0.5999726319768507, 7e-5), 0.5999726);
   EXPECT_EQ(rounded_to_significant_digits(-123456.789, 3000.0), -123460.0);
   EXPECT_EQ(rounded_to_significant_digits(2.5014371e-9, 1e-11), 2.5014e-9);
