@@ -54,6 +54,7 @@ std::vector<StartSearch> searches_of_grid(const SweepConfig& config, std::span<c
 
 std::vector<Transition> transitions_of(const std::vector<StartSearch>& searches) {
   std::vector<Transition> all;
+  all.reserve(searches.size());
   for (const StartSearch& search : searches) all.push_back(search.transition());
   return all;
 }
