@@ -137,6 +137,13 @@ TEST(Open, RefusesADeviceThatAcknowledgesZeroVoltsAndKeepsAnother) {
   for (const bool serial : {false, true}) {
     Driven driven({serial, false, Trouble::none, 0.0});
     driven.device.begin(Trouble::ignores_writes, 60.0);
+    // On a busy machine the rig may have written zero volts in between: then there is no voltage to keep.
+    for (int i = 0; i < 20 && driven.device.voltage_v() != run_v; ++i) {
+      driven.device.end_trouble();
+      driven.drive();
+      driven.device.begin(Trouble::ignores_writes, 60.0);
+    }
+    ASSERT_EQ(driven.device.voltage_v(), run_v);
     try {
       driven.rig->open();
       ADD_FAILURE() << "it opened";
