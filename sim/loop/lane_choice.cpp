@@ -103,6 +103,14 @@ std::optional<LaneEstimator> estimator_of(const LoopSetup& setup) {
   return LaneEstimator{filter.step(), filter.model()};
 }
 
+/// What does not depend on the plants. `predictions` must outlive it.
+LaneParts parts_of_controller(const LoopSetup& setup, LanePredictions& predictions) {
+  LaneParts parts;
+  parts.estimator = estimator_of(setup);
+  if (compensates(setup)) parts.predictions = &predictions;
+  return parts;
+}
+
 /// Sets how lanes run this plant.
 void choose_steps(const LoopSetup& setup, const PlantModel<double>& model, LaneParts& parts) {
   LoopSetup of_plant = setup;
@@ -203,10 +211,8 @@ void run_plants_on_lanes(const LoopSetup& setup, std::span<const PlantModel<doub
                          std::span<const LoopCase> cases, std::span<LoopResult> results,
                          LaneRegisters registers) {
   if (cases.empty()) return;
-  LaneParts parts;
-  parts.estimator = estimator_of(setup);
   LanePredictions predictions(setup);
-  if (compensates(setup)) parts.predictions = &predictions;
+  LaneParts parts = parts_of_controller(setup, predictions);
   for (std::size_t first = 0, end = 0; first < plants.size(); first = end) {
     choose_steps(setup, plants[first], parts);
     const bool mix = setup.sampled && parts.own_pace;
@@ -218,10 +224,8 @@ void run_plants_on_lanes(const LoopSetup& setup, std::span<const PlantModel<doub
 }
 
 void run_source_on_lanes(const LoopSetup& setup, LoopSource& source, LaneRegisters registers) {
-  LaneParts parts;
-  parts.estimator = estimator_of(setup);
   LanePredictions predictions(setup);
-  if (compensates(setup)) parts.predictions = &predictions;
+  LaneParts parts = parts_of_controller(setup, predictions);
   choose_steps(setup, setup.model, parts);
   lanes_for(registers).run(setup, parts, std::span(&setup.model, 1), source);
 }
