@@ -95,6 +95,17 @@ Improvement compare(const Hypothesis& simpler, const Hypothesis& richer) {
   return compare(simpler, richer, std::max(richer.train.dispersion, 1.0));
 }
 
+namespace {
+
+std::vector<double> gaps_of_segments(const FitResult& simulated) {
+  std::vector<double> gaps;
+  for (std::size_t s = 0; s < simulated.segment_chi_square.size(); ++s)
+    gaps.push_back(std::sqrt(simulated.segment_chi_square[s] / std::max(simulated.segment_samples[s], 1e-9)));
+  return gaps;
+}
+
+}  // namespace
+
 std::vector<ParameterEstimate> estimates_of(std::size_t effect, const Hypothesis& h) {
   std::vector<ParameterEstimate> result;
   const EffectInfo& info = effect_registry()[effect];
@@ -221,11 +232,17 @@ const FreeRunSimulation& Search::simulate(Hypothesis& h) const {
   Hypothesis plain = h;
   filter_held_out(plain, sensors_only(h.train.point.noise));
   const FitResult& simulated = held_.segments.empty() ? plain.train : plain.held;
-  h.simulation.emplace(FreeRunSimulation{gap_of(plain), {}});
-  for (std::size_t s = 0; s < simulated.segment_chi_square.size(); ++s)
-    h.simulation->segment_gap.push_back(
-        std::sqrt(simulated.segment_chi_square[s] / std::max(simulated.segment_samples[s], 1e-9)));
+  h.simulation.emplace(FreeRunSimulation{gap_of(plain), gaps_of_segments(simulated)});
   return *h.simulation;
+}
+
+const std::vector<double>& Search::simulate_training(Hypothesis& h) const {
+  if (h.training_segment_gap.empty()) {
+    FitPoint point = h.train.point;
+    point.noise = sensors_only(point.noise);
+    h.training_segment_gap = gaps_of_segments(fit_initial_states(train_, point, budget_.held_out_steps));
+  }
+  return h.training_segment_gap;
 }
 
 double Search::gap_of(const Hypothesis& h) const {
@@ -327,6 +344,7 @@ Hypothesis Search::conditioned_on_held_out(const Hypothesis& h) const {
   result.train.point.plant = held.point.plant;
   result.held = held;
   result.simulation.reset();
+  result.training_segment_gap.clear();
   return result;
 }
 
@@ -524,6 +542,7 @@ Hypothesis Search::fitted_to_all_runs(const Hypothesis& h) const {
   point.starts.insert(point.starts.end(), h.held.point.starts.begin(), h.held.point.starts.end());
   Hypothesis result = h;
   result.simulation.reset();
+  result.training_segment_gap.clear();
   result.train = fit(all, point, h.free, FitOptions{});
   result.valid = std::isfinite(result.train.objective);
   if (!result.valid) return h;
