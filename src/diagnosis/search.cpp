@@ -95,17 +95,6 @@ Improvement compare(const Hypothesis& simpler, const Hypothesis& richer) {
   return compare(simpler, richer, std::max(richer.train.dispersion, 1.0));
 }
 
-namespace {
-
-std::vector<double> gaps_of_segments(const FitResult& simulated) {
-  std::vector<double> gaps;
-  for (std::size_t s = 0; s < simulated.segment_chi_square.size(); ++s)
-    gaps.push_back(std::sqrt(simulated.segment_chi_square[s] / std::max(simulated.segment_samples[s], 1e-9)));
-  return gaps;
-}
-
-}  // namespace
-
 std::vector<ParameterEstimate> estimates_of(std::size_t effect, const Hypothesis& h) {
   std::vector<ParameterEstimate> result;
   const EffectInfo& info = effect_registry()[effect];
@@ -225,28 +214,6 @@ void Search::filter_held_out(Hypothesis& h, const Noise& noise) const {
   const FitPoint plain{plant_, held_starts_, noise};
   const FitPoint point = moved_to(plain, h.train.point.plant);
   h.held = fit_initial_states(held_, point, budget_.held_out_steps);
-}
-
-const FreeRunSimulation& Search::simulate(Hypothesis& h) const {
-  if (h.simulation) return *h.simulation;
-  Hypothesis plain = h;
-  filter_held_out(plain, sensors_only(h.train.point.noise));
-  const FitResult& simulated = held_.segments.empty() ? plain.train : plain.held;
-  h.simulation.emplace(FreeRunSimulation{gap_of(plain), gaps_of_segments(simulated)});
-  return *h.simulation;
-}
-
-const std::vector<double>& Search::simulate_training(Hypothesis& h) const {
-  if (h.training_segment_gap.empty()) {
-    FitPoint point = h.train.point;
-    point.noise = sensors_only(point.noise);
-    h.training_segment_gap = gaps_of_segments(fit_initial_states(train_, point, budget_.held_out_steps));
-  }
-  return h.training_segment_gap;
-}
-
-double Search::gap_of(const Hypothesis& h) const {
-  return held_.segments.empty() ? whitened_rms(h.train) : whitened_rms(h.held);
 }
 
 bool Search::is_plausible(const Hypothesis& h, std::size_t effect) const {

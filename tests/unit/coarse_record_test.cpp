@@ -56,7 +56,7 @@ double jitter_v(double t) {
   return std::lround(1e3 * t) % 2 == 0 ? 0.5 : -0.5;
 }
 
-TEST(CoarseRecord, KeepsAllSamplesOfACartThatMayStickWhileItsVoltageChanges) {
+TEST(CoarseRecord, KeepsAllSamplesWhereTheCartMayStick) {
   Measurement run = record(jitter_v);
   for (double& x : run.cart_m) x = 0.0;
   EXPECT_EQ(coarse_runs({run}, cart_alone(), period_s)[0].size(), run.size());
