@@ -54,6 +54,7 @@ bool StepwiseSelection::find_thoroughly(bool certainly_missing) {
   const double share = search_.screening_share();
   if (share < 1.0 && !(certainly_missing && share < budget_.certain_screening_share)) {
     search_.screen_on_all();
+    if (explorer_ != nullptr) explorer_->search_.screen_on_all();
     select_forward(2 * budget_.max_rounds, 3 * budget_.max_rounds, false);
   }
   // On the way a better place may have been found for the noise alone.
@@ -114,15 +115,11 @@ std::vector<std::size_t> StepwiseSelection::promising_candidates(const Hypothesi
       chosen.push_back(candidates[i]);
       kept += unknown ? 0 : 1;
     } else {
+      last_gains_[candidates[i]] = predicted[i] / budget_.predicted_gain_share;
       if (round == 0) note_candidate(candidates[i], predicted[i]);
     }
   }
   return chosen;
-}
-
-void StepwiseSelection::note_candidate(std::size_t effect, double gain) {
-  std::erase_if(record_.candidates, [&](const CandidateScore& c) { return c.effect == effect; });
-  record_.candidates.push_back({effect, 0.0, std::max(gain, 0.0)});
 }
 
 double StepwiseSelection::penalty_of(std::size_t effect) const {
@@ -165,8 +162,7 @@ Decision StepwiseSelection::decided(Evidence& e, Hypothesis& h, std::size_t effe
         e.simulated_gap = search_.simulate(h).gap;
         break;
       case MissingFit::simulated_segments:
-        // What stands in the place of something else is compared where both were fitted, too.
-        e.simulated_segments = simulation_change(h, e.change == Change::pair);
+        e.simulated_segments = simulation_change(h);
         break;
       case MissingFit::all_runs:
         e.certainty_of_all_runs = search_.certainty(search_.fitted_to_all_runs(h), effect);
@@ -189,23 +185,19 @@ void StepwiseSelection::converge(Hypothesis& h) {
   }
 }
 
-SimulationChange StepwiseSelection::simulation_change(Hypothesis& h, bool of_training_too) {
+SimulationChange StepwiseSelection::simulation_change(Hypothesis& h) {
   if (search_.held_data().segments.empty()) return {};
-  std::vector<double> worse;
-  const auto compare_segments = [&](const std::vector<double>& before, const std::vector<double>& now) {
-    for (std::size_t s = 0; s < now.size(); ++s)
-      worse.push_back(std::log(std::max(now[s], 1e-9) / std::max(before[s], 1e-9)));
-  };
-  compare_segments(search_.simulate(current_).segment_gap, search_.simulate(h).segment_gap);
+  const std::vector<double>& now = search_.simulate(h).segment_gap;
+  const std::vector<double>& before = search_.simulate(current_).segment_gap;
   if (found_.empty()) given_.simulation = current_.simulation;
-  if (of_training_too) compare_segments(search_.simulate_training(current_), search_.simulate_training(h));
-  const auto n = static_cast<double>(worse.size());
+  const auto n = static_cast<double>(now.size());
   double mean = 0.0, square = 0.0;
-  for (const double change : worse) {
-    mean += change / n;
-    square += change * change / n;
+  for (std::size_t s = 0; s < now.size(); ++s) {
+    const double worse = std::log(std::max(now[s], 1e-9) / std::max(before[s], 1e-9));
+    mean += worse / n;
+    square += worse * worse / n;
   }
-  return {worse.size(), mean, std::sqrt(std::max(square - mean * mean, 0.0))};
+  return {now.size(), mean, std::sqrt(std::max(square - mean * mean, 0.0))};
 }
 
 void StepwiseSelection::resolve_doubt() {
@@ -276,7 +268,8 @@ void StepwiseSelection::record_step() {
 }
 
 void StepwiseSelection::select_forward(int first_round, int last_round, bool with_low_noise) {
-  for (int round = first_round; round < last_round && add_best(round, with_low_noise); ++round) {
+  int round = explorer_ == nullptr ? first_round : explore(first_round, last_round, with_low_noise);
+  for (; round < last_round && add_best(round, with_low_noise); ++round) {
   }
   resolve_doubt();
 }
@@ -297,7 +290,9 @@ std::vector<StepwiseSelection::ScreenedCandidate> StepwiseSelection::screen(int 
   options_.tell(done, "ranking the candidates");
   Hypothesis from = current_;
   if (with_low_noise) from.train.point.noise = reduced_process_noise(from.train.point.noise);
-  const std::vector<std::size_t> candidates = promising_candidates(from, open_candidates(), round);
+  last_gains_.clear();
+  const std::vector<std::size_t> candidates =
+      promising_candidates(from, possible_candidates(open_candidates()), round);
   const double on_screening_subset = search_.on_screening_subset(from).train.objective;
   std::vector<ScreenedCandidate> screened;
   for (std::size_t c = 0; c < candidates.size(); ++c) {
@@ -306,6 +301,7 @@ std::vector<StepwiseSelection::ScreenedCandidate> StepwiseSelection::screen(int 
     Hypothesis h = search_.screened(from, candidates[c]);
     const double gain = on_screening_subset - h.train.objective - penalty_of(candidates[c]);
     if (round == 0) note_candidate(candidates[c], gain);
+    last_gains_[candidates[c]] = gain;
     screened.push_back({candidates[c], std::move(h), gain});
   }
   return screened;
@@ -400,6 +396,8 @@ void StepwiseSelection::take(int round, Finalist& best, const std::vector<Screen
     if (trial.round == static_cast<std::size_t>(round) && trial.effect == effect) trial.taken = true;
   current_ = std::move(best.hypothesis);
   found_.push_back(effect);
+  last_gains_.clear();
+  limits_.clear();
   const auto winner = std::find_if(screened.begin(), screened.end(),
                                    [&](const ScreenedCandidate& s) { return s.effect == effect; });
   for (const ScreenedCandidate& s : screened)
@@ -502,6 +500,10 @@ bool StepwiseSelection::simplify() {
 
 bool StepwiseSelection::try_pairs(const std::vector<std::pair<std::size_t, Hypothesis>>& contenders) {
   if (contenders.size() < 2) return false;
+  if (explorer_ != nullptr) {
+    lead_explorer();
+    return explorer_->try_pairs(contenders) && adopt(false);
+  }
   std::optional<Hypothesis> best;
   std::vector<std::size_t> best_found;
   std::optional<double> to_beat;  // on the screening subset, by the best so far

@@ -21,6 +21,10 @@ class StepwiseSelection {
  public:
   StepwiseSelection(Search& search, const DiagnosisOptions& options, Diagnosis& record);
 
+  /// Searches on thinned data first, each time. `explorer` works on a search of these and must outlive this;
+  /// the data here have so many times as many samples.
+  void explore_with(StepwiseSelection& explorer, double sample_ratio);
+
   /// Fits the plant file as given: before everything else. Throws ConfigError when that cannot be simulated.
   /// This and what follows throw Interrupted and BoundReached; what was found until then stays readable.
   void begin();
@@ -36,9 +40,10 @@ class StepwiseSelection {
   /// changed.
   bool find_thoroughly(bool certainly_missing);
 
-  /// What is left is more than noise: an effect that others resemble is left out, and the search goes on
-  /// without it; one effect after the other, until a better model is found. Whether one was.
-  bool find_without_each();
+  /// Adopts what an exploration had found when the search ended before its time.
+  void adopt_unfinished();
+  /// This, or the exploration where it had found more when the search ended.
+  const StepwiseSelection& latest() const;
 
   /// After something was taken out for good: looks for what can stand in its place.
   void find_again();
@@ -90,6 +95,17 @@ class StepwiseSelection {
   };
 
   std::vector<std::size_t> open_candidates() const;
+  /// Of these, those that may be accepted by what the exploration says.
+  std::vector<std::size_t> possible_candidates(const std::vector<std::size_t>& candidates) const;
+  /// Lets the explorer search in these rounds from what was found here, and adopts what it finds. The next
+  /// round.
+  int explore(int first_round, int last_round, bool with_low_noise);
+  /// The explorer continues from what was found here.
+  void lead_explorer();
+  /// Takes over what the explorer found, if these data bear it out. `with_low_noise`: as in select_forward.
+  bool adopt(bool with_low_noise);
+  /// The account of the explorer's search becomes a part of this one's.
+  void take_account();
   /// Notes a candidate of the first round, in the place of an earlier note.
   void note_candidate(std::size_t effect, double gain);
   /// Those that promise a share of what the best one does, some at least, and all that cannot promise. A
@@ -112,7 +128,7 @@ class StepwiseSelection {
   void converge(Hypothesis& h);
   /// By how much `h` simulates held-out segments worse than `current_` does: while more is missing, one and
   /// the other come out better or worse by half.
-  SimulationChange simulation_change(Hypothesis& h, bool of_training_too);
+  SimulationChange simulation_change(Hypothesis& h);
   /// What held-out runs spoke against while more was missing must have them on its side in the end, or all
   /// that was added since goes.
   void resolve_doubt();
@@ -163,8 +179,6 @@ class StepwiseSelection {
   /// Two effects can hide each other, so that a third, which resembles both, is found instead. Every pair of
   /// these is tried in the place of what was found of them, once. Whether one is better.
   bool try_pairs(const std::vector<std::pair<std::size_t, Hypothesis>>& contenders);
-  /// Searches without this effect, and takes what is found if that is better. Whether it is.
-  bool find_without(std::size_t effect);
   /// Backward deletion: what is no longer needed once others are there goes.
   void eliminate_backward();
   /// What the search says of one effect of a hypothesis.
@@ -191,6 +205,11 @@ class StepwiseSelection {
   std::map<std::size_t, double> finalist_evidence_;
   std::vector<std::pair<std::size_t, Hypothesis>> resembling_;  ///< screened, of the first round
   std::set<std::pair<std::size_t, std::size_t>> paired_;        ///< tried already
+  /// What each candidate promised or gained in the last round, where no effect was added to the model since.
+  std::map<std::size_t, double> last_gains_;
+  StepwiseSelection* explorer_ = nullptr;
+  double sample_ratio_ = 1.0;             ///< how many times as many samples there are here
+  std::map<std::size_t, double> limits_;  ///< of what candidates can gain here; empty: none is known
 };
 
 }  // namespace upright
