@@ -117,6 +117,7 @@ FeedbackPrediction EstimatePredictor::feedback(const Gains& gains, double volts_
   made.constant_v = row.dot(constant_);
   const Eigen::RowVectorXd on_their_way = row.transpose() * on_their_way_;
   made.on_their_way.assign(on_their_way.begin(), on_their_way.end());
+  made.leaving = step_.of_a_volt(made.on_their_way.size() - 1);
   made.free_periods = free_steps_;
   made.step = step_;
   made.lead = lead_;

@@ -152,6 +152,7 @@ FeedbackPrediction Predictor::feedback(const Gains& gains) const {
   made.motor = row * weights_.filtered_motor;
   const Eigen::RowVectorXd on_their_way = row * weights_.on_their_way;
   made.on_their_way.assign(on_their_way.begin(), on_their_way.end());
+  made.leaving = step_.of_a_volt(made.on_their_way.size() - 1);
   made.fraction = fraction_;
   made.free_periods = free_steps_;
   made.step = step_;

@@ -24,13 +24,29 @@ struct PredictorStep {
   /// `State` is indexed by FilterState.
   template <class S, class State>
   void propagate(State& state, const S& drive_v) const {
-    State next = state;
-    for (std::size_t row = 0; row < predicted_states; ++row) {
+    const State moved = freely<predicted_states>(state);
+    for (std::size_t row = 0; row < predicted_states; ++row)
+      state[row] = (moved[row] + S(b[row]) * drive_v) + S(constant[row]);
+  }
+
+  /// a x of the first `states`, while the others are 0.
+  template <std::size_t states, class State>
+  State freely(const State& state) const {
+    using S = typename State::value_type;
+    State moved = state;
+    for (std::size_t row = 0; row < states; ++row) {
       S sum = S(a[0][row]) * state[0];
-      for (std::size_t j = 1; j < predicted_states; ++j) sum = sum + S(a[j][row]) * state[j];
-      next[row] = (sum + S(b[row]) * drive_v) + S(constant[row]);
+      for (std::size_t j = 1; j < states; ++j) sum = sum + S(a[j][row]) * state[j];
+      moved[row] = sum;
     }
-    state = next;
+    return moved;
+  }
+
+  /// What a volt over one period adds to the state so many periods later.
+  Column of_a_volt(std::size_t periods_later) const {
+    Column added = b;
+    for (std::size_t i = 0; i < periods_later; ++i) added = freely<predicted_states>(added);
+    return added;
   }
 };
 
@@ -82,6 +98,8 @@ struct FeedbackPrediction {
   double constant_v = 0.0;
   double now = 0.0, next = 0.0, motor = 0.0;
   std::vector<double> on_their_way;  ///< oldest first
+  /// What a volt as old as the oldest would add to the predicted state, had it acted over the whole period.
+  PredictorStep::Column leaving{};
   /// Of a period, by which the oldest voltage acts longer than whole periods.
   double fraction = 0.0;
   std::size_t free_periods = 0;
