@@ -18,6 +18,7 @@
 #include "estimation/held_out.hpp"
 #include "estimation/smoother.hpp"
 #include "exploration.hpp"
+#include "final_fits.hpp"
 #include "force_description.hpp"
 #include "indistinguishable.hpp"
 #include "listing.hpp"
@@ -46,11 +47,12 @@ class Diagnostician {
         plant_(plant),
         runs_(runs),
         options_(options),
-        data_(checked(split(runs, which, policy_.excitation.arm_m, policy_.excitation.speed_window_s))),
+        data_(checked(split(runs_, which, policy_.excitation.arm_m, policy_.excitation.speed_window_s))),
         work_samples_(options.search_bound * (sample_count(data_.train) + sample_count(data_.held))),
         bound_(work_samples_),
         search_(plant_, runs_, bounded(data_.train), bounded(data_.held), policy_, budget_),
         selection_(search_, options, result_),
+        fits_(search_, selection_, options),
         exploration_(options.quick ? nullptr : Exploration::of(search_, options)) {
     if (exploration_) selection_.explore_with(exploration_->selection(), exploration_->sample_ratio());
   }
@@ -78,7 +80,7 @@ class Diagnostician {
     if (!beyond_sensors_) return;
     options_.tell(0.98, "describing what is left");
     try {
-      const auto force = describe_force(search_, final_, known_);
+      const auto force = describe_force(search_, fits_.judged(), fits_.known());
       const double named = std::min(listing_.numbers_moved.value_or(listing_.after), listing_.after);
       const double lower = force ? named / force->held_out_error : 1.0;
       if (lower > policy_.power.clear_gap) {
@@ -86,7 +88,7 @@ class Diagnostician {
       } else if (force && force->shows_on_held_out(lower, policy_.acceptance)) {
         diagnosis.verdict = Verdict::unexplained;
         diagnosis.residual = force->left_sentence();
-      } else if (const auto left = place_force_left(search_, known_)) {
+      } else if (const auto left = place_force_left(search_, fits_.known())) {
         diagnosis.notes.push_back(*left);
       }
     } catch (const Interrupted&) {
@@ -106,7 +108,7 @@ class Diagnostician {
   /// alone show it, or spoke to the end against what the others show beyond doubt.
   bool misses_held_out_excitation() const {
     return selection_.contradicted() ||
-           !examine_fit(data_.train, final_.train.point, policy_, budget_).structured;
+           !examine_fit(data_.train, fits_.judged().train.point, policy_, budget_).structured;
   }
 
  private:
@@ -203,24 +205,26 @@ class Diagnostician {
   ResidualTests search_further(ResidualTests left) {
     if (left.structured && selection_.renew_initial_states()) left = settle();
     if (left.structured && selection_.find_pairs_of_all()) left = settle();
+    if (left.structured && selection_.find_without_each()) left = settle();
     if (left.beyond_sensors && selection_.find_thoroughly(left.structured)) left = settle();
     return left;
   }
 
   /// Settles the corrections, and looks at what is left.
   ResidualTests settle() {
-    settle_corrections();
+    fits_.settle(withdrawn_);
     options_.tell(0.92, "measuring the gap");
     // At what all runs say, so that what few training runs left uncertain is not taken for something missing.
-    return tests_of(known_.train.point, final_.train.point.noise);
+    return tests_of(fits_.known().train.point, fits_.judged().train.point.noise);
   }
 
   /// What is left at a fit to all runs, with this noise in held-out ones.
   ResidualTests tests_of(const FitPoint& fitted, const Noise& noise) const {
     ResidualTests left = examine_fit(search_.all_data(), fitted, policy_, budget_);
-    if (!left.structured) compare_held_out(search_, final_, noise, left);
+    if (!left.structured) compare_held_out(search_, fits_.judged(), noise, left);
     if (left.structured) return left;
-    if (const auto impossible = sentence_on_impossible_scale(known_, all_found(), policy_.correction)) {
+    if (const auto impossible =
+            sentence_on_impossible_scale(fits_.known(), fits_.effects(), policy_.correction)) {
       left.structured = true;
       left.sentence = *impossible;
     }
@@ -230,86 +234,15 @@ class Diagnostician {
   /// The noise of the search is white. A disturbance that lasts looks like something missing beside it: the
   /// last word has noise with a coloured part, where that accounts for the residual better.
   ResidualTests beside_coloured_noise(const ResidualTests& left) {
-    noise_ = known_.train.point.noise;
+    noise_ = fits_.known().train.point.noise;
     if (!left.structured) return left;
     options_.tell(0.945, "estimating a coloured disturbance");
-    const FitResult coloured = search_.with_coloured_noise(known_);
-    if (!(minus_log_likelihood(known_.train) - minus_log_likelihood(coloured) >
+    const FitResult coloured = search_.with_coloured_noise(fits_.known());
+    if (!(minus_log_likelihood(fits_.known().train) - minus_log_likelihood(coloured) >
           policy_.acceptance.min_evidence))
       return left;
     noise_ = coloured.point.noise;
     return tests_of(coloured.point, noise_);
-  }
-
-  /// Which of the corrections that every fit was left room for are really there.
-  void settle_corrections() {
-    const Hypothesis& h = selection_.current();
-    const auto n = static_cast<Eigen::Index>(h.free.size());
-    ParameterPosterior posterior{Eigen::VectorXd(n), Eigen::VectorXd(n), h.train.covariance};
-    std::vector<bool> is_correction;
-    for (const FreeParameter& p : h.free) {
-      const auto at = static_cast<Eigen::Index>(is_correction.size());
-      posterior.value[at] = h.train.point.plant.find(p.effect)->values[p.index];
-      posterior.prior_mean[at] = p.prior_mean;
-      is_correction.push_back(std::find(selection_.found().begin(), selection_.found().end(), p.effect) ==
-                              selection_.found().end());
-    }
-    std::vector<std::size_t> corrections;
-    for (const std::size_t j : certain_parameters(posterior, is_correction, policy_.correction))
-      if (is_correction[j] && !keeps_prior(h, j) && !withdrawn_.contains(h.free[j].effect) &&
-          search_.is_plausible(h, h.free[j].effect) &&
-          std::find(corrections.begin(), corrections.end(), h.free[j].effect) == corrections.end())
-        corrections.push_back(h.free[j].effect);
-    fit_last(corrections);
-    order_corrections(corrections);
-  }
-
-  /// The last fits, of training runs and of all. A correction that these leave uncertain is none: it goes.
-  void fit_last(std::vector<std::size_t>& corrections) {
-    const Hypothesis* from = &selection_.current();
-    for (;;) {
-      options_.tell(0.88, "final fit to the training runs");
-      std::vector<std::size_t> all = selection_.found();
-      all.insert(all.end(), corrections.begin(), corrections.end());
-      final_ = search_.fitted_separately(all, *from, nullptr, true);
-      search_.filter_held_out(final_, final_.train.point.noise);
-      from = &final_;
-      options_.tell(0.9, "final fit to all runs");
-      known_ = search_.fitted_to_all_runs(final_);
-      const auto includes_nothing = [&](std::size_t effect) {
-        return !is_certain_of_all_runs(search_.certainty(known_, effect), policy_.correction);
-      };
-      const auto gone = std::remove_if(corrections.begin(), corrections.end(), includes_nothing);
-      if (gone == corrections.end()) return;
-      corrections.erase(gone, corrections.end());
-    }
-  }
-
-  /// A coefficient of the plant file that moved within what is believed of it.
-  bool keeps_prior(const Hypothesis& h, std::size_t j) const {
-    const FreeParameter& p = h.free[j];
-    if (effect_registry()[p.effect].enters == Enters::parameter || plant_.find(p.effect) == nullptr)
-      return false;
-    const double value = h.train.point.plant.find(p.effect)->values[p.index];
-    return is_within_prior(value, p.prior_mean, p.prior_sigma, policy_.correction);
-  }
-
-  /// Corrections in the order of how much each closes: of sensors first, then of the plant's numbers, which
-  /// are always a little off.
-  void order_corrections(const std::vector<std::size_t>& corrections) {
-    const Noise noise = final_.train.point.noise;
-    std::vector<std::tuple<bool, double, std::size_t>> ranked;
-    for (const std::size_t effect : corrections) {
-      std::vector<std::size_t> others = selection_.found();
-      for (const std::size_t other : corrections)
-        if (other != effect) others.push_back(other);
-      Hypothesis h = search_.fitted_separately(others, final_, &noise);
-      search_.filter_held_out(h, noise);
-      ranked.emplace_back(effect_registry()[effect].enters == Enters::parameter, -search_.gap_of(h), effect);
-    }
-    std::sort(ranked.begin(), ranked.end());
-    corrections_.clear();
-    for (const auto& [number, gap, effect] : ranked) corrections_.push_back(effect);
   }
 
   /// An effect that does not reproduce, or that takes held-out data further from the model, is not named: it
@@ -317,7 +250,7 @@ class Diagnostician {
   ResidualTests without_local_effects(ResidualTests left) {
     for (;;) {
       options_.tell(0.93, "comparing parts of the data");
-      reproductions_ = reproduce(search_, known_, all_found());
+      reproductions_ = reproduce(search_, fits_.known(), fits_.effects());
       if (options_.quick) {
         const std::vector<std::size_t> doubtful = doubtful_effects(reproductions_, search_);
         for (const std::size_t effect : doubtful)
@@ -339,13 +272,20 @@ class Diagnostician {
         result_.helps_here_only.back().by_run = differs->sizes;
         selection_.exclude(same_force_as(differs->effect));
         selection_.find_again();
-      } else if (const auto outdone = outdone_by_disturbance(search_, known_, final_, reproductions_)) {
+      } else if (const auto outdone =
+                     outdone_by_disturbance(search_, fits_.known(), fits_.judged(), reproductions_)) {
         withdraw(outdone->effect, outdone->where);
       } else {
         options_.tell(0.94, "measuring the gap");
-        listing_ = list_effects(search_, final_, all_found());
-        if (!listing_.raises) return left;
-        withdraw(*listing_.raises, "it helps the runs that were fitted, and takes held-out data further off");
+        listing_ = list_effects(search_, fits_.judged(), fits_.effects());
+        if (listing_.raises) {
+          withdraw(*listing_.raises,
+                   "it helps the runs that were fitted, and takes held-out data further off");
+        } else {
+          const auto uncertain = fits_.uncertain_effect();
+          if (!uncertain) return left;
+          withdraw(*uncertain, "its size is not certain once all runs are fitted");
+        }
       }
       left = settle();
     }
@@ -354,7 +294,7 @@ class Diagnostician {
   /// Of the effects that need not help on a further run, the one whose sizes differ most certainly; else
   /// null.
   const RunDifference* most_different_between_runs() {
-    differences_ = run_differences(search_, known_, all_found());
+    differences_ = run_differences(search_, fits_.known(), fits_.effects());
     const RunDifference* most = nullptr;
     for (const RunDifference& difference : differences_)
       if (is_of_single_runs(difference, policy_.reproducibility) &&
@@ -365,7 +305,7 @@ class Diagnostician {
 
   void withdraw(std::size_t effect, const std::string& where) {
     for (const std::size_t gone : selection_.withdraw(effect)) {
-      LocalEffect local{gone, estimates_of(gone, known_), where, {}, {}};
+      LocalEffect local{gone, estimates_of(gone, fits_.known()), where, {}, {}};
       if (gone != effect) local.where = "it cannot be without " + kind_of(effect);
       for (const Reproduction& r : reproductions_)
         if (r.effect == gone) local.shown_on = r.runs;
@@ -378,10 +318,10 @@ class Diagnostician {
     options_.tell(0.95, "measuring the noise floor");
     note_runs();
     result_.noise = noise_;
-    const std::vector<std::size_t> all = all_found();
+    const std::vector<std::size_t> all = fits_.effects();
     // The same floor whatever the verdict: nearly equal fits are measured in the same unit. An error that was
     // reached is no less than the floor.
-    const double usual = held_out_floor(search_, final_, noise_, tests).usual;
+    const double usual = held_out_floor(search_, fits_.judged(), noise_, tests).usual;
     // Without an effect the numbers of the file stand, unless they are what is clearly off.
     const bool numbers_only = all.empty() && listing_.numbers_moved < listing_.before &&
                               listing_.before > policy_.power.clear_gap * usual;
@@ -393,7 +333,7 @@ class Diagnostician {
       found.effect = row.effect;
       found.gap_before = row.before / floor_;
       found.gap_after = row.after / floor_;
-      found.parameters = estimates_of(row.effect, known_);
+      found.parameters = estimates_of(row.effect, fits_.known());
       found.where = selection_.where(row.effect);
       for (const Reproduction& r : reproductions_)
         if (r.effect == row.effect) {
@@ -406,7 +346,7 @@ class Diagnostician {
     }
     result_.gap_after = listing_.after / floor_;
     result_.residual = tests.sentence;
-    const Plant& fitted = known_.train.point.plant;
+    const Plant& fitted = fits_.known().train.point.plant;
     result_.model =
         all.empty() && !numbers_only ? plant_ : model_with(plant_, fitted, search_.nuisances(), all);
     result_.numbers = moved_numbers(plant_, result_.model, search_.range(), policy_.prior);
@@ -420,11 +360,11 @@ class Diagnostician {
     }
     std::stable_sort(result_.candidates.begin(), result_.candidates.end(),
                      [](const auto& a, const auto& b) { return a.evidence > b.evidence; });
-    for (const std::string& note : notes_on_doubtful_numbers(known_, all, policy_.correction))
+    for (const std::string& note : notes_on_doubtful_numbers(fits_.known(), all, policy_.correction))
       result_.notes.push_back(note);
     beyond_sensors_ = tests.beyond_sensors;
-    opened_ = open_effects(search_, final_, all);
-    result_.detectable = detectable_sizes(search_, final_, opened_);
+    opened_ = open_effects(search_, fits_.judged(), all);
+    result_.detectable = detectable_sizes(search_, fits_.judged(), opened_);
     decide(tests);
     trace_residuals();
     if (!options_.quick) find_indistinguishable();
@@ -432,17 +372,11 @@ class Diagnostician {
 
   void trace_residuals() {
     if (data_.held.segments.empty()) return;
-    const Noise noise = final_.train.point.noise;
-    result_.residual_after = smooth_residuals(data_.held, final_.held.point, policy_.location.walk);
-    Hypothesis as_given = search_.fitted_separately({}, final_, &noise);
+    const Noise noise = fits_.judged().train.point.noise;
+    result_.residual_after = smooth_residuals(data_.held, fits_.judged().held.point, policy_.location.walk);
+    Hypothesis as_given = search_.fitted_separately({}, fits_.judged(), &noise);
     search_.filter_held_out(as_given, noise);
     result_.residual_before = smooth_residuals(data_.held, as_given.held.point, policy_.location.walk);
-  }
-
-  std::vector<std::size_t> all_found() const {
-    std::vector<std::size_t> all = selection_.found();
-    all.insert(all.end(), corrections_.begin(), corrections_.end());
-    return all;
   }
 
   void decide(const ResidualTests& tests) {
@@ -462,7 +396,8 @@ class Diagnostician {
   void find_indistinguishable() {
     options_.tell(0.96, "searching for confusable effects");
     std::vector<std::pair<std::size_t, Plant>> alternatives;
-    for (const Alternative& alternative : linear_alternatives(search_, final_, all_found(), opened_)) {
+    for (const Alternative& alternative :
+         linear_alternatives(search_, fits_.judged(), fits_.effects(), opened_)) {
       declare(alternative.instead_of, alternative.effect);
       alternatives.emplace_back(alternative.effect, alternative.plant);
     }
@@ -492,7 +427,7 @@ class Diagnostician {
       }
     }
     if (!alternatives.empty())
-      result_.next_experiment = choose_experiment(final_.train.point.plant, alternatives, runs_);
+      result_.next_experiment = choose_experiment(fits_.judged().train.point.plant, alternatives, runs_);
   }
 
   FoundEffect& listed(std::size_t effect) {
@@ -500,7 +435,7 @@ class Diagnostician {
                          [&](const FoundEffect& found) { return found.effect == effect; });
   }
   bool is_listed(std::size_t effect) const {
-    const std::vector<std::size_t> all = all_found();
+    const std::vector<std::size_t> all = fits_.effects();
     return std::find(all.begin(), all.end(), effect) != all.end();
   }
   bool is_declared(std::size_t effect, std::size_t other) {
@@ -525,12 +460,10 @@ class Diagnostician {
   bool beyond_sensors_ = false;  ///< more is left than noise of the sensors
   Search search_;
   StepwiseSelection selection_;
+  FinalFits fits_;
   std::unique_ptr<Exploration> exploration_;  ///< null: there is none
-  Hypothesis final_;                          ///< fitted to the training runs, judged on the others
-  Hypothesis known_;  ///< the same effects fitted to all runs: what the model says in the end
-  Noise noise_;       ///< of all runs beside that model
-  std::vector<std::size_t> corrections_;
-  std::set<std::size_t> withdrawn_;  ///< found, and not named
+  Noise noise_;                               ///< of all runs beside that model
+  std::set<std::size_t> withdrawn_;           ///< found, and not named
   std::vector<Reproduction> reproductions_;
   std::vector<RunDifference> differences_;
   Listing listing_;

@@ -216,22 +216,6 @@ void Search::filter_held_out(Hypothesis& h, const Noise& noise) const {
   h.held = fit_initial_states(held_, point, budget_.held_out_steps);
 }
 
-const FreeRunSimulation& Search::simulate(Hypothesis& h) const {
-  if (h.simulation) return *h.simulation;
-  Hypothesis plain = h;
-  filter_held_out(plain, sensors_only(h.train.point.noise));
-  const FitResult& simulated = held_.segments.empty() ? plain.train : plain.held;
-  h.simulation.emplace(FreeRunSimulation{gap_of(plain), {}});
-  for (std::size_t s = 0; s < simulated.segment_chi_square.size(); ++s)
-    h.simulation->segment_gap.push_back(
-        std::sqrt(simulated.segment_chi_square[s] / std::max(simulated.segment_samples[s], 1e-9)));
-  return *h.simulation;
-}
-
-double Search::gap_of(const Hypothesis& h) const {
-  return held_.segments.empty() ? whitened_rms(h.train) : whitened_rms(h.held);
-}
-
 bool Search::is_plausible(const Hypothesis& h, std::size_t effect) const {
   for (const FreeParameter& p : h.free) {
     if (p.effect != effect) continue;
@@ -327,6 +311,7 @@ Hypothesis Search::conditioned_on_held_out(const Hypothesis& h) const {
   result.train.point.plant = held.point.plant;
   result.held = held;
   result.simulation.reset();
+  result.training_segment_gap.clear();
   return result;
 }
 
@@ -524,6 +509,7 @@ Hypothesis Search::fitted_to_all_runs(const Hypothesis& h) const {
   point.starts.insert(point.starts.end(), h.held.point.starts.begin(), h.held.point.starts.end());
   Hypothesis result = h;
   result.simulation.reset();
+  result.training_segment_gap.clear();
   result.train = fit(all, point, h.free, FitOptions{});
   result.valid = std::isfinite(result.train.objective);
   if (!result.valid) return h;

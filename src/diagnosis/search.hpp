@@ -35,6 +35,7 @@ struct Hypothesis {
   std::vector<FreeParameter> free;  ///< the parameters that moved, in the order of train.covariance
   bool valid = false;               ///< fitted, and no parameter at a bound that makes it another effect
   std::optional<FreeRunSimulation> simulation;  ///< once measured
+  std::vector<double> training_segment_gap;     ///< of a plain simulation of training data, once measured
 };
 
 /// How much better the richer one is, if the data count `dispersion` times less than the likelihood says.
@@ -121,6 +122,8 @@ class Search {
   void filter_held_out(Hypothesis& hypothesis, const Noise& noise) const;
   /// A plain simulation of held-out data, at its first call (of training data where none is held out).
   const FreeRunSimulation& simulate(Hypothesis& h) const;
+  /// The same of training data, by segment.
+  const std::vector<double>& simulate_training(Hypothesis& h) const;
   /// How far off what was judged is, in units of its noise.
   double gap_of(const Hypothesis& h) const;
   /// A hypothesis in which the new effect does nothing, or is of a size that makes it another effect, has

@@ -87,8 +87,8 @@ struct AcceptancePolicy {
 struct CorrectionPolicy {
   /// [standard errors] A correction of the plant file is listed from here on. As `min_certainty`. Chosen.
   double min_z = 4.0;
-  /// [standard errors] A correction with less than this after the final fit to all runs is removed, because
-  /// its 95 % interval would contain zero.
+  /// [standard errors] A correction or an effect with less than this after the final fit to all runs is
+  /// removed, because its 95 % interval would include nothing.
   double min_certainty_of_all_runs = 2.0;
   /// [prior standard deviations] A coefficient of the plant file that moved by less counts as unchanged: its
   /// number is adjusted, but nothing was missing. Such coefficients change this much from day to day. Chosen.

@@ -162,7 +162,8 @@ Decision StepwiseSelection::decided(Evidence& e, Hypothesis& h, std::size_t effe
         e.simulated_gap = search_.simulate(h).gap;
         break;
       case MissingFit::simulated_segments:
-        e.simulated_segments = simulation_change(h);
+        // What stands in the place of something else is compared where both were fitted, too.
+        e.simulated_segments = simulation_change(h, e.change == Change::pair);
         break;
       case MissingFit::all_runs:
         e.certainty_of_all_runs = search_.certainty(search_.fitted_to_all_runs(h), effect);
@@ -185,19 +186,23 @@ void StepwiseSelection::converge(Hypothesis& h) {
   }
 }
 
-SimulationChange StepwiseSelection::simulation_change(Hypothesis& h) {
+SimulationChange StepwiseSelection::simulation_change(Hypothesis& h, bool of_training_too) {
   if (search_.held_data().segments.empty()) return {};
-  const std::vector<double>& now = search_.simulate(h).segment_gap;
-  const std::vector<double>& before = search_.simulate(current_).segment_gap;
+  std::vector<double> worse;
+  const auto compare_segments = [&](const std::vector<double>& before, const std::vector<double>& now) {
+    for (std::size_t s = 0; s < now.size(); ++s)
+      worse.push_back(std::log(std::max(now[s], 1e-9) / std::max(before[s], 1e-9)));
+  };
+  compare_segments(search_.simulate(current_).segment_gap, search_.simulate(h).segment_gap);
   if (found_.empty()) given_.simulation = current_.simulation;
-  const auto n = static_cast<double>(now.size());
+  if (of_training_too) compare_segments(search_.simulate_training(current_), search_.simulate_training(h));
+  const auto n = static_cast<double>(worse.size());
   double mean = 0.0, square = 0.0;
-  for (std::size_t s = 0; s < now.size(); ++s) {
-    const double worse = std::log(std::max(now[s], 1e-9) / std::max(before[s], 1e-9));
-    mean += worse / n;
-    square += worse * worse / n;
+  for (const double change : worse) {
+    mean += change / n;
+    square += change * change / n;
   }
-  return {now.size(), mean, std::sqrt(std::max(square - mean * mean, 0.0))};
+  return {worse.size(), mean, std::sqrt(std::max(square - mean * mean, 0.0))};
 }
 
 void StepwiseSelection::resolve_doubt() {

@@ -40,6 +40,10 @@ class StepwiseSelection {
   /// changed.
   bool find_thoroughly(bool certainly_missing);
 
+  /// What is left is more than noise: an effect that others resemble is left out, and the search goes on
+  /// without it; one effect after the other, until a better model is found. Whether one was.
+  bool find_without_each();
+
   /// Adopts what an exploration had found when the search ended before its time.
   void adopt_unfinished();
   /// This, or the exploration where it had found more when the search ended.
@@ -128,7 +132,7 @@ class StepwiseSelection {
   void converge(Hypothesis& h);
   /// By how much `h` simulates held-out segments worse than `current_` does: while more is missing, one and
   /// the other come out better or worse by half.
-  SimulationChange simulation_change(Hypothesis& h);
+  SimulationChange simulation_change(Hypothesis& h, bool of_training_too);
   /// What held-out runs spoke against while more was missing must have them on its side in the end, or all
   /// that was added since goes.
   void resolve_doubt();
@@ -179,6 +183,8 @@ class StepwiseSelection {
   /// Two effects can hide each other, so that a third, which resembles both, is found instead. Every pair of
   /// these is tried in the place of what was found of them, once. Whether one is better.
   bool try_pairs(const std::vector<std::pair<std::size_t, Hypothesis>>& contenders);
+  /// Searches without this effect, and takes what is found if that is better. Whether it is.
+  bool find_without(std::size_t effect);
   /// Backward deletion: what is no longer needed once others are there goes.
   void eliminate_backward();
   /// What the search says of one effect of a hypothesis.

@@ -1,0 +1,49 @@
+// The last fits of a diagnosis, once the search has found its effects: which numbers of the plant file are
+// corrected beside them, and what the model says in the end.
+#pragma once
+
+#include <optional>
+#include <set>
+#include <vector>
+
+#include "search.hpp"
+#include "stepwise_selection.hpp"
+
+namespace upright {
+
+class FinalFits {
+ public:
+  /// `search`, `selection` and `options` must outlive it.
+  FinalFits(Search& search, const StepwiseSelection& selection, const DiagnosisOptions& options);
+
+  /// Fits what the selection found, with the corrections that are really there but for the `withdrawn` ones.
+  void settle(const std::set<std::size_t>& withdrawn);
+  /// Of the effects that do nothing in the fit to all runs, or whose 95 % interval includes nothing, the
+  /// least certain one.
+  std::optional<std::size_t> uncertain_effect() const;
+
+  /// Fitted to the training runs, judged on the others.
+  const Hypothesis& judged() const { return judged_; }
+  /// The same effects fitted to all runs: what the model says in the end.
+  const Hypothesis& known() const { return known_; }
+  /// What was found, and the corrections.
+  std::vector<std::size_t> effects() const;
+
+ private:
+  /// The last fits, of training runs and of all. A correction that these leave uncertain is none: it goes.
+  void fit_last(std::vector<std::size_t>& corrections);
+  /// A coefficient of the plant file that moved within what is believed of it.
+  bool keeps_prior(const Hypothesis& h, std::size_t j) const;
+  /// Corrections in the order of how much each closes: of sensors first, then of the plant's numbers, which
+  /// are always a little off.
+  void order_corrections(const std::vector<std::size_t>& corrections);
+
+  Search& search_;
+  const StepwiseSelection& selection_;
+  const DiagnosisOptions& options_;
+  const SelectionPolicy& policy_;
+  std::vector<std::size_t> corrections_;
+  Hypothesis judged_, known_;
+};
+
+}  // namespace upright

@@ -1,0 +1,56 @@
+// The part of the selection that leaves its path: one wrong name at the beginning can keep all others away.
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+
+#include "stepwise_selection.hpp"
+
+namespace upright {
+
+bool StepwiseSelection::find_without_each() {
+  const std::vector<std::size_t> effects = found_;
+  return std::any_of(effects.begin(), effects.end(), [&](std::size_t effect) {
+    return !similar_effects_[effect].empty() && find_without(effect);
+  });
+}
+
+bool StepwiseSelection::find_without(std::size_t effect) {
+  options_.tell(0.84, "searching without " + kind_of(effect));
+  Checkpoint other{search_.without(current_, effect), found_};
+  if (!std::isfinite(other.hypothesis.train.objective)) return false;
+  std::erase(other.found, effect);
+  const bool contradicted = contradicted_;
+  const auto exchange_paths = [&] {
+    std::swap(current_, other.hypothesis);
+    std::swap(found_, other.found);
+  };
+  exchange_paths();
+  withdrawn_.insert(effect);
+  const auto return_to_path = [&] {
+    withdrawn_.erase(effect);
+    contradicted_ = contradicted;
+    exchange_paths();
+  };
+  try {
+    find_again();
+  } catch (...) {  // the search may end at any time: what was found before it counts
+    return_to_path();
+    throw;
+  }
+  return_to_path();
+  std::vector<std::size_t> brought;
+  std::copy_if(other.found.begin(), other.found.end(), std::back_inserter(brought),
+               [&](std::size_t of) { return !is_found(of); });
+  if (brought.empty()) return false;
+  Evidence e = evidence_of(Change::pair, current_, other.hypothesis, brought);
+  e.penalty = penalty_of_change(current_, other.hypothesis);
+  const bool better = decided(e, other.hypothesis, brought.front()).accepted;
+  if (better) {
+    current_ = std::move(other.hypothesis);
+    found_ = std::move(other.found);
+  }
+  record_step();
+  return better;
+}
+
+}  // namespace upright
