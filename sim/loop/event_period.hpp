@@ -40,6 +40,7 @@ class EventPeriod {
         cart_turns_(physics_.cart_has_kink()),
         by_series_(sticks_ && parts.short_series),
         stiff_(parts.stiff_bristles) {
+    if (by_series_) sweep_mps_ = CoarseLanes(physics_.longest_sweep_mps());
     if (sticks_ && is_common_set<Present>) find_static_friction(Lanes(0.0), everywhere_);
   }
 
@@ -215,7 +216,7 @@ class EventPeriod {
       mode = select(steps.settles, select(excess > zero, sign_of(load), zero), mode);
     }
     motion.develop(series_, steps.drive_v, mode);
-    Lanes h = motion.exact_part_of(smaller(steps.left_s, steps.longest_s));
+    Lanes h = motion.within_sweep(smaller(steps.left_s, steps.longest_s), sweep_mps_);
     Lanes v = motion.cart_mps_after(h);
     const Lanes slowed = steps.state.cart_mps + h * motion.cart_mps2.value;
     const Lanes load = motion.load_n_after(h);
@@ -465,6 +466,7 @@ class EventPeriod {
   std::conditional_t<second, LaneMotor, PromptMotor> motor_;
   bool sticks_, pivot_sticks_, cart_turns_;
   bool by_series_;               ///< in place of the classical method
+  CoarseLanes sweep_mps_;        ///< change of the cart's velocity in a step by series, at most
   bool stiff_;                   ///< bristles relax too fast for the classical method
   StaticFriction everywhere_{};  ///< of the common sets, whose levels are the same at every place
 };

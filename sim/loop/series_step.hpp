@@ -41,15 +41,15 @@ class SeriesMotion {
   LaneSeries<3> cart_mps2, theta_radps2;
   LaneSeries<3> load_n;  ///< that holds the cart if it rests
 
-  /// A step of this length, or shorter where the friction turns so fast that the last term of the cart's
-  /// velocity shows that further ones would count.
-  [[gnu::always_inline]] Lanes exact_part_of(const Lanes& length_s) const {
-    constexpr float last_term_mps = 1e-6f;  // the next is smaller, and few steps come near it
-    constexpr double shortest_s = 2e-5;     // a bound on the work
-    const CoarseLanes h(length_s), square = h * h;
-    const CoarseLanes term = absolute(cart_mps2.more[2]) * (square * square), most(4.0f * last_term_mps);
-    if (!xsimd::any(most < term)) return length_s;
-    const CoarseLanes part = sqrt(sqrt(most * rough_inverse(larger(term, most))));
+  /// A step of this length, or shorter where it would change the velocity of the cart by more than this.
+  [[gnu::always_inline]] Lanes within_sweep(const Lanes& length_s, const CoarseLanes& longest_mps) const {
+    constexpr double shortest_s = 2e-5;  // a bound on the work
+    const CoarseLanes h(length_s);
+    const CoarseLanes sweep = h * (absolute(cart_mps2.coarse) + 0.5f * (h * absolute(cart_mps2.more[0])));
+    const auto beyond = longest_mps < sweep;
+    if (!xsimd::any(beyond)) return length_s;
+    // Others keep their length to the last bit, whatever their neighbours do.
+    const CoarseLanes part = select(beyond, longest_mps * rough_inverse(sweep), CoarseLanes(1.0f));
     return larger(smaller(length_s, Lanes(shortest_s)), length_s * part.widened());
   }
   [[gnu::always_inline]] Lanes cart_mps_after(const Lanes& h) const {

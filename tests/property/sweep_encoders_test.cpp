@@ -80,9 +80,10 @@ class SweepEncoders : public testing::TestWithParam<Loop> {
     return cases;
   }
 
+  static constexpr std::size_t periods = 400;
+
   /// After each period, by the event engine with steps so short that it is the truth.
-  static std::vector<PlantState<double>> states_of(const LoopSetup& setup, const LoopCase& start,
-                                                   std::size_t periods) {
+  static std::vector<PlantState<double>> states_of(const LoopSetup& setup, const LoopCase& start) {
     EngineOptions tight;
     tight.max_step_s = 5e-5;
     ControlConfig control = setup.control;
@@ -115,11 +116,28 @@ class SweepEncoders : public testing::TestWithParam<Loop> {
     return same(a.cart_m, b.cart_m, setup.cart_resolution_m) &&
            same(a.theta_rad, b.theta_rad, setup.angle_resolution_rad);
   }
+
+  /// Compares with the event engine, period by period: false from the first count that differs on. `lane` of
+  /// a period: the state at its end.
+  template <class Lane>
+  static bool agree(const LoopSetup& setup, const LoopCase& start, const Lane& lane) {
+    constexpr double bar = 1e-6;
+    const std::vector<PlantState<double>> truth = states_of(setup, start);
+    double worst = 0.0;
+    bool same = true;
+    for (std::size_t tick = 1; tick <= periods && same; ++tick) {
+      const PlantState<double> on_lane = lane(tick);
+      const PlantState<double>& state = truth[tick - 1];
+      worst = std::max(
+          {worst, std::abs(on_lane.theta_rad - state.theta_rad), std::abs(on_lane.cart_m - state.cart_m)});
+      same = same_counts(setup, on_lane, state);
+    }
+    EXPECT_LT(worst, bar) << start.theta0_rad << " rad, " << start.delay_s << " s";
+    return same;
+  }
 };
 
 TEST_P(SweepEncoders, AgreeUntilTheFirstCountThatDiffers) {
-  constexpr double bar = 1e-6;
-  constexpr std::size_t periods = 400;
   LoopSetup setup = SweepEncoders::setup();
   const std::vector<LoopCase> cases = random_cases(240, GetParam().longest_stay_s, 24);
   std::vector<std::vector<LoopResult>> lanes(periods + 1, std::vector<LoopResult>(cases.size()));
@@ -128,20 +146,41 @@ TEST_P(SweepEncoders, AgreeUntilTheFirstCountThatDiffers) {
     run_on_lanes(setup, cases, lanes[tick]);
   }
   std::size_t together = 0;
-  for (std::size_t i = 0; i < cases.size(); ++i) {
-    const std::vector<PlantState<double>> truth = states_of(setup, cases[i], periods);
-    double worst = 0.0;
-    bool same = true;
-    for (std::size_t tick = 1; tick <= periods && same; ++tick) {
-      const PlantState<double>&lane = lanes[tick][i].end, &state = truth[tick - 1];
-      worst =
-          std::max({worst, std::abs(lane.theta_rad - state.theta_rad), std::abs(lane.cart_m - state.cart_m)});
-      same = same_counts(setup, lane, state);
-    }
-    EXPECT_LT(worst, bar) << cases[i].theta0_rad << " rad, " << cases[i].delay_s << " s";
-    together += same ? 1 : 0;
-  }
+  for (std::size_t i = 0; i < cases.size(); ++i)
+    together += agree(setup, cases[i], [&](std::size_t tick) { return lanes[tick][i].end; }) ? 1 : 0;
   EXPECT_GT(together, cases.size() / 2);
+}
+
+/// Friction near rest of any strength, over any velocity.
+class SweepEncodersOfStribeck : public SweepEncoders {};
+
+TEST_P(SweepEncodersOfStribeck, AgreeUntilTheFirstCountThatDiffers) {
+  std::mt19937_64 random(29);
+  std::uniform_real_distribution<double> part(0.0, 1.0);
+  const auto log_uniform = [&](double low, double high) { return low * std::pow(high / low, part(random)); };
+  constexpr std::size_t runs = 240;
+  std::size_t together = 0;
+  for (std::size_t i = 0; i < runs; ++i) {
+    Plant plant = plant_with_effects();
+    plant.cart_mass_kg *= 0.8 + 0.4 * part(random);
+    plant.set("stribeck_friction", {log_uniform(0.05, 1.0), log_uniform(0.005, 0.3), 2.0});
+    plant.set("coulomb_friction", {log_uniform(0.05, 1.0)});
+    SCOPED_TRACE(plant_text(plant));
+    LoopSetup setup = SweepEncoders::setup();
+    setup.model = make_model<double>(plant);
+    const LoopCase start[] = {{0.005 + 0.05 * part(random), GetParam().longest_stay_s * part(random)}};
+    ASSERT_TRUE(lanes_can_run(setup));
+    together += agree(setup, start[0],
+                      [&](std::size_t tick) {
+                        setup.duration_s = static_cast<double>(tick) * setup.control.period_s();
+                        LoopResult lane[1];
+                        run_on_lanes(setup, start, lane);
+                        return lane[0].end;
+                      })
+                    ? 1
+                    : 0;
+  }
+  EXPECT_GT(together, runs / 2);
 }
 
 /// Loops that fall from a delay within the range below.
@@ -319,6 +358,7 @@ const Loop with_predictor[] = {{"predicted", "exponential", 0.0, false, 0.1, tru
 const Loop smooth[] = {{"smooth", "exponential", 100.0, false, 0.014}};
 
 INSTANTIATE_TEST_SUITE_P(Events, SweepEncoders, testing::ValuesIn(with_events), name_of_loop);
+INSTANTIATE_TEST_SUITE_P(Stribeck, SweepEncodersOfStribeck, testing::Values(with_events[0]), name_of_loop);
 INSTANTIATE_TEST_SUITE_P(Pivot, SweepEncoders, testing::ValuesIn(with_pivot), name_of_loop);
 INSTANTIATE_TEST_SUITE_P(Lag, SweepEncoders, testing::ValuesIn(with_lag), name_of_loop);
 INSTANTIATE_TEST_SUITE_P(Predictor, SweepEncoders, testing::ValuesIn(with_predictor), name_of_loop);

@@ -291,8 +291,7 @@ class Dynamics {
     return derivative_by_direction(state, cart_balance(state, motor_v), direction);
   }
 
-  /// Whether few terms of its Taylor series in time tell the motion of a sliding cart over a millisecond, as
-  /// far as its effects say that.
+  /// Whether the motion of a sliding cart is analytic in time, as far as its effects say that.
   bool has_short_series() const {
     bool all = true;
     for_each_effect([&]<std::size_t I>() {
@@ -301,6 +300,17 @@ class Dynamics {
         if (present_.template has<I>()) all = all && E::has_short_series(p<I>());
     });
     return all;
+  }
+
+  /// By how much a step of 1 ms by a Taylor series of order 4 may change the velocity of the cart [m/s].
+  S longest_sweep_mps() const {
+    S longest(1e6);  // any
+    for_each_effect([&]<std::size_t I>() {
+      if constexpr (requires { EffectAt<I>::longest_sweep_mps(p<I>(), model_.base.cart_mass_kg); })
+        if (present_.template has<I>())
+          longest = smaller(longest, EffectAt<I>::longest_sweep_mps(p<I>(), model_.base.cart_mass_kg));
+    });
+    return longest;
   }
 
   /// As `derivative`, of a cart on bristles that moves in this direction: the motion continues smoothly a
