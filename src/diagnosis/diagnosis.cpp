@@ -462,7 +462,7 @@ class Diagnostician {
   StepwiseSelection selection_;
   FinalFits fits_;
   std::unique_ptr<Exploration> exploration_;  ///< null: there is none
-  Noise noise_;                               ///< of all runs beside that model
+  Noise noise_;                               ///< of all runs beside the model of `fits_`
   std::set<std::size_t> withdrawn_;           ///< found, and not named
   std::vector<Reproduction> reproductions_;
   std::vector<RunDifference> differences_;

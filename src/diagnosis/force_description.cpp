@@ -274,7 +274,7 @@ std::optional<ForceDescription> describe_force(const Search& search, const Hypot
   const Curve& curve = curves.front();
   ForceDescription force{
       judged, known, unbounded, sentence_of(curves), curve.over == Table::velocity, curve.held_evidence};
-  force.judged.simulation.reset();
+  force.judged.forget_simulations();
   fit_table(search, curve, force);
   return force;
 }

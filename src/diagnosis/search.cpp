@@ -310,8 +310,7 @@ Hypothesis Search::conditioned_on_held_out(const Hypothesis& h) const {
   Hypothesis result = h;
   result.train.point.plant = held.point.plant;
   result.held = held;
-  result.simulation.reset();
-  result.training_segment_gap.clear();
+  result.forget_simulations();
   return result;
 }
 
@@ -508,8 +507,7 @@ Hypothesis Search::fitted_to_all_runs(const Hypothesis& h) const {
   FitPoint point = h.train.point;
   point.starts.insert(point.starts.end(), h.held.point.starts.begin(), h.held.point.starts.end());
   Hypothesis result = h;
-  result.simulation.reset();
-  result.training_segment_gap.clear();
+  result.forget_simulations();
   result.train = fit(all, point, h.free, FitOptions{});
   result.valid = std::isfinite(result.train.objective);
   if (!result.valid) return h;

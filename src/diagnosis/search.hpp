@@ -36,6 +36,12 @@ struct Hypothesis {
   bool valid = false;               ///< fitted, and no parameter at a bound that makes it another effect
   std::optional<FreeRunSimulation> simulation;  ///< once measured
   std::vector<double> training_segment_gap;     ///< of a plain simulation of training data, once measured
+
+  /// After the fit has changed.
+  void forget_simulations() {
+    simulation.reset();
+    training_segment_gap.clear();
+  }
 };
 
 /// How much better the richer one is, if the data count `dispersion` times less than the likelihood says.

@@ -130,8 +130,8 @@ class StepwiseSelection {
   /// Fits until that gains nothing more. Much noise hides what a poor fit leaves, and each gives way to the
   /// other by and by.
   void converge(Hypothesis& h);
-  /// By how much `h` simulates held-out segments worse than `current_` does: while more is missing, one and
-  /// the other come out better or worse by half.
+  /// By how much `h` simulates held-out segments worse than `current_` does, and training segments if these
+  /// count too: while more is missing, one and the other come out better or worse by half.
   SimulationChange simulation_change(Hypothesis& h, bool of_training_too);
   /// What held-out runs spoke against while more was missing must have them on its side in the end, or all
   /// that was added since goes.
