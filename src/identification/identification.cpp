@@ -103,13 +103,11 @@ class Identifier {
     Model model = start();
     model = fitted(model, trial_, 8, 1);
     so_far_ = model;
-    Model low_noise = model;
-    low_noise.fit.point.noise = reduced_process_noise(low_noise.fit.point.noise);
-    low_noise = fitted(low_noise, trial_, 16, 1);
-    if (rank_of(low_noise) < rank_of(model)) model = std::move(low_noise);
+    model = or_with_less_noise(std::move(model));
     so_far_ = model;
     const bool transition = range_.cart_moves && starts_from_rest() && grow(model);
     so_far_ = model;
+    model = or_with_less_noise(std::move(model));
     tell(0.6, "fitting all parameters");
     model = fitted(model, whole_, 12, 2);
     so_far_ = model;
@@ -255,6 +253,15 @@ class Identifier {
     model.fit = fit(data, point, parameters_of(model, mass_known_to), fit_options);
     if (std::isfinite(model.fit.objective)) model.plant = model.fit.point.plant;
     return model;
+  }
+
+  /// The model, or what it is when it is fitted again with little process noise, if that is more likely.
+  /// Process noise that made up for parameters that were not right yet keeps them from getting right.
+  Model or_with_less_noise(Model model) const {
+    Model less = model;
+    less.fit.point.noise = reduced_process_noise(less.fit.point.noise);
+    less = fitted(less, trial_, 16, 1);
+    return rank_of(less) < rank_of(model) ? less : model;
   }
 
   /// How friction changes between rest and sliding shows only where the cart rested and then went.
