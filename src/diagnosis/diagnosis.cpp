@@ -17,7 +17,6 @@
 #include "estimation/coarse_record.hpp"
 #include "estimation/held_out.hpp"
 #include "estimation/smoother.hpp"
-#include "exploration.hpp"
 #include "final_fits.hpp"
 #include "force_description.hpp"
 #include "indistinguishable.hpp"
@@ -31,6 +30,7 @@
 #include "run_differences.hpp"
 #include "search.hpp"
 #include "stepwise_selection.hpp"
+#include "thinned_record.hpp"
 #include "upright/base/error.hpp"
 #include "verdict.hpp"
 
@@ -38,24 +38,26 @@ namespace upright {
 
 namespace {
 
+/// What a diagnosis works on.
+struct Record {
+  const std::vector<Measurement>& runs;
+  const std::vector<Measurement>* all_samples = nullptr;  ///< of the runs, where those are thinned
+};
+
 class Diagnostician {
  public:
-  Diagnostician(const Plant& plant, const std::vector<Measurement>& runs, const DiagnosisOptions& options,
-                HeldOut which)
+  Diagnostician(const Plant& plant, const Record& record, const DiagnosisOptions& options, HeldOut which)
       : policy_(policy_for(plant)),
         budget_(options.quick ? quick_budget() : SearchBudget{}),
         plant_(plant),
-        runs_(runs),
+        runs_(record.runs),
         options_(options),
         data_(checked(split(runs_, which, policy_.excitation.arm_m, policy_.excitation.speed_window_s))),
         work_samples_(options.search_bound * (sample_count(data_.train) + sample_count(data_.held))),
         bound_(work_samples_),
         search_(plant_, runs_, bounded(data_.train), bounded(data_.held), policy_, budget_),
         selection_(search_, options, result_),
-        fits_(search_, selection_, options),
-        exploration_(options.quick ? nullptr : Exploration::of(search_, options)) {
-    if (exploration_) selection_.explore_with(exploration_->selection(), exploration_->sample_ratio());
-  }
+        fits_(search_, selection_, record.all_samples, options) {}
 
   /// `only_missing`: the answer counts only if an effect was found that the plant file lacks.
   Diagnosis run(bool only_missing = false) {
@@ -153,7 +155,6 @@ class Diagnostician {
     if (decided_) return;
     bound_.grant(budget_.examination_share * work_samples_);
     try {
-      selection_.adopt_unfinished();
       conclude(beside_coloured_noise(without_local_effects(settle())));
     } catch (const Interrupted&) {
       result_.interrupted = true;
@@ -165,26 +166,25 @@ class Diagnostician {
   /// What a search that was given up has found, unexamined: nothing is claimed of it.
   void report_so_far() {
     constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
-    const StepwiseSelection& latest = selection_.latest();
-    const Hypothesis& h = latest.current();
+    const Hypothesis& h = selection_.current();
     const auto known_gap = [&](const Hypothesis& of) { return of.simulation ? of.simulation->gap : unknown; };
     note_runs();
     result_.examined = false;
-    for (const std::size_t effect : latest.found()) {
+    for (const std::size_t effect : selection_.found()) {
       FoundEffect found;
       found.effect = effect;
       found.gap_before = found.gap_after = unknown;
       found.parameters = estimates_of(effect, h);
-      found.where = latest.where(effect);
+      found.where = selection_.where(effect);
       result_.effects.push_back(found);
     }
     for (CandidateScore& candidate : result_.candidates) candidate.gap_after = unknown;
-    result_.gap_before = known_gap(latest.given());
+    result_.gap_before = known_gap(selection_.given());
     result_.gap_after = known_gap(h);
     result_.noise = h.train.point.noise;
-    result_.model = latest.found().empty()
+    result_.model = selection_.found().empty()
                         ? plant_
-                        : model_with(plant_, h.train.point.plant, search_.nuisances(), latest.found());
+                        : model_with(plant_, h.train.point.plant, search_.nuisances(), selection_.found());
     result_.residual = "not examined: the search was not finished";
     result_.verdict = moves_enough(runs_, policy_.excitation) ? Verdict::unexplained : Verdict::not_excited;
   }
@@ -282,9 +282,10 @@ class Diagnostician {
           withdraw(*listing_.raises,
                    "it helps the runs that were fitted, and takes held-out data further off");
         } else {
+          fits_.fit_all_samples();
           const auto uncertain = fits_.uncertain_effect();
           if (!uncertain) return left;
-          withdraw(*uncertain, "its size is not certain once all runs are fitted");
+          withdraw(*uncertain, "its size is not certain once all samples are fitted");
         }
       }
       left = settle();
@@ -333,7 +334,7 @@ class Diagnostician {
       found.effect = row.effect;
       found.gap_before = row.before / floor_;
       found.gap_after = row.after / floor_;
-      found.parameters = estimates_of(row.effect, fits_.known());
+      found.parameters = estimates_of(row.effect, fits_.reported());
       found.where = selection_.where(row.effect);
       for (const Reproduction& r : reproductions_)
         if (r.effect == row.effect) {
@@ -346,7 +347,7 @@ class Diagnostician {
     }
     result_.gap_after = listing_.after / floor_;
     result_.residual = tests.sentence;
-    const Plant& fitted = fits_.known().train.point.plant;
+    const Plant& fitted = fits_.reported().train.point.plant;
     result_.model =
         all.empty() && !numbers_only ? plant_ : model_with(plant_, fitted, search_.nuisances(), all);
     result_.numbers = moved_numbers(plant_, result_.model, search_.range(), policy_.prior);
@@ -360,7 +361,7 @@ class Diagnostician {
     }
     std::stable_sort(result_.candidates.begin(), result_.candidates.end(),
                      [](const auto& a, const auto& b) { return a.evidence > b.evidence; });
-    for (const std::string& note : notes_on_doubtful_numbers(fits_.known(), all, policy_.correction))
+    for (const std::string& note : notes_on_doubtful_numbers(fits_.reported(), all, policy_.correction))
       result_.notes.push_back(note);
     beyond_sensors_ = tests.beyond_sensors;
     opened_ = open_effects(search_, fits_.judged(), all);
@@ -461,9 +462,8 @@ class Diagnostician {
   Search search_;
   StepwiseSelection selection_;
   FinalFits fits_;
-  std::unique_ptr<Exploration> exploration_;  ///< null: there is none
-  Noise noise_;                               ///< of all runs beside the model of `fits_`
-  std::set<std::size_t> withdrawn_;           ///< found, and not named
+  Noise noise_;                      ///< of all runs beside the model of `fits_`
+  std::set<std::size_t> withdrawn_;  ///< found, and not named
   std::vector<Reproduction> reproductions_;
   std::vector<RunDifference> differences_;
   Listing listing_;
@@ -471,7 +471,7 @@ class Diagnostician {
 };
 
 /// The search with other runs held out, where that may show more, and what is left in the end.
-void look_further(const Plant& plant, const std::vector<Measurement>& runs, const DiagnosisOptions& options,
+void look_further(const Plant& plant, const Record& record, const DiagnosisOptions& options,
                   Diagnostician& first, std::optional<Diagnostician>& second, Diagnosis& diagnosis) {
   if (diagnosis.verdict == Verdict::not_excited || diagnosis.interrupted || diagnosis.bound_reached) return;
   const bool unexplained = diagnosis.verdict == Verdict::unexplained;
@@ -479,7 +479,7 @@ void look_further(const Plant& plant, const std::vector<Measurement>& runs, cons
     // A weak effect may show too little in the runs that are left once one is held out.
     if (unexplained ? first.misses_held_out_excitation() : !first.found_missing_effect()) {
       options.tell(0.02, "repeating the search with other runs held out");
-      second.emplace(plant, runs, options, HeldOut::other);
+      second.emplace(plant, record, options, HeldOut::other);
       Diagnosis other = second->run(!unexplained);
       if (other.verdict == Verdict::explained && (unexplained || second->found_missing_effect())) {
         second->describe_what_is_left(other);
@@ -513,16 +513,17 @@ Diagnosis diagnose(const Plant& plant, const std::vector<Measurement>& runs,
     throw ConfigError(
         "the runs contain only theta_rad, and the model has no pendulum: add the pendulum to the plant file");
   const InterruptibleWork watch(options.signal);
-  std::vector<Measurement> thinned;
-  if (options.quick) thinned = coarse_runs(runs, plant, quick_budget().quick_period_s);
-  const std::vector<Measurement>& used = options.quick ? thinned : runs;
-  Diagnostician first(plant, used, options, HeldOut::middle);
+  const std::vector<Measurement> thinned = options.quick
+                                               ? coarse_runs(runs, plant, quick_budget().quick_period_s)
+                                               : thinned_runs(runs, plant, SearchBudget{});
+  const Record record{thinned.empty() ? runs : thinned, thinned.empty() || options.quick ? nullptr : &runs};
+  Diagnostician first(plant, record, options, HeldOut::middle);
   std::optional<Diagnostician> second;
   Diagnosis diagnosis = first.run();
   if (options.quick)
     diagnosis.not_examined = not_examined_quickly();
   else
-    look_further(plant, runs, options, first, second, diagnosis);
+    look_further(plant, record, options, first, second, diagnosis);
   diagnosis.work_samples = first.work_samples() + (second ? second->work_samples() : 0.0);
   return diagnosis;
 }

@@ -4,11 +4,17 @@
 #include <tuple>
 
 #include "plausibility.hpp"
+#include "thinned_record.hpp"
 
 namespace upright {
 
-FinalFits::FinalFits(Search& search, const StepwiseSelection& selection, const DiagnosisOptions& options)
-    : search_(search), selection_(selection), options_(options), policy_(search.policy()) {}
+FinalFits::FinalFits(Search& search, const StepwiseSelection& selection,
+                     const std::vector<Measurement>* all_samples, const DiagnosisOptions& options)
+    : search_(search),
+      selection_(selection),
+      all_samples_(all_samples),
+      options_(options),
+      policy_(search.policy()) {}
 
 void FinalFits::settle(const std::set<std::size_t>& withdrawn) {
   const Hypothesis& h = selection_.current();
@@ -76,10 +82,16 @@ void FinalFits::order_corrections(const std::vector<std::size_t>& corrections) {
   for (const auto& [number, gap, effect] : ranked) corrections_.push_back(effect);
 }
 
+void FinalFits::fit_all_samples() {
+  options_.tell(0.94, "fitting all samples");
+  reported_ =
+      all_samples_ == nullptr ? known_ : fitted_to_all_samples(known_, search_.all_data(), *all_samples_);
+}
+
 std::optional<std::size_t> FinalFits::uncertain_effect() const {
   const auto certainty_of = [&](std::size_t effect) {
     const bool is_new = search_.given().find(effect) == nullptr;
-    return is_new && !search_.is_plausible(known_, effect) ? 0.0 : search_.certainty(known_, effect);
+    return is_new && !search_.is_plausible(reported_, effect) ? 0.0 : search_.certainty(reported_, effect);
   };
   std::optional<std::size_t> least;
   for (const std::size_t effect : effects()) {

@@ -13,19 +13,25 @@ namespace upright {
 
 class FinalFits {
  public:
-  /// `search`, `selection` and `options` must outlive it.
-  FinalFits(Search& search, const StepwiseSelection& selection, const DiagnosisOptions& options);
+  /// `search`, `selection`, `options` and `all_samples` must outlive it. `all_samples`: of the runs, where
+  /// the search has thinned ones; else null.
+  FinalFits(Search& search, const StepwiseSelection& selection, const std::vector<Measurement>* all_samples,
+            const DiagnosisOptions& options);
 
   /// Fits what the selection found, with the corrections that are really there but for the `withdrawn` ones.
   void settle(const std::set<std::size_t>& withdrawn);
-  /// Of the effects that do nothing in the fit to all runs, or whose 95 % interval includes nothing, the
-  /// least certain one.
+  /// Fits `known()` to all samples.
+  void fit_all_samples();
+  /// Of the effects that do nothing in that fit, or whose 95 % interval includes nothing, the least certain
+  /// one.
   std::optional<std::size_t> uncertain_effect() const;
 
   /// Fitted to the training runs, judged on the others.
   const Hypothesis& judged() const { return judged_; }
-  /// The same effects fitted to all runs: what the model says in the end.
+  /// The same effects fitted to all runs.
   const Hypothesis& known() const { return known_; }
+  /// The same fitted to all samples: what the model says in the end.
+  const Hypothesis& reported() const { return reported_; }
   /// What was found, and the corrections.
   std::vector<std::size_t> effects() const;
 
@@ -40,10 +46,11 @@ class FinalFits {
 
   Search& search_;
   const StepwiseSelection& selection_;
+  const std::vector<Measurement>* const all_samples_;
   const DiagnosisOptions& options_;
   const SelectionPolicy& policy_;
   std::vector<std::size_t> corrections_;
-  Hypothesis judged_, known_;
+  Hypothesis judged_, known_, reported_;
 };
 
 }  // namespace upright

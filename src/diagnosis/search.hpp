@@ -99,8 +99,6 @@ class Search {
   void refine(const Hypothesis& base, Hypothesis& hypothesis);
   /// The same without judging it, from the noise that it has.
   void refit(const Hypothesis& base, Hypothesis& hypothesis);
-  /// A hypothesis on other data, fitted to these.
-  Hypothesis refitted(const Hypothesis& other);
   /// The same hypothesis without one effect.
   Hypothesis without(const Hypothesis& base, std::size_t effect);
   /// The same hypothesis from initial states that are guessed from the data once more: those that suited a

@@ -11,14 +11,13 @@
 namespace upright {
 
 struct SearchBudget {
-  // Exploration: the search goes first through a part of the samples, where the record is finer than the
-  // motion.
-  /// [s] From sample to sample in an exploration: the longest step of the simulation in a fit, so that longer
-  /// periods save less. What is found there is judged on all samples.
-  double exploration_period_s = 4e-3;
-  /// [1] An exploration pays if the record has this many times as many samples. It replaces most fits of the
-  /// search, but its finds are fitted once more. Chosen.
-  double min_exploration_ratio = 3.0;
+  // Samples: the diagnosis works on a part of them, where the record is finer than the motion.
+  /// [s] From sample to sample: the longest step of the simulation in a fit, so that longer periods save less.
+  /// The numbers of the model that was found are fitted to all samples.
+  double thinned_period_s = 4e-3;
+  /// [1] Thinning pays if the record has this many times as many samples: its numbers are fitted to all samples
+  /// in the end, which costs a part of what was saved. Chosen.
+  double min_thinning_ratio = 1.5;
 
   // Screening: the part of the training data that is used first.
   /// [segments] The least number of screening segments. Runs differ, but the segments of a run are similar,

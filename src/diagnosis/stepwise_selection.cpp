@@ -54,7 +54,6 @@ bool StepwiseSelection::find_thoroughly(bool certainly_missing) {
   const double share = search_.screening_share();
   if (share < 1.0 && !(certainly_missing && share < budget_.certain_screening_share)) {
     search_.screen_on_all();
-    if (explorer_ != nullptr) explorer_->search_.screen_on_all();
     select_forward(2 * budget_.max_rounds, 3 * budget_.max_rounds, false);
   }
   // On the way a better place may have been found for the noise alone.
@@ -115,11 +114,15 @@ std::vector<std::size_t> StepwiseSelection::promising_candidates(const Hypothesi
       chosen.push_back(candidates[i]);
       kept += unknown ? 0 : 1;
     } else {
-      last_gains_[candidates[i]] = predicted[i] / budget_.predicted_gain_share;
       if (round == 0) note_candidate(candidates[i], predicted[i]);
     }
   }
   return chosen;
+}
+
+void StepwiseSelection::note_candidate(std::size_t effect, double gain) {
+  std::erase_if(record_.candidates, [&](const CandidateScore& c) { return c.effect == effect; });
+  record_.candidates.push_back({effect, 0.0, std::max(gain, 0.0)});
 }
 
 double StepwiseSelection::penalty_of(std::size_t effect) const {
@@ -273,8 +276,7 @@ void StepwiseSelection::record_step() {
 }
 
 void StepwiseSelection::select_forward(int first_round, int last_round, bool with_low_noise) {
-  int round = explorer_ == nullptr ? first_round : explore(first_round, last_round, with_low_noise);
-  for (; round < last_round && add_best(round, with_low_noise); ++round) {
+  for (int round = first_round; round < last_round && add_best(round, with_low_noise); ++round) {
   }
   resolve_doubt();
 }
@@ -295,9 +297,7 @@ std::vector<StepwiseSelection::ScreenedCandidate> StepwiseSelection::screen(int 
   options_.tell(done, "ranking the candidates");
   Hypothesis from = current_;
   if (with_low_noise) from.train.point.noise = reduced_process_noise(from.train.point.noise);
-  last_gains_.clear();
-  const std::vector<std::size_t> candidates =
-      promising_candidates(from, possible_candidates(open_candidates()), round);
+  const std::vector<std::size_t> candidates = promising_candidates(from, open_candidates(), round);
   const double on_screening_subset = search_.on_screening_subset(from).train.objective;
   std::vector<ScreenedCandidate> screened;
   for (std::size_t c = 0; c < candidates.size(); ++c) {
@@ -306,7 +306,6 @@ std::vector<StepwiseSelection::ScreenedCandidate> StepwiseSelection::screen(int 
     Hypothesis h = search_.screened(from, candidates[c]);
     const double gain = on_screening_subset - h.train.objective - penalty_of(candidates[c]);
     if (round == 0) note_candidate(candidates[c], gain);
-    last_gains_[candidates[c]] = gain;
     screened.push_back({candidates[c], std::move(h), gain});
   }
   return screened;
@@ -401,8 +400,6 @@ void StepwiseSelection::take(int round, Finalist& best, const std::vector<Screen
     if (trial.round == static_cast<std::size_t>(round) && trial.effect == effect) trial.taken = true;
   current_ = std::move(best.hypothesis);
   found_.push_back(effect);
-  last_gains_.clear();
-  limits_.clear();
   const auto winner = std::find_if(screened.begin(), screened.end(),
                                    [&](const ScreenedCandidate& s) { return s.effect == effect; });
   for (const ScreenedCandidate& s : screened)
@@ -505,10 +502,6 @@ bool StepwiseSelection::simplify() {
 
 bool StepwiseSelection::try_pairs(const std::vector<std::pair<std::size_t, Hypothesis>>& contenders) {
   if (contenders.size() < 2) return false;
-  if (explorer_ != nullptr) {
-    lead_explorer();
-    return explorer_->try_pairs(contenders) && adopt(false);
-  }
   std::optional<Hypothesis> best;
   std::vector<std::size_t> best_found;
   std::optional<double> to_beat;  // on the screening subset, by the best so far

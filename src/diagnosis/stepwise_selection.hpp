@@ -21,10 +21,6 @@ class StepwiseSelection {
  public:
   StepwiseSelection(Search& search, const DiagnosisOptions& options, Diagnosis& record);
 
-  /// Searches on thinned data first, each time. `explorer` works on a search of these and must outlive this;
-  /// the data here have so many times as many samples.
-  void explore_with(StepwiseSelection& explorer, double sample_ratio);
-
   /// Fits the plant file as given: before everything else. Throws ConfigError when that cannot be simulated.
   /// This and what follows throw Interrupted and BoundReached; what was found until then stays readable.
   void begin();
@@ -43,11 +39,6 @@ class StepwiseSelection {
   /// What is left is more than noise: an effect that others resemble is left out, and the search goes on
   /// without it; one effect after the other, until a better model is found. Whether one was.
   bool find_without_each();
-
-  /// Adopts what an exploration had found when the search ended before its time.
-  void adopt_unfinished();
-  /// This, or the exploration where it had found more when the search ended.
-  const StepwiseSelection& latest() const;
 
   /// After something was taken out for good: looks for what can stand in its place.
   void find_again();
@@ -99,17 +90,6 @@ class StepwiseSelection {
   };
 
   std::vector<std::size_t> open_candidates() const;
-  /// Of these, those that may be accepted by what the exploration says.
-  std::vector<std::size_t> possible_candidates(const std::vector<std::size_t>& candidates) const;
-  /// Lets the explorer search in these rounds from what was found here, and adopts what it finds. The next
-  /// round.
-  int explore(int first_round, int last_round, bool with_low_noise);
-  /// The explorer continues from what was found here.
-  void lead_explorer();
-  /// Takes over what the explorer found, if these data bear it out. `with_low_noise`: as in select_forward.
-  bool adopt(bool with_low_noise);
-  /// The account of the explorer's search becomes a part of this one's.
-  void take_account();
   /// Notes a candidate of the first round, in the place of an earlier note.
   void note_candidate(std::size_t effect, double gain);
   /// Those that promise a share of what the best one does, some at least, and all that cannot promise. A
@@ -211,11 +191,6 @@ class StepwiseSelection {
   std::map<std::size_t, double> finalist_evidence_;
   std::vector<std::pair<std::size_t, Hypothesis>> resembling_;  ///< screened, of the first round
   std::set<std::pair<std::size_t, std::size_t>> paired_;        ///< tried already
-  /// What each candidate promised or gained in the last round, where no effect was added to the model since.
-  std::map<std::size_t, double> last_gains_;
-  StepwiseSelection* explorer_ = nullptr;
-  double sample_ratio_ = 1.0;             ///< how many times as many samples there are here
-  std::map<std::size_t, double> limits_;  ///< of what candidates can gain here; empty: none is known
 };
 
 }  // namespace upright

@@ -3,19 +3,49 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <limits>
 
 namespace upright {
 
 namespace {
 
-/// The largest change of the voltage within `period_s` that its mean may stand for: half of the period at one
-/// voltage and half at the other moves the cart by an eighth of the difference in acceleration.
-double largest_change_v(const Measurement& run, const Plant& plant, double period_s) {
-  if (run.cart_locked) return std::numeric_limits<double>::infinity();
-  if (!run.has_cart()) return 0.0;
-  const double per_volt_m = plant.motor.force_per_volt_n / plant.cart_mass_kg * period_s * period_s / 8.0;
-  return run.cart_noise_m() / std::max(std::abs(per_volt_m), std::numeric_limits<double>::min());
+/// How far the cart gets from where the mean voltage of these samples takes it until the sample `end`, if
+/// only the motor and its mass count: the difference, integrated twice.
+double shift_by_mean_m(const Measurement& run, double accelerates_mps2_per_v, std::size_t first,
+                       std::size_t end) {
+  double impulse_vs = 0.0, lever_vs2 = 0.0;  // of the voltage, about the end
+  for (std::size_t k = first; k < end; ++k) {
+    const double held_s = run.time_s[k + 1] - run.time_s[k];
+    impulse_vs += run.voltage_v[k] * held_s;
+    lever_vs2 += run.voltage_v[k] * held_s * (run.time_s[end] - run.time_s[k] - 0.5 * held_s);
+  }
+  const double of_mean_vs2 = 0.5 * impulse_vs * (run.time_s[end] - run.time_s[first]);
+  return accelerates_mps2_per_v * (lever_vs2 - of_mean_vs2);
+}
+
+/// Whether the cart slides in one direction all the time, whatever these voltages do: dry friction does not
+/// follow the mean of a voltage at which the cart sticks and slips in turn.
+bool slides_on(const Measurement& run, double accelerates_mps2_per_v, double change_v, std::size_t first,
+               std::size_t end) {
+  const double time_s = run.time_s[end] - run.time_s[first];
+  const double two_readings_m = 2.0 * std::sqrt(12.0) * run.cart_noise_m();
+  return std::abs(run.cart_m[end] - run.cart_m[first]) >
+         accelerates_mps2_per_v * change_v * time_s * time_s + two_readings_m;
+}
+
+/// By how much the mean of some voltages may move the cart, as a share of the sensor's noise. A controller
+/// answers the noise with its voltage, so that what moves the cart goes with the noise and does not average
+/// out: a share of 1 biased estimates from records of closed loops beyond their intervals.
+constexpr double largest_shift = 0.01;
+
+/// Whether the mean voltage may stand for the samples from `first` to before `end`.
+bool may_replace(const Measurement& run, double accelerates_mps2_per_v, std::size_t first, std::size_t end) {
+  const auto from = run.voltage_v.begin();
+  const auto [low, high] =
+      std::minmax_element(from + static_cast<std::ptrdiff_t>(first), from + static_cast<std::ptrdiff_t>(end));
+  if (run.cart_locked || *low == *high) return true;
+  return run.has_cart() && slides_on(run, accelerates_mps2_per_v, *high - *low, first, end) &&
+         std::abs(shift_by_mean_m(run, accelerates_mps2_per_v, first, end)) <=
+             largest_shift * run.cart_noise_m();
 }
 
 /// The samples of a run that are kept.
@@ -23,18 +53,14 @@ std::vector<std::size_t> kept_samples(const Measurement& run, const Plant& plant
                                       const std::vector<std::size_t>& gaps) {
   constexpr double slack_periods = 0.1;  // time stamps scatter
   const double longest_s = period_s + slack_periods * run.median_period_s();
-  const double change_v = largest_change_v(run, plant, period_s);
+  const double accelerates_mps2_per_v = std::abs(plant.motor.force_per_volt_n) / plant.cart_mass_kg;
   std::vector<std::size_t> kept = {0};
-  double low_v = run.voltage_v[0], high_v = low_v;
   for (std::size_t k = 1; k < run.size(); ++k) {
     const bool next_too_late = k + 1 == run.size() || run.time_s[k + 1] - run.time_s[kept.back()] > longest_s;
     const bool at_gap = std::binary_search(gaps.begin(), gaps.end(), k) ||
                         std::binary_search(gaps.begin(), gaps.end(), k + 1);
-    low_v = std::min(low_v, run.voltage_v[k]);
-    high_v = std::max(high_v, run.voltage_v[k]);
-    if (!next_too_late && !at_gap && high_v - low_v <= change_v) continue;
+    if (!next_too_late && !at_gap && may_replace(run, accelerates_mps2_per_v, kept.back(), k + 1)) continue;
     kept.push_back(k);
-    low_v = high_v = run.voltage_v[k];
   }
   return kept;
 }
@@ -90,23 +116,6 @@ std::vector<Measurement> coarse_runs(const std::vector<Measurement>& runs, const
   coarse.reserve(runs.size());
   for (const Measurement& run : runs) coarse.push_back(coarse_run(run, plant, period_s));
   return coarse;
-}
-
-std::vector<Segment> coarse_segments(const std::vector<Segment>& segments,
-                                     const std::vector<Measurement>& runs,
-                                     const std::vector<Measurement>& coarse) {
-  constexpr std::size_t fewest_samples = 8;
-  std::vector<Segment> kept;
-  for (const Segment& segment : segments) {
-    const std::vector<double>& fine_s = runs[segment.run].time_s;
-    const std::vector<double>& coarse_s = coarse[segment.run].time_s;
-    const auto first = std::lower_bound(coarse_s.begin(), coarse_s.end(), fine_s[segment.first]);
-    const auto beyond = std::upper_bound(first, coarse_s.end(), fine_s[segment.last]);
-    if (static_cast<std::size_t>(beyond - first) <= fewest_samples) continue;
-    kept.push_back({segment.run, static_cast<std::size_t>(first - coarse_s.begin()),
-                    static_cast<std::size_t>(beyond - coarse_s.begin()) - 1});
-  }
-  return kept;
 }
 
 }  // namespace upright

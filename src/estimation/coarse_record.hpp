@@ -1,4 +1,4 @@
-// A record with fewer samples, for a search: what decides in the end is judged on all of them.
+// A record with fewer samples, for a diagnosis of a record that is finer than the motion.
 #pragma once
 
 #include <vector>
@@ -8,15 +8,10 @@
 
 namespace upright {
 
-/// Every few samples of each run, about `period_s` apart. Between two of them the voltage is held at its
-/// mean, and a sample is kept wherever the mean would move the cart by more than the sensor's noise. Gaps
-/// stay gaps.
+/// Every few samples of each run, at most about `period_s` apart. Between two of them the voltage is held at
+/// its mean. Samples are kept wherever the voltage changes while the cart may stick, and wherever the mean
+/// would move the cart by more than a hundredth of the sensor's noise. Gaps stay gaps.
 std::vector<Measurement> coarse_runs(const std::vector<Measurement>& runs, const Plant& plant,
                                      double period_s);
-
-/// The same segments of coarse runs, as far as they have enough samples there.
-std::vector<Segment> coarse_segments(const std::vector<Segment>& segments,
-                                     const std::vector<Measurement>& runs,
-                                     const std::vector<Measurement>& coarse);
 
 }  // namespace upright

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 namespace upright {
@@ -51,18 +52,55 @@ TEST(CoarseRecord, KeepsTheSampleAtWhichTheVoltageJumps) {
   for (const double volts : coarse.voltage_v) EXPECT_EQ(std::abs(volts), 8.0);
 }
 
-TEST(CoarseRecord, KeepsGapsAndSegments) {
+/// A voltage that changes from sample to sample.
+double jitter_v(double t) {
+  return std::lround(1e3 * t) % 2 == 0 ? 0.5 : -0.5;
+}
+
+TEST(CoarseRecord, KeepsAllSamplesWhereTheCartMayStick) {
+  Measurement run = record(jitter_v);
+  for (double& x : run.cart_m) x = 0.0;
+  EXPECT_EQ(coarse_runs({run}, cart_alone(), period_s)[0].size(), run.size());
+}
+
+TEST(CoarseRecord, KeepsAllSamplesWhereTheVoltageJitters) {
+  Measurement run = record(jitter_v);
+  for (std::size_t k = 0; k < run.size(); ++k) run.cart_m[k] = 0.5 * run.time_s[k];
+  EXPECT_EQ(coarse_runs({run}, cart_alone(), period_s)[0].size(), run.size());
+}
+
+TEST(CoarseRecord, TheMeanVoltageTakesASlidingCartToTheSamePlace) {
+  Measurement run = record([](double t) { return 2.0 * std::sin(6.0 * t); });
+  for (std::size_t k = 0; k < run.size(); ++k) run.cart_m[k] = 0.5 * run.time_s[k];
+  const Measurement coarse = coarse_runs({run}, cart_alone(), period_s)[0];
+  EXPECT_LT(coarse.size(), run.size() / 3);
+  const double per_volt_mps2 = cart_alone().motor.force_per_volt_n / cart_alone().cart_mass_kg;
+  const auto place_m = [&](const Measurement& of, double until_s) {
+    double x = 0.0, v = 0.0;
+    for (std::size_t k = 0; k + 1 < of.size() && of.time_s[k] < until_s; ++k) {
+      const double held_s = of.time_s[k + 1] - of.time_s[k], a = per_volt_mps2 * of.voltage_v[k];
+      x += v * held_s + 0.5 * a * held_s * held_s;
+      v += a * held_s;
+    }
+    return x;
+  };
+  // The mean over each period T moves a cart as the voltage itself does, but for T^2/12 times the change of
+  // the voltage since the beginning.
+  constexpr double swing_v = 4.0;
+  const double shift_m = per_volt_mps2 * swing_v * period_s * period_s / 12.0;
+  double largest_m = 0.0;
+  for (const double time_s : coarse.time_s)
+    largest_m = std::max(largest_m, std::abs(place_m(coarse, time_s) - place_m(run, time_s)));
+  EXPECT_LT(largest_m, shift_m);
+}
+
+TEST(CoarseRecord, KeepsGaps) {
   Measurement run = record([](double) { return 1.0; });
   run.breaks = {503};
   const std::vector<Measurement> runs = {run};
   const std::vector<Measurement> coarse = coarse_runs(runs, cart_alone(), period_s);
   ASSERT_EQ(coarse[0].breaks.size(), 1u);
   EXPECT_EQ(coarse[0].time_s[coarse[0].breaks[0]], run.time_s[503]);
-  const std::vector<Segment> segments =
-      coarse_segments({{0, 0, 502}, {0, 503, 999}, {0, 100, 110}}, runs, coarse);
-  ASSERT_EQ(segments.size(), 2u) << "too few samples are left of the third";
-  EXPECT_EQ(coarse[0].time_s[segments[0].last], run.time_s[502]);
-  EXPECT_EQ(coarse[0].time_s[segments[1].first], run.time_s[503]);
 }
 
 }  // namespace
