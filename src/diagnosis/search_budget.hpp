@@ -18,6 +18,9 @@ struct SearchBudget {
   /// [1] Thinning pays if the record has this many times as many samples: its numbers are fitted to all samples
   /// in the end, which costs a part of what was saved. Chosen.
   double min_thinning_ratio = 1.5;
+  /// [samples] At least so many stay. Sensor noise averages out over samples, so that weak effects show less in
+  /// fewer; and a diagnosis of fewer takes seconds anyway. Chosen.
+  std::size_t min_thinned_samples = 5000;
 
   // Screening: the part of the training data that is used first.
   /// [segments] The least number of screening segments. Runs differ, but the segments of a run are similar,

@@ -7,7 +7,7 @@
 
 namespace upright {
 
-/// The runs with fewer samples; empty where that would save too little.
+/// The runs with fewer samples; empty where that would save too little, or leave too few.
 std::vector<Measurement> thinned_runs(const std::vector<Measurement>& runs, const Plant& plant,
                                       const SearchBudget& budget);
 

@@ -21,7 +21,7 @@ std::vector<Measurement> fine_runs(const Plant& plant, unsigned seed) {
     blind::Plan plan;
     plan.experiment = r == 1 ? blind::Experiment::square : blind::Experiment::multisine;
     plan.rate_hz = 1000.0;
-    plan.duration_s = 5.0;
+    plan.duration_s = 8.0;
     plan.seed = 100 * seed + r;
     runs.push_back(measure(rig, plan, std::string("run").append(std::to_string(r))));
   }

@@ -307,10 +307,8 @@ class Dynamics {
     S longest(1e6);  // any
     for_each_effect([&]<std::size_t I>() {
       if constexpr (requires { EffectAt<I>::longest_sweep_mps(p<I>(), model_.base.cart_mass_kg); })
-        if (present_.template has<I>()) {
-          const S of_effect = EffectAt<I>::longest_sweep_mps(p<I>(), model_.base.cart_mass_kg);
-          longest = select(of_effect < longest, of_effect, longest);
-        }
+        if (present_.template has<I>())
+          longest = smaller(longest, EffectAt<I>::longest_sweep_mps(p<I>(), model_.base.cart_mass_kg));
     });
     return longest;
   }

@@ -41,6 +41,12 @@ S absolute(const S& x) {
   return select(x < S(0.0), S(-x), x);
 }
 
+/// The smaller one.
+template <class S>
+S smaller(const S& a, const S& b) {
+  return select(b < a, b, a);
+}
+
 /// The value where it is positive, otherwise 0.
 template <class S>
 S positive_part(const S& x) {
