@@ -513,9 +513,10 @@ Diagnosis diagnose(const Plant& plant, const std::vector<Measurement>& runs,
     throw ConfigError(
         "the runs contain only theta_rad, and the model has no pendulum: add the pendulum to the plant file");
   const InterruptibleWork watch(options.signal);
-  const std::vector<Measurement> thinned = options.quick
-                                               ? coarse_runs(runs, plant, quick_budget().quick_period_s)
-                                               : thinned_runs(runs, plant, SearchBudget{});
+  const SearchBudget budget;
+  const std::vector<Measurement> thinned =
+      options.quick ? coarse_runs(runs, plant, {budget.quick_period_s, budget.quick_shift})
+                    : thinned_runs(runs, plant, budget);
   const Record record{thinned.empty() ? runs : thinned, thinned.empty() || options.quick ? nullptr : &runs};
   Diagnostician first(plant, record, options, HeldOut::middle);
   std::optional<Diagnostician> second;

@@ -12,14 +12,18 @@ namespace upright {
 
 struct SearchBudget {
   // Samples: the diagnosis works on a part of them, where the record is finer than the motion.
-  /// [s] From sample to sample: the longest step of the simulation in a fit, so that longer periods save less.
-  /// The numbers of the model that was found are fitted to all samples.
+  /// [s] From sample to sample: the longest step of the simulation in a fit, so that longer periods save
+  /// less. The numbers of the model that was found are fitted to all samples.
   double thinned_period_s = 4e-3;
-  /// [1] Thinning pays if the record has this many times as many samples: its numbers are fitted to all samples
-  /// in the end, which costs a part of what was saved. Chosen.
+  /// [of the noise of the cart's sensor] By how much the mean of some voltages may move the cart. A
+  /// controller answers the noise with its voltage, so that this does not average out: 1 biased estimates
+  /// from records of closed loops beyond their intervals. A hundredth of that was chosen.
+  double thinned_shift = 0.01;
+  /// [1] Thinning pays if the record has this many times as many samples: its numbers are fitted to all
+  /// samples in the end, which costs a part of what was saved. Chosen.
   double min_thinning_ratio = 1.5;
-  /// [samples] At least so many stay. Sensor noise averages out over samples, so that weak effects show less in
-  /// fewer; and a diagnosis of fewer takes seconds anyway. Chosen.
+  /// [samples] At least so many stay. Sensor noise averages out over samples, so that weak effects show less
+  /// in fewer; and a diagnosis of fewer takes seconds anyway. Chosen.
   std::size_t min_thinned_samples = 5000;
 
   // Screening: the part of the training data that is used first.
@@ -93,6 +97,9 @@ struct SearchBudget {
   /// [s] From sample to sample in a quick diagnosis. At 100 Hz the motion of a pendulum of arm's length is
   /// still followed; effects of a few milliseconds are not seen. Chosen.
   double quick_period_s = 10e-3;
+  /// [of the noise of the cart's sensor] By how much a mean voltage may move the cart in a quick diagnosis,
+  /// which names only what is beyond doubt. Chosen.
+  double quick_shift = 1.0;
   /// [segments] The least number of segments on which a quick diagnosis screens. Chosen.
   std::size_t quick_screening_segments = 3;
 

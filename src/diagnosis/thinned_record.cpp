@@ -26,7 +26,8 @@ std::size_t place_in(const Measurement& run, double time_s) {
 
 std::vector<Measurement> thinned_runs(const std::vector<Measurement>& runs, const Plant& plant,
                                       const SearchBudget& budget) {
-  std::vector<Measurement> thinned = coarse_runs(runs, plant, budget.thinned_period_s);
+  std::vector<Measurement> thinned =
+      coarse_runs(runs, plant, {budget.thinned_period_s, budget.thinned_shift});
   const std::size_t before = samples_of(runs), after = samples_of(thinned);
   const bool pays = static_cast<double>(before) >= budget.min_thinning_ratio * static_cast<double>(after);
   if (!pays || after < budget.min_thinned_samples) thinned.clear();

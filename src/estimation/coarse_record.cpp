@@ -32,13 +32,9 @@ bool slides_on(const Measurement& run, double accelerates_mps2_per_v, double cha
          accelerates_mps2_per_v * change_v * time_s * time_s + two_readings_m;
 }
 
-/// By how much the mean of some voltages may move the cart, as a share of the sensor's noise. A controller
-/// answers the noise with its voltage, so that what moves the cart goes with the noise and does not average
-/// out: a share of 1 biased estimates from records of closed loops beyond their intervals.
-constexpr double largest_shift = 0.01;
-
 /// Whether the mean voltage may stand for the samples from `first` to before `end`.
-bool may_replace(const Measurement& run, double accelerates_mps2_per_v, std::size_t first, std::size_t end) {
+bool may_replace(const Measurement& run, double accelerates_mps2_per_v, double largest_shift,
+                 std::size_t first, std::size_t end) {
   const auto from = run.voltage_v.begin();
   const auto [low, high] =
       std::minmax_element(from + static_cast<std::ptrdiff_t>(first), from + static_cast<std::ptrdiff_t>(end));
@@ -49,17 +45,19 @@ bool may_replace(const Measurement& run, double accelerates_mps2_per_v, std::siz
 }
 
 /// The samples of a run that are kept.
-std::vector<std::size_t> kept_samples(const Measurement& run, const Plant& plant, double period_s,
+std::vector<std::size_t> kept_samples(const Measurement& run, const Plant& plant, const Thinning& thinning,
                                       const std::vector<std::size_t>& gaps) {
   constexpr double slack_periods = 0.1;  // time stamps scatter
-  const double longest_s = period_s + slack_periods * run.median_period_s();
+  const double longest_s = thinning.period_s + slack_periods * run.median_period_s();
   const double accelerates_mps2_per_v = std::abs(plant.motor.force_per_volt_n) / plant.cart_mass_kg;
   std::vector<std::size_t> kept = {0};
   for (std::size_t k = 1; k < run.size(); ++k) {
     const bool next_too_late = k + 1 == run.size() || run.time_s[k + 1] - run.time_s[kept.back()] > longest_s;
     const bool at_gap = std::binary_search(gaps.begin(), gaps.end(), k) ||
                         std::binary_search(gaps.begin(), gaps.end(), k + 1);
-    if (!next_too_late && !at_gap && may_replace(run, accelerates_mps2_per_v, kept.back(), k + 1)) continue;
+    if (!next_too_late && !at_gap &&
+        may_replace(run, accelerates_mps2_per_v, thinning.largest_shift, kept.back(), k + 1))
+      continue;
     kept.push_back(k);
   }
   return kept;
@@ -88,9 +86,9 @@ std::vector<double> mean_voltage(const Measurement& run, const std::vector<std::
   return means;
 }
 
-Measurement coarse_run(const Measurement& run, const Plant& plant, double period_s) {
+Measurement coarse_run(const Measurement& run, const Plant& plant, const Thinning& thinning) {
   const std::vector<std::size_t> gaps = gaps_in(run);
-  const std::vector<std::size_t> kept = kept_samples(run, plant, period_s, gaps);
+  const std::vector<std::size_t> kept = kept_samples(run, plant, thinning, gaps);
   Measurement coarse = run;
   coarse.time_s = at(run.time_s, kept);
   coarse.voltage_v = mean_voltage(run, kept);
@@ -111,10 +109,10 @@ Measurement coarse_run(const Measurement& run, const Plant& plant, double period
 }  // namespace
 
 std::vector<Measurement> coarse_runs(const std::vector<Measurement>& runs, const Plant& plant,
-                                     double period_s) {
+                                     const Thinning& thinning) {
   std::vector<Measurement> coarse;
   coarse.reserve(runs.size());
-  for (const Measurement& run : runs) coarse.push_back(coarse_run(run, plant, period_s));
+  for (const Measurement& run : runs) coarse.push_back(coarse_run(run, plant, thinning));
   return coarse;
 }
 

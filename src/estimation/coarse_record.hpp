@@ -8,10 +8,15 @@
 
 namespace upright {
 
-/// Every few samples of each run, at most about `period_s` apart. Between two of them the voltage is held at
-/// its mean. Samples are kept wherever the voltage changes while the cart may stick, and wherever the mean
-/// would move the cart by more than a hundredth of the sensor's noise. Gaps stay gaps.
+struct Thinning {
+  double period_s;       ///< from sample to sample, at most about [s]
+  double largest_shift;  ///< by how much a mean voltage may move the cart [of the noise of its sensor]
+};
+
+/// Every few samples of each run. Between two of them the voltage is held at its mean. Samples are kept
+/// wherever the voltage changes while the cart may stick, and wherever the mean would move the cart too far.
+/// Gaps stay gaps.
 std::vector<Measurement> coarse_runs(const std::vector<Measurement>& runs, const Plant& plant,
-                                     double period_s);
+                                     const Thinning& thinning);
 
 }  // namespace upright

@@ -38,7 +38,8 @@ TEST(FineRecords, NumbersAreThoseOfAllSamples) {
   plant.set("quadratic_drag", {4.0});
   const std::vector<Measurement> runs = fine_runs(plant, 1);
   const Diagnosis of_all = diagnose(cart_with_friction(), runs);
-  const Diagnosis of_part = diagnose(cart_with_friction(), coarse_runs(runs, cart_with_friction(), 4e-3));
+  const Diagnosis of_part =
+      diagnose(cart_with_friction(), coarse_runs(runs, cart_with_friction(), {4e-3, 0.01}));
   ASSERT_FALSE(of_all.effects.empty());
   ASSERT_FALSE(of_part.effects.empty());
   EXPECT_EQ(kind_of(of_all.effects.front().effect), "quadratic_drag");

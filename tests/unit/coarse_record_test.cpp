@@ -10,6 +10,7 @@ namespace upright {
 namespace {
 
 constexpr double period_s = 4e-3;
+constexpr Thinning thinning{period_s, 0.01};
 
 Plant cart_alone() {
   Plant plant;
@@ -33,7 +34,7 @@ Measurement record(const Voltage& voltage) {
 
 TEST(CoarseRecord, KeepsEveryFourthSampleAndTheMeanOfASlowVoltage) {
   const std::vector<Measurement> runs = {record([](double t) { return 2.0 * std::sin(6.0 * t); })};
-  const std::vector<Measurement> coarse = coarse_runs(runs, cart_alone(), period_s);
+  const std::vector<Measurement> coarse = coarse_runs(runs, cart_alone(), thinning);
   ASSERT_NEAR(coarse[0].size(), 250.0, 2.0);
   double impulse = 0.0, coarse_impulse = 0.0;
   for (std::size_t k = 0; k + 1 < runs[0].size(); ++k) impulse += runs[0].voltage_v[k] * 1e-3;
@@ -48,7 +49,7 @@ TEST(CoarseRecord, KeepsEveryFourthSampleAndTheMeanOfASlowVoltage) {
 
 TEST(CoarseRecord, KeepsTheSampleAtWhichTheVoltageJumps) {
   const auto square = [](double t) { return t < 0.4985 ? -8.0 : 8.0; };
-  const Measurement coarse = coarse_runs({record(square)}, cart_alone(), period_s)[0];
+  const Measurement coarse = coarse_runs({record(square)}, cart_alone(), thinning)[0];
   for (const double volts : coarse.voltage_v) EXPECT_EQ(std::abs(volts), 8.0);
 }
 
@@ -60,19 +61,19 @@ double jitter_v(double t) {
 TEST(CoarseRecord, KeepsAllSamplesWhereTheCartMayStick) {
   Measurement run = record(jitter_v);
   for (double& x : run.cart_m) x = 0.0;
-  EXPECT_EQ(coarse_runs({run}, cart_alone(), period_s)[0].size(), run.size());
+  EXPECT_EQ(coarse_runs({run}, cart_alone(), thinning)[0].size(), run.size());
 }
 
 TEST(CoarseRecord, KeepsAllSamplesWhereTheVoltageJitters) {
   Measurement run = record(jitter_v);
   for (std::size_t k = 0; k < run.size(); ++k) run.cart_m[k] = 0.5 * run.time_s[k];
-  EXPECT_EQ(coarse_runs({run}, cart_alone(), period_s)[0].size(), run.size());
+  EXPECT_EQ(coarse_runs({run}, cart_alone(), thinning)[0].size(), run.size());
 }
 
 TEST(CoarseRecord, TheMeanVoltageTakesASlidingCartToTheSamePlace) {
   Measurement run = record([](double t) { return 2.0 * std::sin(6.0 * t); });
   for (std::size_t k = 0; k < run.size(); ++k) run.cart_m[k] = 0.5 * run.time_s[k];
-  const Measurement coarse = coarse_runs({run}, cart_alone(), period_s)[0];
+  const Measurement coarse = coarse_runs({run}, cart_alone(), thinning)[0];
   EXPECT_LT(coarse.size(), run.size() / 3);
   const double per_volt_mps2 = cart_alone().motor.force_per_volt_n / cart_alone().cart_mass_kg;
   const auto place_m = [&](const Measurement& of, double until_s) {
@@ -98,7 +99,7 @@ TEST(CoarseRecord, KeepsGaps) {
   Measurement run = record([](double) { return 1.0; });
   run.breaks = {503};
   const std::vector<Measurement> runs = {run};
-  const std::vector<Measurement> coarse = coarse_runs(runs, cart_alone(), period_s);
+  const std::vector<Measurement> coarse = coarse_runs(runs, cart_alone(), thinning);
   ASSERT_EQ(coarse[0].breaks.size(), 1u);
   EXPECT_EQ(coarse[0].time_s[coarse[0].breaks[0]], run.time_s[503]);
 }
