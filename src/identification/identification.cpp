@@ -107,7 +107,7 @@ class Identifier {
     so_far_ = model;
     const bool transition = range_.cart_moves && starts_from_rest() && grow(model);
     so_far_ = model;
-    model = or_with_less_noise(std::move(model));
+    if (transition) model = or_with_less_noise(std::move(model));
     tell(0.6, "fitting all parameters");
     model = fitted(model, whole_, 12, 2);
     so_far_ = model;
