@@ -283,9 +283,15 @@ class Diagnostician {
                    "it helps the runs that were fitted, and takes held-out data further off");
         } else {
           fits_.fit_all_samples();
-          const auto uncertain = fits_.uncertain_effect();
-          if (!uncertain) return left;
-          withdraw(*uncertain, "its size is not certain once all samples are fitted");
+          if (const auto uncertain = fits_.uncertain_effect()) {
+            withdraw(*uncertain, "its size is not certain once all samples are fitted");
+          } else if (const auto elsewhere_open = fits_.effect_with_open_phase()) {
+            withdraw(*elsewhere_open,
+                     "its phase at the zero of the cart is open, so its force is known only where it was "
+                     "measured");
+          } else {
+            return left;
+          }
         }
       }
       left = settle();

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <tuple>
 
+#include "phases.hpp"
 #include "plausibility.hpp"
 #include "thinned_record.hpp"
 
@@ -99,6 +100,12 @@ std::optional<std::size_t> FinalFits::uncertain_effect() const {
     if (!least || certainty_of(effect) < certainty_of(*least)) least = effect;
   }
   return least;
+}
+
+std::optional<std::size_t> FinalFits::effect_with_open_phase() const {
+  for (const std::size_t effect : effects())
+    if (is_phase_open(estimates_of(effect, reported_))) return effect;
+  return std::nullopt;
 }
 
 std::vector<std::size_t> FinalFits::effects() const {

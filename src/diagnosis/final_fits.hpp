@@ -25,6 +25,8 @@ class FinalFits {
   /// Of the effects that do nothing in that fit, or whose 95 % interval includes nothing, the least certain
   /// one.
   std::optional<std::size_t> uncertain_effect() const;
+  /// An effect whose phase that fit leaves open.
+  std::optional<std::size_t> effect_with_open_phase() const;
 
   /// Fitted to the training runs, judged on the others.
   const Hypothesis& judged() const { return judged_; }

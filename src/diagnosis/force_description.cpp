@@ -7,6 +7,7 @@
 #include <sstream>
 #include <vector>
 
+#include "candidates.hpp"
 #include "estimation/random_curve.hpp"
 #include "estimation/smoother.hpp"
 #include "force_formula.hpp"
@@ -55,6 +56,20 @@ CurveNodes nodes_along(const std::vector<CurveArgument>& arguments, std::size_t 
   const double low = at(beyond), high = at(1.0 - beyond);
   if (!(high > low)) return {};
   return {low, (high - low) / static_cast<double>(count - 1), count};
+}
+
+/// The nodes of a table. A table is constant beyond its ends. A curve over the position would push with the
+/// force of the last place everywhere else, so its table goes on until the curve is forgotten, where it is
+/// near its level. A smooth curve is not forgotten soon; the margin stays a small part of the table.
+CurveNodes table_nodes(const std::vector<CurveArgument>& along, Table::Over over, double length) {
+  CurveNodes nodes = nodes_along(along, Table::node_count);
+  if (over == Table::velocity || nodes.count == 0) return nodes;
+  constexpr double forgotten_lengths = 2.0;   // the correlation there is a seventh
+  constexpr double largest_margin = 1.0 / 6;  // [of the travel] on each side
+  const auto intervals = static_cast<double>(nodes.count - 1);
+  const double travel = nodes.spacing * intervals;
+  const double margin = std::min(forgotten_lengths * length, largest_margin * travel);
+  return {nodes.first - margin, (travel + 2.0 * margin) / intervals, nodes.count};
 }
 
 /// What known effects make of a curve at q: a constant force, viscous friction, quadratic drag, Coulomb
@@ -112,6 +127,7 @@ struct Curve {
   double held_evidence = 0.0;         ///< what the same curve saves on held-out data
   CurveNodes nodes;                   ///< of the table
   Eigen::MatrixXd prior_information;  ///< of the forces at these nodes
+  double deviation = 0.0;             ///< of these forces from their level
   Eigen::VectorXd force_n;            ///< expected at these nodes
 };
 
@@ -129,12 +145,42 @@ std::vector<Curve> curves_of(const Followed& train, const Followed& held, std::s
     const Eigen::VectorXd force_n = curve.mean(shown);
     const CurveEquations unseen = held.equations(nodes, over, held.arguments(over));
     const double held_evidence = 2.0 * force_n.dot(unseen.score) - force_n.dot(unseen.information * force_n);
-    const CurveNodes few = nodes_along(along, Table::node_count);
-    curves.push_back({over, -curve.change(), held_evidence, few, curve.prior_information(few), {}});
+    const CurveNodes few = table_nodes(along, over, curve.length());
+    curves.push_back(
+        {over, -curve.change(), held_evidence, few, curve.prior_information(few), curve.deviation(), {}});
   }
   std::stable_sort(curves.begin(), curves.end(),
                    [](const Curve& a, const Curve& b) { return a.evidence > b.evidence; });
   return curves;
+}
+
+/// The effect that is a curve of this kind with the same value everywhere.
+std::optional<std::size_t> level_effect(Table::Over over) {
+  switch (over) {
+    case Table::position:
+      return effect_number("constant_force");
+    case Table::position_and_direction:
+      return effect_number("coulomb_friction");
+    case Table::position_and_velocity:
+      return effect_number("viscous_friction");
+    default:
+      return std::nullopt;
+  }
+}
+
+/// Gives a curve a level of its own, which is expected to be as large as what deviates from it: by the matrix
+/// inversion lemma, from the covariance with the square of the deviation added everywhere. A level that an
+/// effect of the model has already stays with that effect.
+void free_level(Curve& curve, const std::vector<FreeParameter>& free) {
+  const std::optional<std::size_t> level = level_effect(curve.over);
+  if (!level) return;
+  std::vector<std::size_t> same = same_force_as(*level);
+  same.push_back(*level);
+  for (const FreeParameter& p : free)
+    if (std::find(same.begin(), same.end(), p.effect) != same.end()) return;
+  const Eigen::VectorXd pull = curve.prior_information.rowwise().sum();
+  const double of_level = 1.0 / (curve.deviation * curve.deviation);
+  curve.prior_information -= pull * pull.transpose() / (of_level + pull.sum());
 }
 
 /// The expected values of a curve at the few nodes of its table. Where no data are, they are near zero: the
@@ -270,6 +316,7 @@ std::optional<ForceDescription> describe_force(const Search& search, const Hypot
       curves_of(fitted, Followed(held, judged.held.point, walk), search.budget().track_nodes);
   if (curves.empty() || !(curves.front().evidence > search.policy().acceptance.min_evidence))
     return std::nullopt;
+  free_level(curves.front(), known.free);
   draw_table(fitted, curves.front());
   const Curve& curve = curves.front();
   ForceDescription force{

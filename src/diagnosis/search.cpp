@@ -103,7 +103,7 @@ std::vector<ParameterEstimate> estimates_of(std::size_t effect, const Hypothesis
     e.name = info.parameters[i].name;
     e.unit = info.parameters[i].unit;
     e.value = h.train.point.plant.find(effect)->values[i];
-    if (is_phase(info.parameters[i])) e.value = wrapped_phase(e.value);
+    if (is_phase(info.parameters[i].name)) e.value = wrapped_phase(e.value);
     e.low = e.high = e.value;
     for (std::size_t j = 0; j < h.free.size(); ++j) {
       if (h.free[j].effect != effect || h.free[j].index != i) continue;

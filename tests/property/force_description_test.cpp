@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/QR>
+#include <algorithm>
 #include <cmath>
 
 #include "diagnosis/described_curve.hpp"
@@ -48,6 +49,32 @@ TEST(ForceDescription, DrawsARippleOverTheVelocity) {
     EXPECT_NE(d.model.find("force_table"), nullptr);
     EXPECT_GT(likeness(*curve, rig.unknown_period), 0.9) << seed;
   }
+}
+
+/// At other places the force of a rough track is not known, and its level is the best guess.
+TEST(ForceDescription, EndsNearItsLevelBesideTheMeasuredTrack) {
+  int drawn = 0;
+  for (const unsigned seed : {7, 8, 9}) {
+    blind::Rig rig{.plant = cart_with_friction(), .unknown = blind::Unknown::rough_track};
+    rig.unknown_size = 1.0;
+    rig.unknown_period = 0.02;
+    rig.track_seed = seed;
+    const std::vector<Measurement> runs = three_runs(rig, 6.0, seed);
+    const auto curve = curve_in(diagnose(cart_with_friction(), runs, {}));
+    if (!curve) continue;
+    ++drawn;
+    EXPECT_EQ(curve->over, "position") << seed;
+    for (const Measurement& run : runs) {
+      const auto [low, high] = std::minmax_element(run.cart_m.begin(), run.cart_m.end());
+      EXPECT_LT(curve->at.front(), *low) << seed;
+      EXPECT_GT(curve->at.back(), *high) << seed;
+    }
+    const auto nodes = static_cast<Eigen::Index>(curve->force_n.size());
+    const Eigen::VectorXd force_n = Eigen::Map<const Eigen::VectorXd>(curve->force_n.data(), nodes);
+    const Eigen::VectorXd off = (force_n.array() - force_n.mean()).abs();
+    EXPECT_LT(std::max(off[0], off[nodes - 1]), 0.5 * off.maxCoeff()) << seed;
+  }
+  EXPECT_GT(drawn, 0);
 }
 
 TEST(ForceDescription, DrawsNothingWhereNothingIsMissing) {

@@ -158,6 +158,35 @@ TEST(Phase, IsWithinHalfATurn) {
   EXPECT_EQ(plant.find("cogging_force")->values[1], 0.01);
 }
 
+/// Three runs of a cart that cogs, so far from the zero of its encoder.
+Diagnosis of_cogging_cart(double far_m) {
+  blind::Rig rig{.plant = file_plant()};
+  rig.plant.set("cogging_force", {0.5, 0.011, 0.3});
+  std::vector<Measurement> runs;
+  for (const unsigned seed : {1u, 2u, 3u}) {
+    blind::Plan plan;
+    plan.rate_hz = 200.0;
+    plan.duration_s = 6.0;
+    plan.seed = seed;
+    runs.push_back(measure(rig, plan, "run" + std::to_string(seed)));
+    for (double& cart_m : runs.back().cart_m) cart_m += far_m;
+  }
+  return diagnose(file_plant(), runs, {});
+}
+
+TEST(Phases, OpenAtTheZeroOfTheCartAreNotNamed) {
+  const Diagnosis near = of_cogging_cart(0.0);
+  ASSERT_EQ(near.effects.size(), 1u);
+  EXPECT_EQ(kind_of(near.effects[0].effect), "cogging_force");
+  EXPECT_FALSE(is_phase_open(near.effects[0].parameters));
+  const Diagnosis far = of_cogging_cart(1000.0);  // these data fix the pitch well
+  EXPECT_TRUE(far.effects.empty());
+  ASSERT_EQ(far.helps_here_only.size(), 1u);
+  EXPECT_EQ(kind_of(far.helps_here_only[0].effect), "cogging_force");
+  EXPECT_TRUE(is_phase_open(far.helps_here_only[0].parameters));
+  EXPECT_EQ(far.model.find("cogging_force"), nullptr);
+}
+
 TEST(Power, GrowsWithTheParametersThatHaveToBePaidFor) {
   const SelectionPolicy policy;
   const double one = standard_errors_to_be_shown(force, false, policy);
