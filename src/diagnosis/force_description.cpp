@@ -61,14 +61,13 @@ CurveNodes nodes_along(const std::vector<CurveArgument>& arguments, std::size_t 
 /// The nodes of a table. A table is constant beyond its ends. A curve over the position would push with the
 /// force of the last place everywhere else, so its table goes on until the curve is forgotten, where it is
 /// near its level. A smooth curve is not forgotten soon; the margin stays a small part of the table.
-CurveNodes table_nodes(const std::vector<CurveArgument>& along, Table::Over over, double length) {
+CurveNodes table_nodes(const std::vector<CurveArgument>& along, Table::Over over, double length,
+                       const CurvePolicy& policy) {
   CurveNodes nodes = nodes_along(along, Table::node_count);
   if (over == Table::velocity || nodes.count == 0) return nodes;
-  constexpr double forgotten_lengths = 2.0;   // the correlation there is a seventh
-  constexpr double largest_margin = 1.0 / 6;  // [of the travel] on each side
   const auto intervals = static_cast<double>(nodes.count - 1);
   const double travel = nodes.spacing * intervals;
-  const double margin = std::min(forgotten_lengths * length, largest_margin * travel);
+  const double margin = std::min(policy.forgotten_lengths * length, policy.largest_margin * travel);
   return {nodes.first - margin, (travel + 2.0 * margin) / intervals, nodes.count};
 }
 
@@ -132,7 +131,8 @@ struct Curve {
 };
 
 /// Curves over each quantity, the one with the most evidence first.
-std::vector<Curve> curves_of(const Followed& train, const Followed& held, std::size_t many) {
+std::vector<Curve> curves_of(const Followed& train, const Followed& held, std::size_t many,
+                             const CurvePolicy& policy) {
   std::vector<Curve> curves;
   for (int number = 0; number < Table::over_count; ++number) {
     const auto over = static_cast<Table::Over>(number);
@@ -145,7 +145,7 @@ std::vector<Curve> curves_of(const Followed& train, const Followed& held, std::s
     const Eigen::VectorXd force_n = curve.mean(shown);
     const CurveEquations unseen = held.equations(nodes, over, held.arguments(over));
     const double held_evidence = 2.0 * force_n.dot(unseen.score) - force_n.dot(unseen.information * force_n);
-    const CurveNodes few = table_nodes(along, over, curve.length());
+    const CurveNodes few = table_nodes(along, over, curve.length(), policy);
     curves.push_back(
         {over, -curve.change(), held_evidence, few, curve.prior_information(few), curve.deviation(), {}});
   }
@@ -183,8 +183,9 @@ void free_level(Curve& curve, const std::vector<FreeParameter>& free) {
   curve.prior_information -= pull * pull.transpose() / (of_level + pull.sum());
 }
 
-/// The expected values of a curve at the few nodes of its table. Where no data are, they are near zero: the
-/// size of the curve is that of the force, not what a few nodes would need to follow its details.
+/// The expected values of a curve at the few nodes of its table. Where no data are, they are near the
+/// level of the curve, or near zero if it has none: the size of the curve is that of the force, not what a
+/// few nodes would need to follow its details.
 void draw_table(const Followed& train, Curve& curve) {
   const CurveEquations shown = train.equations(curve.nodes, curve.over, train.arguments(curve.over));
   curve.force_n = solve_symmetric(shown.information + curve.prior_information, shown.score);
@@ -312,8 +313,8 @@ std::optional<ForceDescription> describe_force(const Search& search, const Hypot
   if (known.train.point.starts.size() != search.all_data().segments.size()) return std::nullopt;
   const ResidualWalk& walk = search.policy().location.walk;
   const Followed fitted(train, judged.train.point, walk);
-  std::vector<Curve> curves =
-      curves_of(fitted, Followed(held, judged.held.point, walk), search.budget().track_nodes);
+  std::vector<Curve> curves = curves_of(fitted, Followed(held, judged.held.point, walk),
+                                        search.budget().track_nodes, search.policy().curve);
   if (curves.empty() || !(curves.front().evidence > search.policy().acceptance.min_evidence))
     return std::nullopt;
   free_level(curves.front(), known.free);

@@ -263,6 +263,15 @@ struct LocationPolicy {
   ResidualWalk walk;  ///< of the smoother that estimates the residual force
 };
 
+/// How far the table of a curve over the position goes on beside the data.
+struct CurvePolicy {
+  /// [correlation lengths] Where the curve is forgotten: its correlation with the last place is a seventh
+  /// there. Chosen.
+  double forgotten_lengths = 2.0;
+  /// [of the travel] The largest margin on each side, so that most nodes lie where the data are. Chosen.
+  double largest_margin = 1.0 / 6.0;
+};
+
 /// The prior distributions of parameters.
 struct PriorPolicy {
   /// [1] The standard deviation of a base parameter relative to its value in the plant file: data sheets and
@@ -346,6 +355,7 @@ struct SelectionPolicy {
   MotionPolicy motion;
   ResidualPolicy residual;
   LocationPolicy location;
+  CurvePolicy curve;
   PriorPolicy prior;
   ExcitationPolicy excitation;
 };

@@ -174,7 +174,7 @@ Diagnosis of_cogging_cart(double far_m) {
   return diagnose(file_plant(), runs, {});
 }
 
-TEST(Phases, OpenAtTheZeroOfTheCartAreNotNamed) {
+TEST(Phase, OpenAtTheZeroOfTheCartIsNotNamed) {
   const Diagnosis near = of_cogging_cart(0.0);
   ASSERT_EQ(near.effects.size(), 1u);
   EXPECT_EQ(kind_of(near.effects[0].effect), "cogging_force");
