@@ -103,11 +103,11 @@ class Identifier {
     Model model = start();
     model = fitted(model, trial_, 8, 1);
     so_far_ = model;
-    model = or_with_less_noise(std::move(model));
+    model = or_with_less_noise(model);
     so_far_ = model;
     const bool transition = range_.cart_moves && starts_from_rest() && grow(model);
     so_far_ = model;
-    if (transition) model = or_with_less_noise(std::move(model));
+    if (transition) model = or_with_less_noise(model);
     tell(0.6, "fitting all parameters");
     model = fitted(model, whole_, 12, 2);
     so_far_ = model;
@@ -257,7 +257,7 @@ class Identifier {
 
   /// The model, or what it is when it is fitted again with little process noise, if that is more likely.
   /// Process noise that made up for parameters that were not right yet keeps them from getting right.
-  Model or_with_less_noise(Model model) const {
+  Model or_with_less_noise(const Model& model) const {
     Model less = model;
     less.fit.point.noise = reduced_process_noise(less.fit.point.noise);
     less = fitted(less, trial_, 16, 1);
