@@ -1,8 +1,10 @@
 #include "time_stamps.hpp"
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
+
+#include "model/dense_algebra.hpp"
 
 namespace upright {
 
@@ -30,7 +32,7 @@ double left_of(const Window& time, const Window& values) {
     for (Eigen::Index j = 0; j < coefficients; ++j) basis(i, j) = j == 0 ? 1.0 : basis(i, j - 1) * u;
   }
   const Window centred = values.array() - values.mean();
-  return (centred - basis * basis.householderQr().solve(centred).eval()).squaredNorm();
+  return (centred - basis * least_squares(basis, centred)).squaredNorm();
 }
 
 /// First rows of windows without a gap in them.
