@@ -213,6 +213,10 @@ class Diagnostician {
   /// Settles the corrections, and looks at what is left.
   ResidualTests settle() {
     fits_.settle(withdrawn_);
+    return what_is_left();
+  }
+
+  ResidualTests what_is_left() const {
     options_.tell(0.92, "measuring the gap");
     // At what all runs say, so that what few training runs left uncertain is not taken for something missing.
     return tests_of(fits_.known().train.point, fits_.judged().train.point.noise);
@@ -245,57 +249,56 @@ class Diagnostician {
     return tests_of(coloured.point, noise_);
   }
 
-  /// An effect that does not reproduce, or that takes held-out data further from the model, is not named: it
-  /// goes, and what is left is looked at anew.
-  ResidualTests without_local_effects(ResidualTests left) {
-    for (;;) {
-      options_.tell(0.93, "comparing parts of the data");
-      reproductions_ = reproduce(search_, fits_.known(), fits_.effects());
-      if (options_.quick) {
-        const std::vector<std::size_t> doubtful = doubtful_effects(reproductions_, search_);
-        for (const std::size_t effect : doubtful)
-          if (!withdrawn_.contains(effect))
-            withdraw(effect, "not certain enough for a quick diagnosis: repeat it without --quick");
-        if (!doubtful.empty()) {
-          left = settle();
-          continue;
-        }
-      }
-      const Reproduction* worst = nullptr;
-      for (const Reproduction& r : reproductions_)
-        if (is_contradicted(r, policy_.reproducibility) && (worst == nullptr || r.t_value < worst->t_value))
-          worst = &r;
-      if (worst != nullptr) {
-        withdraw(worst->effect, worst->where);
-      } else if (const RunDifference* differs = most_different_between_runs()) {
-        withdraw(differs->effect, sentence_on(*differs, runs_));
-        result_.helps_here_only.back().by_run = differs->sizes;
-        selection_.exclude(same_force_as(differs->effect));
-        selection_.find_again();
-      } else if (const auto outdone =
-                     outdone_by_disturbance(search_, fits_.known(), fits_.judged(), reproductions_)) {
-        withdraw(outdone->effect, outdone->where);
-      } else {
-        options_.tell(0.94, "measuring the gap");
-        listing_ = list_effects(search_, fits_.judged(), fits_.effects());
-        if (listing_.raises) {
-          withdraw(*listing_.raises,
-                   "it helps the runs that were fitted, and takes held-out data further off");
-        } else {
-          fits_.fit_all_samples();
-          if (const auto uncertain = fits_.uncertain_effect()) {
-            withdraw(*uncertain, "its size is not certain once all samples are fitted");
-          } else if (const auto elsewhere_open = fits_.effect_with_open_phase()) {
-            withdraw(*elsewhere_open,
-                     "its phase at the zero of the cart is open, so its force is known only where it was "
-                     "measured");
-          } else {
-            return left;
-          }
-        }
-      }
-      left = settle();
+  /// What is left once all effects are gone that are not to be named.
+  ResidualTests without_local_effects(const ResidualTests& left) {
+    if (!withdraw_next()) return left;
+    do {
+      fits_.settle(withdrawn_);
+    } while (withdraw_next());
+    return what_is_left();
+  }
+
+  /// An effect that does not reproduce, or that takes held-out data further from the model, is not named: one
+  /// of these goes. False: there is none.
+  bool withdraw_next() {
+    options_.tell(0.93, "comparing parts of the data");
+    reproductions_ = reproduce(search_, fits_.known(), fits_.effects());
+    if (options_.quick && withdraw_doubtful()) return true;
+    const Reproduction* worst = nullptr;
+    for (const Reproduction& r : reproductions_)
+      if (is_contradicted(r, policy_.reproducibility) && (worst == nullptr || r.t_value < worst->t_value))
+        worst = &r;
+    if (worst != nullptr) return withdraw(worst->effect, worst->where);
+    if (const RunDifference* differs = most_different_between_runs()) {
+      withdraw(differs->effect, sentence_on(*differs, runs_));
+      result_.helps_here_only.back().by_run = differs->sizes;
+      selection_.exclude(same_force_as(differs->effect));
+      selection_.find_again();
+      return true;
     }
+    if (const auto outdone = outdone_by_disturbance(search_, fits_.known(), fits_.judged(), reproductions_))
+      return withdraw(outdone->effect, outdone->where);
+    options_.tell(0.94, "measuring the gap");
+    listing_ = list_effects(search_, fits_.judged(), fits_.effects());
+    if (listing_.raises)
+      return withdraw(*listing_.raises,
+                      "it helps the runs that were fitted, and takes held-out data further off");
+    fits_.fit_all_samples();
+    if (const auto uncertain = fits_.uncertain_effect())
+      return withdraw(*uncertain, "its size is not certain once all samples are fitted");
+    if (const auto open = fits_.effect_with_open_phase())
+      return withdraw(*open,
+                      "its phase at the zero of the cart is open, so its force is known only where it was "
+                      "measured");
+    return false;
+  }
+
+  bool withdraw_doubtful() {
+    const std::vector<std::size_t> doubtful = doubtful_effects(reproductions_, search_);
+    for (const std::size_t effect : doubtful)
+      if (!withdrawn_.contains(effect))
+        withdraw(effect, "not certain enough for a quick diagnosis: repeat it without --quick");
+    return !doubtful.empty();
   }
 
   /// Of the effects that need not help on a further run, the one whose sizes differ most certainly; else
@@ -310,7 +313,8 @@ class Diagnostician {
     return most;
   }
 
-  void withdraw(std::size_t effect, const std::string& where) {
+  /// Returns true, for something has changed.
+  bool withdraw(std::size_t effect, const std::string& where) {
     for (const std::size_t gone : selection_.withdraw(effect)) {
       LocalEffect local{gone, estimates_of(gone, fits_.known()), where, {}, {}};
       if (gone != effect) local.where = "it cannot be without " + kind_of(effect);
@@ -319,6 +323,7 @@ class Diagnostician {
       result_.helps_here_only.push_back(local);
       withdrawn_.insert(gone);
     }
+    return true;
   }
 
   void conclude(const ResidualTests& tests) {

@@ -80,6 +80,7 @@ FitResult fit_initial_state_through_noise(const FitData& segment, FitPoint point
   for (const double share : {1.0, 0.1, 0.01, 1e-3}) {
     point.noise.force = std::max(wanted.force, 0.1 * share);
     point.noise.torque = std::max(wanted.torque, 0.01 * share);
+    if (point.noise.force == wanted.force && point.noise.torque == wanted.torque) break;
     const FitResult carried = fit(segment, point, {}, options);
     work_samples += carried.work_samples;
     if (std::isfinite(carried.objective)) point.starts = carried.point.starts;
