@@ -15,7 +15,7 @@ import tempfile
 
 TOOLS = {"compiler": "clang++-14", "tidy": "clang-tidy-14"}
 # Options of g++ that clang does not support.
-FOREIGN = re.compile(r"--param|(ggc-min-heapsize|inline-unit-growth)=.*|-fno-gnu-unique|-fno-sanitize-recover.*|-ffp-contract=.*|-mmemset-strategy=.*|-Wno-maybe-uninitialized|-W(all|extra|pedantic|shadow|error)")
+FOREIGN = re.compile(r"--param|ggc-min-heapsize=.*|-fno-gnu-unique|-fno-sanitize-recover.*|-ffp-contract=.*|-mmemset-strategy=.*|-Wno-maybe-uninitialized|-W(all|extra|pedantic|shadow|error)")
 
 
 def flags_of(command):

@@ -1,5 +1,6 @@
 #include "gauss_newton.hpp"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <array>
 #include <atomic>
@@ -10,7 +11,6 @@
 #include <utility>
 
 #include "base/parallel.hpp"
-#include "model/dense_algebra.hpp"
 #include "parameter_equations.hpp"
 #include "state_vector.hpp"
 
@@ -19,12 +19,13 @@ namespace upright {
 namespace {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
+using Matrix = Eigen::MatrixXd;
 
 /// Information on the initial state beyond the data: nearly none, enough to keep unmeasured states in place.
 constexpr double start_information[state_count] = {1.0, 1.0, 0.1, 0.01, 1e4};
 
 /// By how much a quadratic objective falls along a way.
-double promise(const Eigen::MatrixXd& information, const Eigen::VectorXd& slope, const Eigen::VectorXd& way) {
+double promise(const Matrix& information, const Eigen::VectorXd& slope, const Eigen::VectorXd& way) {
   return 2.0 * slope.dot(way) - way.dot(information * way);
 }
 
@@ -71,7 +72,7 @@ double Prior::objective(const Plant& plant) const {
 /// The normal equations of the parameters, with the initial states eliminated (Schur complement). The initial
 /// state of segment s moves by base[s] - back[s] * (step of the parameters).
 struct GaussNewton::ReducedEquations {
-  Eigen::MatrixXd information;
+  Matrix information;
   Eigen::VectorXd score;
   std::vector<Eigen::Matrix<double, state_count, Eigen::Dynamic>> back;
   std::vector<Eigen::Matrix<double, state_count, 1>> base;
@@ -198,13 +199,12 @@ GaussNewton::ReducedEquations GaussNewton::eliminate_initial_states(double dampi
   reduced.base.resize(linearised_.size());
   for (std::size_t s = 0; s < linearised_.size(); ++s) {
     const NormalEquations& n = linearised_[s].normal;
-    Eigen::MatrixXd hii = n.information.topLeftCorner(state_count, state_count);
+    Eigen::Matrix<double, state_count, state_count> hii =
+        n.information.topLeftCorner<state_count, state_count>();
     for (int i = 0; i < state_count; ++i) hii(i, i) += start_information[i] + damping * hii(i, i);
-    Eigen::MatrixXd right(state_count, np + 1);
-    right << n.information.topRightCorner(state_count, np), n.score.head(state_count);
-    const Eigen::MatrixXd solved = solve_symmetric(hii, right);
-    reduced.back[s] = solved.leftCols(np);
-    reduced.base[s] = solved.col(np);
+    const Eigen::LDLT<Eigen::Matrix<double, state_count, state_count>> solver(hii);
+    reduced.back[s] = solver.solve(n.information.topRightCorner(state_count, np));
+    reduced.base[s] = solver.solve(n.score.head<state_count>());
     reduced.information += n.information.bottomRightCorner(np, np) -
                            n.information.bottomLeftCorner(np, state_count) * reduced.back[s];
     reduced.score += n.score.tail(np) - n.information.bottomLeftCorner(np, state_count) * reduced.base[s];
@@ -215,9 +215,9 @@ GaussNewton::ReducedEquations GaussNewton::eliminate_initial_states(double dampi
 namespace {
 
 ParameterEquations without_initial_state(const NormalEquations& n, Eigen::Index np) {
-  Eigen::MatrixXd hii = n.information.topLeftCorner(state_count, state_count);
+  Matrix hii = n.information.topLeftCorner(state_count, state_count);
   for (int i = 0; i < state_count; ++i) hii(i, i) += start_information[i];
-  const Eigen::MatrixXd back = solve_symmetric(hii, n.information.topRightCorner(state_count, np));
+  const Matrix back = Eigen::LDLT<Matrix>(hii).solve(n.information.topRightCorner(state_count, np));
   return {n.information.bottomRightCorner(np, np) - n.information.bottomLeftCorner(np, state_count) * back,
           n.score.tail(np) - back.transpose() * n.score.head(state_count)};
 }
@@ -238,7 +238,7 @@ std::vector<ParameterEquations> parameter_equations(const FitData& data, const F
 
 GaussNewton::Information GaussNewton::information() const {
   const auto np = static_cast<Eigen::Index>(free_.size());
-  Eigen::MatrixXd h = prior_.information(), spread = Eigen::MatrixXd::Zero(np, np);
+  Matrix h = prior_.information(), spread = Matrix::Zero(np, np);
   for (const LinearisedSegment& segment : linearised_) {
     const ParameterEquations reduced = without_initial_state(segment.normal, np);
     h += reduced.information;
@@ -334,7 +334,7 @@ Eigen::VectorXd GaussNewton::solve_for(const std::vector<Eigen::Index>& moving,
   const auto n = static_cast<Eigen::Index>(moving.size());
   const auto number = [&](Eigen::Index a) { return moving[static_cast<std::size_t>(a)]; };
   const auto scale = [&](Eigen::Index a) { return free_[static_cast<std::size_t>(number(a))].scale; };
-  Eigen::MatrixXd small(n, n);
+  Matrix small(n, n);
   Eigen::VectorXd right(n);
   for (Eigen::Index a = 0; a < n; ++a) {
     right[a] = reduced.score[number(a)] * scale(a);
@@ -342,7 +342,7 @@ Eigen::VectorXd GaussNewton::solve_for(const std::vector<Eigen::Index>& moving,
       small(a, b) = reduced.information(number(a), number(b)) * scale(a) * scale(b);
   }
   for (Eigen::Index a = 0; a < n; ++a) small(a, a) += damping * small(a, a) + 1e-6;
-  return solve_symmetric(small, right);
+  return small.ldlt().solve(right);
 }
 
 }  // namespace upright

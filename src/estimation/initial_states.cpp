@@ -1,5 +1,5 @@
 // The initial states of segments: a guess from the data alone, and their fit with plant and noise held.
-#include <Eigen/Core>
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -8,7 +8,6 @@
 
 #include "base/parallel.hpp"
 #include "fit.hpp"
-#include "model/dense_algebra.hpp"
 #include "sensor_gains.hpp"
 
 namespace upright {
@@ -36,7 +35,7 @@ std::pair<double, double> local_fit(const std::vector<double>& t, const std::vec
     constant = constant && y[i] == y[k];
   }
   if (constant) return {y[k], 0.0};
-  const Eigen::Vector3d fitted = solve_symmetric(h + 1e-12 * Eigen::Matrix3d::Identity(), g);
+  const Eigen::Vector3d fitted = (h + 1e-12 * Eigen::Matrix3d::Identity()).ldlt().solve(g);
   return {y[k] + fitted[0], fitted[1] / width_s};
 }
 
@@ -80,7 +79,6 @@ FitResult fit_initial_state_through_noise(const FitData& segment, FitPoint point
   for (const double share : {1.0, 0.1, 0.01, 1e-3}) {
     point.noise.force = std::max(wanted.force, 0.1 * share);
     point.noise.torque = std::max(wanted.torque, 0.01 * share);
-    if (point.noise.force == wanted.force && point.noise.torque == wanted.torque) break;
     const FitResult carried = fit(segment, point, {}, options);
     work_samples += carried.work_samples;
     if (std::isfinite(carried.objective)) point.starts = carried.point.starts;

@@ -1,6 +1,6 @@
 #include "noise_floor.hpp"
 
-#include <Eigen/Core>
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "base/parallel.hpp"
-#include "model/dense_algebra.hpp"
 #include "state_vector.hpp"
 
 namespace upright {
@@ -38,14 +37,14 @@ class InitialStateFit {
     scale_ = information.diagonal().unaryExpr([](double v) { return v > 0.0 ? 1.0 / std::sqrt(v) : 0.0; });
     Transition unit = scale_.asDiagonal() * information * scale_.asDiagonal();
     unit.diagonal().array() += 1e-9;
-    covariance_ = solve_symmetric(unit, Transition::Identity());
+    solver_.compute(unit);
   }
 
   /// The weighted sum of squares that is left of these residuals, in the order of steps and channels.
   double left_of(const std::vector<double>& residuals) const {
     State score = State::Zero();
     for (std::size_t k = 0; k < residuals.size(); ++k) score += weights_[k] * residuals[k] * rows_[k];
-    const State fitted = scale_.asDiagonal() * State(covariance_ * State(scale_.asDiagonal() * score));
+    const State fitted = scale_.asDiagonal() * State(solver_.solve(State(scale_.asDiagonal() * score)));
     double sum = 0.0;
     for (std::size_t k = 0; k < residuals.size(); ++k) {
       const double left = residuals[k] - rows_[k].dot(fitted);
@@ -60,7 +59,7 @@ class InitialStateFit {
   std::vector<State> rows_;  ///< derivatives of the residuals with respect to the initial state
   std::vector<double> weights_;
   State scale_;
-  Transition covariance_;  ///< of the initial state, in units of `scale_`
+  Eigen::LDLT<Transition> solver_;
   double count_ = 0.0;
 };
 

@@ -1,45 +1,46 @@
 #include "parameter_covariance.hpp"
 
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
-
-#include "model/dense_algebra.hpp"
 
 namespace upright {
 
 namespace {
 
+using Matrix = Eigen::MatrixXd;
+
 /// Inverse of an information matrix. What holds no information at all is left out (zeros); combinations of
 /// the others that hold none are as good as unknown.
-Eigen::MatrixXd inverse_of(const Eigen::MatrixXd& h) {
+Matrix inverse_of(const Matrix& h) {
   const Eigen::VectorXd scale =
       h.diagonal().unaryExpr([](double v) { return v > 1e-200 ? 1.0 / std::sqrt(v) : 0.0; });
-  const SymmetricEigen eigen = symmetric_eigen(scale.asDiagonal() * h * scale.asDiagonal());
+  const Eigen::SelfAdjointEigenSolver<Matrix> solver(scale.asDiagonal() * h * scale.asDiagonal());
   constexpr double min_eigenvalue = 1e-13;
-  const Eigen::VectorXd inverse = eigen.values.cwiseMax(min_eigenvalue).cwiseInverse();
-  const Eigen::MatrixXd vectors = scale.asDiagonal() * eigen.vectors;
-  return vectors * inverse.asDiagonal() * vectors.transpose();
+  const Eigen::VectorXd inverse = solver.eigenvalues().cwiseMax(min_eigenvalue).cwiseInverse();
+  return scale.asDiagonal() * solver.eigenvectors() * inverse.asDiagonal() *
+         solver.eigenvectors().transpose() * scale.asDiagonal();
 }
 
 /// The scatter of the scores over segments, but in no direction less than the likelihood itself says: noise
 /// that is whiter than it looks must not shrink an interval.
-Eigen::MatrixXd robust_spread(const Eigen::MatrixXd& information, const Eigen::MatrixXd& spread) {
+Matrix robust_spread(const Matrix& information, const Matrix& spread) {
   const Eigen::VectorXd scale = information.diagonal().cwiseMax(1e-300).cwiseSqrt();
   const Eigen::VectorXd unscale = scale.cwiseInverse();
-  Eigen::MatrixXd unit = unscale.asDiagonal() * information * unscale.asDiagonal();
+  Matrix unit = unscale.asDiagonal() * information * unscale.asDiagonal();
   unit.diagonal().array() += 1e-12;
-  const SymmetricEigen eigen = symmetric_eigen(unit);
-  if (!(eigen.values.minCoeff() > 0.0)) return information;
-  const Eigen::VectorXd root = eigen.values.cwiseSqrt();
-  // Columns of unit information; the scatter in their directions.
-  const Eigen::MatrixXd whitening = unscale.asDiagonal() * eigen.vectors * root.cwiseInverse().asDiagonal();
-  const SymmetricEigen scatter = symmetric_eigen(whitening.transpose() * spread * whitening);
-  const Eigen::VectorXd raised = scatter.values.cwiseMax(1.0);
-  const Eigen::MatrixXd half = scale.asDiagonal() * eigen.vectors * root.asDiagonal() * scatter.vectors;
+  const Eigen::LLT<Matrix> root(unit);
+  if (root.info() != Eigen::Success) return information;
+  Matrix relative = root.matrixL().solve(Matrix(unscale.asDiagonal() * spread * unscale.asDiagonal()));
+  relative = root.matrixL().solve(Matrix(relative.transpose()));
+  const Eigen::SelfAdjointEigenSolver<Matrix> solver(0.5 * (relative + relative.transpose()));
+  const Eigen::VectorXd raised = solver.eigenvalues().cwiseMax(1.0);
+  const Matrix half = scale.asDiagonal() * Matrix(root.matrixL()) * solver.eigenvectors();
   return half * raised.asDiagonal() * half.transpose();
 }
 
-Eigen::MatrixXd without_held(Eigen::MatrixXd h, const std::vector<bool>& held) {
+Matrix without_held(Matrix h, const std::vector<bool>& held) {
   for (std::size_t j = 0; j < held.size(); ++j) {
     if (!held[j]) continue;
     const auto at = static_cast<Eigen::Index>(j);
@@ -51,22 +52,22 @@ Eigen::MatrixXd without_held(Eigen::MatrixXd h, const std::vector<bool>& held) {
 
 }  // namespace
 
-Eigen::MatrixXd sandwich_covariance(const Eigen::MatrixXd& information, const Eigen::MatrixXd& spread,
-                                    const Eigen::MatrixXd& prior, const std::vector<bool>& held) {
-  const Eigen::MatrixXd inverse = inverse_of(without_held(information, held));
+Matrix sandwich_covariance(const Matrix& information, const Matrix& spread, const Matrix& prior,
+                           const std::vector<bool>& held) {
+  const Matrix inverse = inverse_of(without_held(information, held));
   return inverse * (robust_spread(information - prior, spread) + prior) * inverse;
 }
 
-double dispersion(const Eigen::MatrixXd& information, const Eigen::MatrixXd& spread) {
+double dispersion(const Matrix& information, const Matrix& spread) {
   const Eigen::VectorXd scale =
       information.diagonal().unaryExpr([](double v) { return v > 1e-200 ? 1.0 / std::sqrt(v) : 0.0; });
-  const SymmetricEigen eigen = symmetric_eigen(scale.asDiagonal() * information * scale.asDiagonal());
+  const Eigen::SelfAdjointEigenSolver<Matrix> solver(scale.asDiagonal() * information * scale.asDiagonal());
   constexpr double min_eigenvalue = 1e-9;
   double sum = 0.0, directions = 0.0;
-  for (Eigen::Index i = 0; i < eigen.values.size(); ++i) {
-    if (!(eigen.values[i] > min_eigenvalue)) continue;
-    const Eigen::VectorXd way = scale.cwiseProduct(eigen.vectors.col(i));
-    sum += way.dot(spread * way) / eigen.values[i];
+  for (Eigen::Index i = 0; i < solver.eigenvalues().size(); ++i) {
+    if (!(solver.eigenvalues()[i] > min_eigenvalue)) continue;
+    const Eigen::VectorXd way = scale.cwiseProduct(solver.eigenvectors().col(i));
+    sum += way.dot(spread * way) / solver.eigenvalues()[i];
     directions += 1.0;
   }
   return directions > 0.0 ? std::max(sum / directions, 1.0) : 1.0;

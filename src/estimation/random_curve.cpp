@@ -1,5 +1,6 @@
 #include "random_curve.hpp"
 
+#include <Eigen/Cholesky>
 #include <cmath>
 #include <cstdlib>
 #include <numbers>
@@ -31,7 +32,7 @@ struct PrincipalAxes {
   Eigen::VectorXd information, score;
 
   PrincipalAxes(const CurveEquations& equations, const CurveNodes& nodes, double length) {
-    const Eigen::MatrixXd factor = cholesky_factor(correlation(nodes, length));
+    const Eigen::MatrixXd factor = correlation(nodes, length).llt().matrixL();
     const SymmetricEigen axes = symmetric_eigen(factor.transpose() * equations.information * factor);
     values = factor * axes.vectors;
     information = axes.values.cwiseMax(0.0);
@@ -87,7 +88,7 @@ Eigen::VectorXd RandomCurve::mean(const CurveEquations& equations) const {
 
 Eigen::MatrixXd RandomCurve::prior_information(const CurveNodes& nodes) const {
   const auto n = static_cast<Eigen::Index>(nodes.count);
-  return solve_symmetric(correlation(nodes, length_), Eigen::MatrixXd::Identity(n, n)) / variance_;
+  return correlation(nodes, length_).llt().solve(Eigen::MatrixXd::Identity(n, n)) / variance_;
 }
 
 }  // namespace upright

@@ -1,11 +1,10 @@
 #include "smoother.hpp"
 
-#include <Eigen/Core>
+#include <Eigen/Cholesky>
 #include <array>
 #include <cmath>
 
 #include "base/parallel.hpp"
-#include "model/dense_algebra.hpp"
 #include "state_vector.hpp"
 
 namespace upright {
@@ -89,7 +88,7 @@ std::vector<Vector> smooth(const std::vector<Filtered>& passes) {
       const Filtered& next = passes[k + 1];
       Matrix ahead = next.predicted_covariance;
       ahead.diagonal().array() += 1e-14;
-      const Matrix gain = solve_symmetric(ahead, next.transition * passes[k].covariance).transpose();
+      const Matrix gain = ahead.ldlt().solve(next.transition * passes[k].covariance).transpose();
       value = passes[k].mean + gain * (value - next.predicted_mean);
     }
     smoothed[k] = value;

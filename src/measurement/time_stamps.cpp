@@ -1,10 +1,8 @@
 #include "time_stamps.hpp"
 
-#include <Eigen/Core>
+#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
-
-#include "model/dense_algebra.hpp"
 
 namespace upright {
 
@@ -32,7 +30,7 @@ double left_of(const Window& time, const Window& values) {
     for (Eigen::Index j = 0; j < coefficients; ++j) basis(i, j) = j == 0 ? 1.0 : basis(i, j - 1) * u;
   }
   const Window centred = values.array() - values.mean();
-  return (centred - basis * least_squares(basis, centred)).squaredNorm();
+  return (centred - basis * basis.householderQr().solve(centred).eval()).squaredNorm();
 }
 
 /// First rows of windows without a gap in them.

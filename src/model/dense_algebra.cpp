@@ -54,16 +54,8 @@ std::pair<MatrixXd, VectorXd> least_squares(const MatrixXd& a, const MatrixXd& b
   return {factored.solve(b), factored.solve(c)};
 }
 
-VectorXd least_squares(const MatrixXd& a, const VectorXd& b) {
-  return a.completeOrthogonalDecomposition().solve(b);
-}
-
 MatrixXd solve_symmetric(const MatrixXd& a, const MatrixXd& b) {
   return a.ldlt().solve(b);
-}
-
-MatrixXd cholesky_factor(const MatrixXd& matrix) {
-  return matrix.llt().matrixL();
 }
 
 VectorXd symmetric_pivots(const MatrixXd& matrix) {

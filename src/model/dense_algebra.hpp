@@ -40,14 +40,9 @@ std::pair<Eigen::MatrixXd, Eigen::MatrixXd> solve_both(const Eigen::MatrixXd& a,
 /// The shortest x and y that minimise |a x - b| and |a y - c|, with one complete orthogonal decomposition.
 std::pair<Eigen::MatrixXd, Eigen::VectorXd> least_squares(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b,
                                                           const Eigen::VectorXd& c);
-/// The shortest x that minimises |a x - b|.
-Eigen::VectorXd least_squares(const Eigen::MatrixXd& a, const Eigen::VectorXd& b);
 
 /// Solution x of a x = b for a symmetric n x n matrix that is positive or negative semidefinite.
 Eigen::MatrixXd solve_symmetric(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b);
-
-/// The lower triangular L with L L' = a symmetric positive definite n x n matrix.
-Eigen::MatrixXd cholesky_factor(const Eigen::MatrixXd& matrix);
 
 /// The n diagonal entries of D in P'LDL'P = a symmetric n x n matrix; their product is its determinant.
 Eigen::VectorXd symmetric_pivots(const Eigen::MatrixXd& matrix);
