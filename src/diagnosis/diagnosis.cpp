@@ -216,6 +216,7 @@ class Diagnostician {
     return what_is_left();
   }
 
+  /// At the settled model.
   ResidualTests what_is_left() const {
     options_.tell(0.92, "measuring the gap");
     // At what all runs say, so that what few training runs left uncertain is not taken for something missing.
@@ -268,7 +269,10 @@ class Diagnostician {
     for (const Reproduction& r : reproductions_)
       if (is_contradicted(r, policy_.reproducibility) && (worst == nullptr || r.t_value < worst->t_value))
         worst = &r;
-    if (worst != nullptr) return withdraw(worst->effect, worst->where);
+    if (worst != nullptr) {
+      withdraw(worst->effect, worst->where);
+      return true;
+    }
     if (const RunDifference* differs = most_different_between_runs()) {
       withdraw(differs->effect, sentence_on(*differs, runs_));
       result_.helps_here_only.back().by_run = differs->sizes;
@@ -276,23 +280,30 @@ class Diagnostician {
       selection_.find_again();
       return true;
     }
-    if (const auto outdone = outdone_by_disturbance(search_, fits_.known(), fits_.judged(), reproductions_))
-      return withdraw(outdone->effect, outdone->where);
+    if (const auto outdone = outdone_by_disturbance(search_, fits_.known(), fits_.judged(), reproductions_)) {
+      withdraw(outdone->effect, outdone->where);
+      return true;
+    }
     options_.tell(0.94, "measuring the gap");
     listing_ = list_effects(search_, fits_.judged(), fits_.effects());
-    if (listing_.raises)
-      return withdraw(*listing_.raises,
-                      "it helps the runs that were fitted, and takes held-out data further off");
+    if (listing_.raises) {
+      withdraw(*listing_.raises, "it helps the runs that were fitted, and takes held-out data further off");
+      return true;
+    }
     fits_.fit_all_samples();
-    if (const auto uncertain = fits_.uncertain_effect())
-      return withdraw(*uncertain, "its size is not certain once all samples are fitted");
-    if (const auto open = fits_.effect_with_open_phase())
-      return withdraw(*open,
-                      "its phase at the zero of the cart is open, so its force is known only where it was "
-                      "measured");
+    if (const auto uncertain = fits_.uncertain_effect()) {
+      withdraw(*uncertain, "its size is not certain once all samples are fitted");
+      return true;
+    }
+    if (const auto open = fits_.effect_with_open_phase()) {
+      withdraw(*open,
+               "its phase at the zero of the cart is open, so its force is known only where it was measured");
+      return true;
+    }
     return false;
   }
 
+  /// Of a quick diagnosis: all that are not certain enough go. False: there are none.
   bool withdraw_doubtful() {
     const std::vector<std::size_t> doubtful = doubtful_effects(reproductions_, search_);
     for (const std::size_t effect : doubtful)
@@ -313,8 +324,7 @@ class Diagnostician {
     return most;
   }
 
-  /// Returns true, for something has changed.
-  bool withdraw(std::size_t effect, const std::string& where) {
+  void withdraw(std::size_t effect, const std::string& where) {
     for (const std::size_t gone : selection_.withdraw(effect)) {
       LocalEffect local{gone, estimates_of(gone, fits_.known()), where, {}, {}};
       if (gone != effect) local.where = "it cannot be without " + kind_of(effect);
@@ -323,7 +333,6 @@ class Diagnostician {
       result_.helps_here_only.push_back(local);
       withdrawn_.insert(gone);
     }
-    return true;
   }
 
   void conclude(const ResidualTests& tests) {
