@@ -62,6 +62,9 @@ LinearSampledLoop::LinearSampledLoop(const Plant& plant, const ControlConfig& co
   if (predicts) add_prediction(config);
   base_delay_s_ = predicts || extra == ExtraDelay::unmodelled ? config.delay_s : 0.0;
   lined_delay_s_ = base_delay_s_;
+  MatrixXd inputs(a_.rows(), static_cast<Index>(entries_.size()));
+  for (std::size_t i = 0; i < entries_.size(); ++i) inputs.col(static_cast<Index>(i)) = entries_[i].per_volt;
+  response_ = FrequencyResponse(a_, inputs, fed_back_ * shows_);
 }
 
 void LinearSampledLoop::resize(Index states) {
@@ -158,15 +161,12 @@ Complex LinearSampledLoop::line(Complex z, double delay_s) const {
 }
 
 Complex LinearSampledLoop::transfer(Complex z) const {
-  Eigen::MatrixXcd m = -a_.cast<Complex>();
-  m.diagonal().array() += z;
   const Complex lined = line(z, lined_delay_s_);
+  const Eigen::RowVectorXcd per_entry = response_.at(z);
   Complex through_plant = 0.0, believed = 0.0;
-  const Eigen::RowVectorXcd row = (fed_back_ * shows_).cast<Complex>();
-  for (const Entry& entry : entries_) {
-    const Eigen::VectorXcd states = solve(m, entry.per_volt.cast<Complex>());
-    (entry.actuator ? through_plant : believed) += (row * states)(0) * lined * std::pow(z, -entry.periods);
-  }
+  for (std::size_t i = 0; i < entries_.size(); ++i)
+    (entries_[i].actuator ? through_plant : believed) +=
+        per_entry(static_cast<Index>(i)) * lined * std::pow(z, -entries_[i].periods);
   const Complex rest = 1.0 - predicted_voltages(z);
   return extra_ == ExtraDelay::known ? (through_plant + believed) / rest : through_plant / (rest - believed);
 }

@@ -7,6 +7,7 @@
 #include <complex>
 #include <vector>
 
+#include "frequency_response.hpp"
 #include "upright/control/gain_file.hpp"
 #include "upright/model/plant.hpp"
 
@@ -83,6 +84,7 @@ class LinearSampledLoop {
   Eigen::MatrixXd shows_;        ///< 6 x states: the contents of a ControlState
   Eigen::RowVectorXd fed_back_;  ///< 1 x 6, of the fed-back states
   Prediction prediction_;
+  FrequencyResponse response_;  ///< of what is fed back to each of the entries
 };
 
 }  // namespace upright

@@ -18,6 +18,12 @@ SymmetricEigen symmetric_eigen(const MatrixXd& matrix) {
   return {solver.eigenvalues(), solver.eigenvectors()};
 }
 
+std::optional<SchurForm> schur_form(const MatrixXd& matrix) {
+  const Eigen::ComplexSchur<MatrixXcd> factored(matrix.cast<std::complex<double>>());
+  if (factored.info() != Eigen::Success) return std::nullopt;
+  return SchurForm{factored.matrixT(), factored.matrixU()};
+}
+
 MatrixXd inverse(const MatrixXd& matrix) {
   return matrix.inverse();
 }

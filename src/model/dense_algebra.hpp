@@ -18,6 +18,13 @@ struct SymmetricEigen {
 };
 SymmetricEigen symmetric_eigen(const Eigen::MatrixXd& matrix);
 
+/// An n x n matrix = u t u^H with u unitary and t upper triangular. Absent where the iteration does not
+/// converge, as with entries that are not finite.
+struct SchurForm {
+  Eigen::MatrixXcd t, u;
+};
+std::optional<SchurForm> schur_form(const Eigen::MatrixXd& matrix);
+
 /// Inverse of a regular n x n matrix.
 Eigen::MatrixXd inverse(const Eigen::MatrixXd& matrix);
 

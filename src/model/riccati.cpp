@@ -1,8 +1,9 @@
 #include "riccati.hpp"
 
-#include <Eigen/Eigenvalues>
+#include <Eigen/Jacobi>
 #include <algorithm>
 #include <complex>
+#include <optional>
 
 #include "dense_algebra.hpp"
 #include "linear_plant.hpp"
@@ -16,11 +17,6 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 using ComplexMatrix = Eigen::MatrixXcd;
-
-struct SchurForm {
-  ComplexMatrix t;
-  ComplexMatrix u;
-};
 
 /// Exchanges the diagonal entries k and k + 1 of the triangular factor by one rotation.
 void exchange(SchurForm& schur, Index k) {
@@ -95,16 +91,14 @@ RiccatiSolution solve_continuous_riccati(const MatrixXd& a, const VectorXd& b, c
   const Index n = a.rows();
   MatrixXd hamiltonian(2 * n, 2 * n);
   hamiltonian << a, -b * b.transpose() / r, -q, -a.transpose();
-  const Eigen::ComplexSchur<ComplexMatrix> factored(hamiltonian.cast<std::complex<double>>());
-  SchurForm schur{factored.matrixT(), factored.matrixU()};
-  const double smallest = schur.t.diagonal().real().cwiseAbs().minCoeff();
+  std::optional<SchurForm> schur = schur_form(hamiltonian);
   constexpr double on_the_axis = 1e-13;
-  if (factored.info() != Eigen::Success || order_stable_first(schur) != n ||
-      smallest < on_the_axis * hamiltonian.cwiseAbs().maxCoeff())
+  const double nearest = on_the_axis * hamiltonian.cwiseAbs().maxCoeff();
+  if (!schur || order_stable_first(*schur) != n || schur->t.diagonal().real().cwiseAbs().minCoeff() < nearest)
     refuse(a, b, q,
            "the matrix pair (A, b) is not stabilizable or (A, Q) is not detectable, so the Hamiltonian "
            "matrix has eigenvalues on the imaginary axis");
-  const ComplexMatrix top = schur.u.topLeftCorner(n, n), bottom = schur.u.bottomLeftCorner(n, n);
+  const ComplexMatrix top = schur->u.topLeftCorner(n, n), bottom = schur->u.bottomLeftCorner(n, n);
   const ComplexMatrix x = solve_from_right(top, bottom);
   RiccatiSolution solution;
   solution.x = symmetric_part(x.real());
