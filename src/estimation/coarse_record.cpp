@@ -4,6 +4,8 @@
 #include <cmath>
 #include <cstddef>
 
+#include "segments.hpp"
+
 namespace upright {
 
 namespace {
@@ -45,20 +47,16 @@ bool may_replace(const Measurement& run, double accelerates_mps2_per_v, double l
 }
 
 /// The samples of a run that are kept.
-std::vector<std::size_t> kept_samples(const Measurement& run, const Plant& plant, const Thinning& thinning,
+std::vector<std::size_t> kept_samples(const Measurement& run, double period_s,
                                       const std::vector<std::size_t>& gaps) {
   constexpr double slack_periods = 0.1;  // time stamps scatter
-  const double longest_s = thinning.period_s + slack_periods * run.median_period_s();
-  const double accelerates_mps2_per_v = std::abs(plant.motor.force_per_volt_n) / plant.cart_mass_kg;
+  const double longest_s = period_s + slack_periods * run.median_period_s();
   std::vector<std::size_t> kept = {0};
   for (std::size_t k = 1; k < run.size(); ++k) {
     const bool next_too_late = k + 1 == run.size() || run.time_s[k + 1] - run.time_s[kept.back()] > longest_s;
     const bool at_gap = std::binary_search(gaps.begin(), gaps.end(), k) ||
                         std::binary_search(gaps.begin(), gaps.end(), k + 1);
-    if (!next_too_late && !at_gap &&
-        may_replace(run, accelerates_mps2_per_v, thinning.largest_shift, kept.back(), k + 1))
-      continue;
-    kept.push_back(k);
+    if (next_too_late || at_gap) kept.push_back(k);
   }
   return kept;
 }
@@ -71,27 +69,45 @@ std::vector<double> at(const std::vector<double>& values, const std::vector<std:
   return some;
 }
 
-/// Over the time from each kept sample to the next.
-std::vector<double> mean_voltage(const Measurement& run, const std::vector<std::size_t>& kept) {
-  std::vector<double> means;
-  means.reserve(kept.size());
-  for (std::size_t i = 0; i + 1 < kept.size(); ++i) {
-    double sum = 0.0;
-    for (std::size_t k = kept[i]; k < kept[i + 1]; ++k)
-      sum += run.voltage_v[k] * (run.time_s[k + 1] - run.time_s[k]);
-    means.push_back(kept[i + 1] == kept[i] + 1 ? run.voltage_v[kept[i]]
-                                               : sum / (run.time_s[kept[i + 1]] - run.time_s[kept[i]]));
+double impulse_vs(const Measurement& run, std::size_t first, std::size_t end) {
+  double sum = 0.0;
+  for (std::size_t k = first; k < end; ++k) sum += run.voltage_v[k] * (run.time_s[k + 1] - run.time_s[k]);
+  return sum;
+}
+
+double mean_voltage(const Measurement& run, std::size_t first, std::size_t end) {
+  const auto from = run.voltage_v.begin();
+  const bool constant =
+      std::all_of(from + static_cast<std::ptrdiff_t>(first), from + static_cast<std::ptrdiff_t>(end),
+                  [&](double v) { return v == run.voltage_v[first]; });
+  if (constant || end == run.size()) return run.voltage_v[first];
+  return impulse_vs(run, first, end) / (run.time_s[end] - run.time_s[first]);
+}
+
+/// Fills the commands of a coarse run, and the mean from each sample to the next.
+void set_voltages(const Measurement& run, const Plant& plant, const Thinning& thinning,
+                  const std::vector<std::size_t>& kept, Measurement& coarse) {
+  const double accelerates_mps2_per_v = std::abs(plant.motor.force_per_volt_n) / plant.cart_mass_kg;
+  coarse.voltage_v.clear();
+  for (std::size_t i = 0; i < kept.size(); ++i) {
+    const std::size_t first = kept[i], next = i + 1 < kept.size() ? kept[i + 1] : run.size();
+    coarse.voltage_v.push_back(mean_voltage(run, first, next));
+    coarse.first_command.push_back(coarse.commands.size());
+    for (std::size_t k = first, end; k < next; k = end) {
+      end = k + 1;
+      while (end < next && may_replace(run, accelerates_mps2_per_v, thinning.largest_shift, k, end + 1))
+        ++end;
+      coarse.commands.push_back({run.time_s[k], mean_voltage(run, k, end)});
+    }
   }
-  means.push_back(run.voltage_v[kept.back()]);
-  return means;
 }
 
 Measurement coarse_run(const Measurement& run, const Plant& plant, const Thinning& thinning) {
   const std::vector<std::size_t> gaps = gaps_in(run);
-  const std::vector<std::size_t> kept = kept_samples(run, plant, thinning, gaps);
+  const std::vector<std::size_t> kept = kept_samples(run, thinning.period_s, gaps);
   Measurement coarse = run;
   coarse.time_s = at(run.time_s, kept);
-  coarse.voltage_v = mean_voltage(run, kept);
+  set_voltages(run, plant, thinning, kept, coarse);
   coarse.cart_m = at(run.cart_m, kept);
   coarse.theta_rad = at(run.theta_rad, kept);
   if (!run.cart_weight.empty()) coarse.cart_weight = dwell_weights(coarse.cart_m);

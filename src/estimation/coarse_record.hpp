@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "segments.hpp"
+#include "upright/measurement/measurement.hpp"
 #include "upright/model/plant.hpp"
 
 namespace upright {
@@ -13,9 +13,9 @@ struct Thinning {
   double largest_shift;  ///< by how much a mean voltage may move the cart [of the noise of its sensor]
 };
 
-/// Every few samples of each run. Between two of them the voltage is held at its mean. Samples are kept
-/// wherever the voltage changes while the cart may stick, and wherever the mean would move the cart too far.
-/// Gaps stay gaps.
+/// Samples of each run that are at most about `period_s` apart. Their voltages are `commands`: of several in a
+/// row one with their mean, but all where the cart may stick, or where the mean would move it too far.
+/// `voltage_v` is the mean from each sample to the next. Gaps stay gaps.
 std::vector<Measurement> coarse_runs(const std::vector<Measurement>& runs, const Plant& plant,
                                      const Thinning& thinning);
 

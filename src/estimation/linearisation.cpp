@@ -124,7 +124,7 @@ class SegmentLineariser {
       : run_(run),
         segment_(segment),
         columns_(state_count + static_cast<int>(free.size())),
-        simulator_(model_of(run, point.plant, free), engine_options(), 64 + segment.last - segment.first),
+        simulator_(model_of(run, point.plant, free), engine_options(), max_commands(run, segment)),
         sensors_(sensor_gains(dynamics())),
         shown_of_speed_s_(shown_of_cart_speed_s(dynamics())),
         noise_input_(point.plant, run.cart_locked),
@@ -211,7 +211,7 @@ class SegmentLineariser {
     // Each sample starts with fresh unit derivatives.
     simulator_.engine().seed();
     if (!first) {
-      simulator_.command(run_.time_s[k - 1], run_.voltage_v[k - 1]);
+      command_from(k - 1, run_, simulator_);
       simulator_.advance_to(run_.time_s[k]);
     }
     const PlantState<Jet>& reached = simulator_.engine().state();

@@ -34,7 +34,7 @@ class PieceSimulation {
     for (std::size_t k = piece_.first; k <= piece_.last; ++k) {
       simulator_.advance_to(run_.time_s[k]);
       keep(k, run_.voltage_v[k]);
-      simulator_.command(run_.time_s[k], run_.voltage_v[k]);
+      command_from(k, run_, simulator_);
     }
   }
 
@@ -142,9 +142,9 @@ std::vector<PlantState<double>> initial_states(const Plant& plant, const std::ve
   return fit_initial_states(data, guess).point.starts;
 }
 
-std::size_t max_commands(const Segment& piece, const SimulatedController* controller, double delay_s) {
-  constexpr std::size_t margin = 64;
-  std::size_t count = margin + piece.last - piece.first;
+std::size_t max_commands(const Measurement& run, const Segment& piece, const SimulatedController* controller,
+                         double delay_s) {
+  std::size_t count = max_commands(run, piece);
   if (controller != nullptr) count += static_cast<std::size_t>(delay_s * controller->control.sample_rate_hz);
   return count;
 }
@@ -171,8 +171,8 @@ std::vector<RunSimulation> simulate_runs(const Plant& plant, const std::vector<M
   parallel_for(pieces.size(), [&](std::size_t i) {
     const std::size_t r = pieces[i].run;
     const SimulatedController* controller = controllers.empty() ? nullptr : &controllers[r];
-    PieceSimulation piece(plant, runs[r], pieces[i], starts[i], max_commands(pieces[i], controller, delay_s),
-                          simulations[r]);
+    PieceSimulation piece(plant, runs[r], pieces[i], starts[i],
+                          max_commands(runs[r], pieces[i], controller, delay_s), simulations[r]);
     if (controller != nullptr) {
       piece.follow(*controller);
     } else {

@@ -3,6 +3,8 @@
 #include <ceres/jet.h>
 #include <gtest/gtest.h>
 
+#include <array>
+#include <cmath>
 #include <numbers>
 
 #include "plants.hpp"
@@ -134,8 +136,9 @@ TEST(EventEngine, DualNumbersAreRightAcrossEvents) {
 }
 
 // The quick ones against the full ones, on the same motion, where a delay moves the ends of steps and a
-// contact sticks; with a motor that lags by less than a step and by more.
-void expect_quick_derivatives(double lag_s) {
+// contact sticks; with a motor that lags by less than a step and by more, and with several voltages in a
+// step.
+void expect_quick_derivatives(double lag_s, int voltages_of_step) {
   using Jet = ceres::Jet<double, 8>;
   Plant plant = paper_plant();
   plant.set("viscous_friction", {3.0});
@@ -157,9 +160,10 @@ void expect_quick_derivatives(double lag_s) {
     Simulator<Jet> simulator(model, options);
     PlantState<Jet> start{Jet(0.0, 0), Jet(std::numbers::pi + 0.3, 1), Jet(0.4, 2), Jet(0.0, 3)};
     simulator.start(start);
-    for (int k = 0; k < 1500; ++k) {
-      simulator.command(k * 2e-3, 2.0 * std::sin(k * 2e-3 * 4.0));
-      simulator.advance_to((k + 1) * 2e-3);
+    const double held_s = voltages_of_step == 1 ? 2e-3 : 1e-3;
+    for (int k = 0; k * held_s < 3.0; ++k) {
+      simulator.command(k * held_s, 2.0 * std::sin(k * held_s * 4.0) + (k % 3 - 1) * 0.5);
+      if ((k + 1) % voltages_of_step == 0) simulator.advance_to((k + 1) * held_s);
     }
     EXPECT_GE(simulator.engine().event_count(), 3u);
     return simulator.engine().state();
@@ -169,8 +173,8 @@ void expect_quick_derivatives(double lag_s) {
                                    &PlantState<Jet>::cart_mps, &PlantState<Jet>::theta_radps}) {
     EXPECT_NEAR((full.*of).a, (quick.*of).a, 1e-10);
     const double largest = (full.*of).v.cwiseAbs().maxCoeff();
-    // The voltage of a lagging motor counts with its mean over a step.
-    const double share = lag_s > 0.0 ? 2e-3 : 1e-3;
+    // A voltage that varies within a step counts with its mean.
+    const double share = lag_s > 0.0 || voltages_of_step > 1 ? 2e-3 : 1e-3;
     for (int i = 0; i < 8; ++i) EXPECT_NEAR((full.*of).v[i], (quick.*of).v[i], share * largest) << i;
   }
 }
@@ -178,8 +182,43 @@ void expect_quick_derivatives(double lag_s) {
 TEST(EventEngine, QuickDerivativesAreNearlyRight) {
   for (const double lag_s : {0.0, 0.0005, 0.002, 0.02}) {
     SCOPED_TRACE(lag_s);
-    expect_quick_derivatives(lag_s);
+    expect_quick_derivatives(lag_s, 1);
+    expect_quick_derivatives(lag_s, 4);
   }
+}
+
+// Several voltages in one step: the values are those of one step for each. An event within them leaves all
+// as it was.
+TEST(EventEngine, OneStepUnderSeveralVoltagesEndsWhereOneForEachDoes) {
+  using Jet = ceres::Jet<double, 8>;
+  Plant plant = paper_plant();
+  plant.set("viscous_friction", {3.0});
+  plant.set("coulomb_friction", {0.43});
+  EngineOptions options;
+  options.max_step_s = 4e-3;
+  options.step_fraction = 0.5;
+  options.quick_derivatives = true;
+  const std::array<HeldVoltage<Jet>, 3> held = {{{Jet(1e-3), 4.0}, {Jet(0.5e-3), -3.0}, {Jet(1.5e-3), 1.0}}};
+  const auto started = [&](double cart_mps) {
+    EventEngine<Jet> engine(make_model<Jet>(plant), options);
+    engine.start({Jet(0.01), Jet(std::numbers::pi + 0.3), Jet(cart_mps), Jet(-0.4)});
+    engine.seed();
+    return engine;
+  };
+  EventEngine<Jet> together = started(0.3), in_turn = started(0.3);
+  ASSERT_EQ(together.advance_in_one_step(held.data(), held.size()), held.size());
+  for (const auto& part : held) in_turn.advance(part.duration_s, Jet(part.voltage_v));
+  EXPECT_EQ(together.time_s(), in_turn.time_s());
+  EXPECT_EQ(together.state().cart_m.a, in_turn.state().cart_m.a);
+  EXPECT_EQ(together.state().theta_radps.a, in_turn.state().theta_radps.a);
+  EXPECT_EQ(together.state().motor_v.a, 1.0);
+
+  EventEngine<Jet> stops = started(-0.003);
+  EXPECT_EQ(stops.advance_in_one_step(held.data(), held.size()), 0u);
+  EXPECT_EQ(stops.state().cart_mps.a, -0.003);
+  EXPECT_EQ(stops.state().cart_mps.v, started(-0.003).state().cart_mps.v);
+  EXPECT_EQ(stops.time_s(), 0.0);
+  EXPECT_EQ(stops.event_count(), 0u);
 }
 
 // Derivatives of accelerations by the state are read from its seeds, or found beside it: as well while the

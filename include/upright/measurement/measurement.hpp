@@ -13,6 +13,12 @@ namespace upright {
 
 struct Dataset;
 
+/// A voltage that is held from a time until the next command.
+struct VoltageCommand {
+  double time_s = 0.0;     ///< when it was commanded [s]
+  double voltage_v = 0.0;  ///< [V]
+};
+
 /// From sample `from` on, `added_rad` was added to unwrap an angle that was recorded modulo a turn.
 struct Unfolding {
   std::size_t from = 0;    ///< the sample from which it applies
@@ -37,10 +43,14 @@ struct Measurement {
   std::optional<double> known_cart_noise_m;
   std::optional<double> known_theta_noise_rad;  ///< the same of theta_noise_rad()
   std::vector<std::size_t> breaks;              ///< samples preceded by missing rows: no segment crosses them
-  std::vector<Unfolding> unfoldings;            ///< of an angle that its source folded
-  std::shared_ptr<const Dataset> dataset;       ///< how it was read; null if not from a file
-  std::size_t missing_rows = 0;                 ///< rows of the file with a cell that has no number
-  std::vector<std::string> notes;               ///< findings and assumptions of the reader
+  /// Of a record with fewer samples than commands: all commands, of which `voltage_v` is the mean, and of
+  /// each sample the first at its time. Both empty: each sample has one, `voltage_v`.
+  std::vector<VoltageCommand> commands;
+  std::vector<std::size_t> first_command;
+  std::vector<Unfolding> unfoldings;       ///< of an angle that its source folded
+  std::shared_ptr<const Dataset> dataset;  ///< how it was read; null if not from a file
+  std::size_t missing_rows = 0;            ///< rows of the file with a cell that has no number
+  std::vector<std::string> notes;          ///< findings and assumptions of the reader
 
   std::size_t size() const { return time_s.size(); }     ///< number of samples
   bool has_cart() const { return !cart_m.empty(); }      ///< whether the cart was measured

@@ -18,6 +18,13 @@
 
 namespace upright {
 
+/// A voltage that is held for a time.
+template <class S>
+struct HeldVoltage {
+  S duration_s{};
+  double voltage_v = 0.0;  ///< after the input delay [V]
+};
+
 /// Integrates a plant over intervals of constant voltage, or under a varying voltage. Allocates nothing
 /// after construction.
 template <class S>
@@ -73,7 +80,7 @@ class EventEngine {
       if (!found) {
         if (!quick) state_ = next;
         if constexpr (!std::is_same_v<S, double>)
-          if (quick) step_linearised(plain_next, step);
+          if (quick) step_linearised(plain_next, step, voltage_over(step));
         seeded_ = false;
         remaining = remaining - step;
         time_s_ += value_of(step);
@@ -81,6 +88,52 @@ class EventEngine {
       }
       remaining = remaining - pass(*found, held, begin);
     }
+  }
+
+  /// Advances under the first of some voltages that are held in turn, as many as one step may span (dual
+  /// numbers with quick derivatives only). The values are those of `advance` for each, the derivatives those
+  /// of one step under the mean voltage. Returns how many voltages have passed: 0, with nothing changed, if
+  /// fewer than two fit into a step, or if they meet an event.
+  std::size_t advance_in_one_step(const HeldVoltage<S>* held,
+                                  std::size_t count) requires(!std::is_same_v<S, double>) {
+    if (!linearises_in_middle() || halted_ || budget_.spent(time_s_)) return 0;
+    constexpr double slack = 1e-9;  // sums of times are rounded
+    const double rate = motion_rate(), limit_s = rate_step(rate) * (1.0 + slack);
+    std::size_t spanned = 0;
+    S duration_s(0.0);
+    while (spanned < count && value_of(duration_s) + value_of(held[spanned].duration_s) <= limit_s)
+      duration_s += held[spanned++].duration_s;
+    if (spanned < 2) return 0;
+    const PlantState<S> begin = state_;
+    const S drive_before = drive_;
+    S impulse_vs(0.0), moment_vs2(0.0), left_s(value_of(duration_s));  // of a step of this length
+    for (std::size_t i = 0; i < spanned; ++i) {
+      const S& h = held[i].duration_s;
+      const double length_s = value_of(h);
+      hold(S(held[i].voltage_v));
+      if (length_s > rate_step(with_lag(rate)) || !step_plainly(length_s)) {
+        state_ = begin;
+        drive_ = drive_before;
+        return 0;
+      }
+      const StepVoltage voltage = voltage_over(h);
+      const S within_s = i + 1 < spanned ? h : left_s;
+      const S part_vs = voltage.mean_v * S(length_s) + voltage.end_v * S(within_s - S(length_s));
+      impulse_vs += part_vs;
+      moment_vs2 += part_vs * (left_s - S(0.5) * within_s);
+      left_s -= within_s;
+      state_.motor_v = voltage.end_v;
+    }
+    const PlantState<double> end = plain_state(state_);
+    const double length_s = value_of(duration_s);
+    const StepVoltage voltage{impulse_vs / S(length_s), state_.motor_v,
+                              S(moment_vs2 - S(0.5 * length_s) * impulse_vs)};
+    state_ = begin;
+    step_linearised(end, duration_s, voltage);
+    seeded_ = false;
+    time_s_ += value_of(duration_s);
+    step_count_ += spanned;
+    return spanned;
   }
 
   /// Advances by `duration_s` under a varying voltage: `volts(t, state)` is the command (after the input
@@ -263,17 +316,17 @@ class EventEngine {
     return pieces <= 1.0 ? remaining : S(remaining / S(pieces));
   }
 
-  S next_step(const S& remaining) const {
-    double rate = motion_rate();
-    if (dynamics_.has_motor_lag()) {
-      const double gap_v = std::abs(value_of(drive_) - value_of(state_.motor_v));
-      constexpr double settled_v = 1e-9;
-      // A lag shorter than the shortest step has settled within it.
-      if (gap_v > settled_v)
-        rate = std::min(rate + options_.step_fraction / value_of(dynamics_.motor_time_constant_s()),
-                        max_rate_radps);
-    }
-    return even_step(remaining, rate_step(rate));
+  S next_step(const S& remaining) const { return even_step(remaining, rate_step(with_lag(motion_rate()))); }
+
+  /// A rate of motion, and that of a lagging motor where its voltage changes.
+  double with_lag(double rate) const {
+    if (!dynamics_.has_motor_lag()) return rate;
+    const double gap_v = std::abs(value_of(drive_) - value_of(state_.motor_v));
+    constexpr double settled_v = 1e-9;
+    if (gap_v <= settled_v) return rate;
+    // A lag shorter than the shortest step has settled within it.
+    return std::min(rate + options_.step_fraction / value_of(dynamics_.motor_time_constant_s()),
+                    max_rate_radps);
   }
 
   /// The motor's lag over a step of length h from `motor_v`.
@@ -349,9 +402,10 @@ class EventEngine {
   }
 
   /// The motor's voltage over a step: its mean, which gives the same impulse, with the derivatives at this
-  /// length, and what it ends at.
+  /// length; what it ends at; and its first moment about the end beyond that of the mean.
   struct StepVoltage {
     S mean_v, end_v;
+    S moment_vs2{};
   };
   StepVoltage voltage_over(const S& h) const {
     if (!dynamics_.has_motor_lag()) return {drive_, drive_};
@@ -361,9 +415,28 @@ class EventEngine {
     return {drive_ + gap_v * mean, drive_ + gap_v * elementary::exp(S(-h / lag_s))};
   }
 
+  /// One step of the values of the coordinates under the present drive, without derivatives. False, with
+  /// nothing changed, if that meets an event.
+  bool step_plainly(double h) requires(!std::is_same_v<S, double>) {
+    const Contacts settled = settled_contacts(plain_, plain_state(state_), contacts_);
+    if (settled.cart != contacts_.cart || settled.pivot != contacts_.pivot) return false;
+    BeginRate<double> begin;
+    const auto along = [&](double t) {
+      return rk4(plain_, plain_state(state_), value_of(drive_), t, &begin);
+    };
+    const PlantState<double> end = along(h);
+    if (first_event(end, *begin, h, false, along)) return false;
+    state_.cart_m.a = end.cart_m;
+    state_.theta_rad.a = end.theta_rad;
+    state_.cart_mps.a = end.cart_mps;
+    state_.theta_radps.a = end.theta_radps;
+    return true;
+  }
+
   /// Steps to `end`, with derivatives (dual numbers only): those of the motion linearised at the middle,
   /// x(h) = x + (h + h^2 A / 2 + h^3 A^2 / 6) (A x + b). A lagging motor counts with its mean voltage.
-  void step_linearised(const PlantState<double>& end, const S& h) requires(!std::is_same_v<S, double>) {
+  void step_linearised(const PlantState<double>& end, const S& h,
+                       const StepVoltage& voltage) requires(!std::is_same_v<S, double>) {
     const PlantState<double> begin = plain_state(state_);
     // The Jacobian is evaluated at the middle, the derivatives are those at the beginning.
     PlantState<double> middle;
@@ -374,7 +447,6 @@ class EventEngine {
     halfway(&PlantState<double>::theta_rad, state_.theta_rad);
     halfway(&PlantState<double>::cart_mps, state_.cart_mps);
     halfway(&PlantState<double>::theta_radps, state_.theta_radps);
-    const StepVoltage voltage = voltage_over(h);
     const PlantState<S> rate = dynamics_.derivative(state_, voltage.mean_v, contacts_);
     const PlantState<double> plain_rate = plain_state(rate);
     const double cart_moves = dynamics_.cart_locked() || cart_at_rest() ? 0.0 : 1.0;
@@ -404,7 +476,12 @@ class EventEngine {
     };
     // The step length may have derivatives too.
     PlantState<double> late = plain_rate;
-    if (dynamics_.has_motor_lag()) late = plain_.derivative(middle, value_of(voltage.end_v), contacts_);
+    Slope moved_x = Slope::Zero(), moved_theta = Slope::Zero();
+    if (const double rise_v = value_of(voltage.end_v - voltage.mean_v); rise_v != 0.0) {
+      late = plain_.derivative(middle, value_of(voltage.end_v), contacts_);
+      moved_x = (late.cart_mps - plain_rate.cart_mps) / rise_v * voltage.moment_vs2.v;
+      moved_theta = (late.theta_radps - plain_rate.theta_radps) / rise_v * voltage.moment_vs2.v;
+    }
     const double v_rate = late.cart_mps + 0.5 * length * bent(slopes.cart_mps2);
     const double omega_rate = late.theta_radps + 0.5 * length * bent(slopes.theta_radps2);
     const auto set = [&](S& number, double value, const Slope& first, const Slope& second, const auto& third,
@@ -417,6 +494,10 @@ class EventEngine {
         pivot_moves * end.theta_radps);
     set(state_.cart_mps, end.cart_mps, rate.cart_mps.v, second_v, third_v, v_rate);
     set(state_.theta_radps, end.theta_radps, rate.theta_radps.v, second_omega, third_omega, omega_rate);
+    state_.cart_m.v += moved_x;
+    state_.theta_rad.v += moved_theta;
+    state_.cart_mps.v += slopes.cart_mps2[2] * moved_x + slopes.cart_mps2[3] * moved_theta;
+    state_.theta_radps.v += slopes.theta_radps2[2] * moved_x + slopes.theta_radps2[3] * moved_theta;
     state_.motor_v = voltage.end_v;
   }
 
