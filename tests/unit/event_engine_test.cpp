@@ -189,7 +189,7 @@ TEST(EventEngine, QuickDerivativesAreNearlyRight) {
 
 // Several voltages in one step: the values are those of one step for each. An event within them leaves all
 // as it was.
-TEST(EventEngine, OneStepUnderSeveralVoltagesEndsWhereOneForEachDoes) {
+TEST(EventEngine, OneStepUnderSeveralVoltagesEndsAsOneForEach) {
   using Jet = ceres::Jet<double, 8>;
   Plant plant = paper_plant();
   plant.set("viscous_friction", {3.0});

@@ -13,6 +13,7 @@
 #include "upright/model/dynamics.hpp"
 #include "upright/model/elementary.hpp"
 #include "upright/sim/contacts.hpp"
+#include "upright/sim/linearised_step.hpp"
 #include "upright/sim/motor_lag.hpp"
 #include "upright/sim/runge_kutta.hpp"
 
@@ -80,7 +81,7 @@ class EventEngine {
       if (!found) {
         if (!quick) state_ = next;
         if constexpr (!std::is_same_v<S, double>)
-          if (quick) step_linearised(plain_next, step, voltage_over(step));
+          if (quick) linearised().take(plain_next, step, voltage_over(step), seeded_, state_);
         seeded_ = false;
         remaining = remaining - step;
         time_s_ += value_of(step);
@@ -116,7 +117,7 @@ class EventEngine {
         drive_ = drive_before;
         return 0;
       }
-      const StepVoltage voltage = voltage_over(h);
+      const StepVoltage<S> voltage = voltage_over(h);
       const S within_s = i + 1 < spanned ? h : left_s;
       const S part_vs = voltage.mean_v * S(length_s) + voltage.end_v * S(within_s - S(length_s));
       impulse_vs += part_vs;
@@ -126,10 +127,10 @@ class EventEngine {
     }
     const PlantState<double> end = plain_state(state_);
     const double length_s = value_of(duration_s);
-    const StepVoltage voltage{impulse_vs / S(length_s), state_.motor_v,
-                              S(moment_vs2 - S(0.5 * length_s) * impulse_vs)};
+    const StepVoltage<S> voltage{impulse_vs / S(length_s), state_.motor_v,
+                                 S(moment_vs2 - S(0.5 * length_s) * impulse_vs)};
     state_ = begin;
-    step_linearised(end, duration_s, voltage);
+    linearised().take(end, duration_s, voltage, seeded_, state_);
     seeded_ = false;
     time_s_ += value_of(duration_s);
     step_count_ += spanned;
@@ -248,11 +249,6 @@ class EventEngine {
   template <class T>
   using BeginRate = std::optional<PlantState<T>>;
 
-  static PlantState<double> plain_state(const PlantState<S>& s) {
-    return {value_of(s.cart_m),      value_of(s.theta_rad), value_of(s.cart_mps),
-            value_of(s.theta_radps), value_of(s.motor_v),   value_of(s.bristle_m)};
-  }
-
   void hold(const S& voltage_v) {
     drive_ = dynamics_.actuate(voltage_v);
     if (!dynamics_.has_motor_lag()) state_.motor_v = drive_;
@@ -370,44 +366,10 @@ class EventEngine {
     return !std::is_same_v<S, double> && options_.quick_derivatives && !dynamics_.has_bristle_state();
   }
 
-  /// Jacobian of the accelerations: columns cart_m, theta_rad, cart_mps, theta_radps.
-  struct Slopes {
-    std::array<double, 4> cart_mps2{}, theta_radps2{};
-  };
-  /// The Jacobian from the derivatives of `rate`, for a state with the identity as derivatives.
-  static Slopes seeded_slopes(const PlantState<S>& rate) requires(!std::is_same_v<S, double>) {
-    Slopes slopes;
-    for (int i = 0; i < 4; ++i) {
-      slopes.cart_mps2[static_cast<std::size_t>(i)] = rate.cart_mps.v[i];
-      slopes.theta_radps2[static_cast<std::size_t>(i)] = rate.theta_radps.v[i];
-    }
-    return slopes;
-  }
-  Slopes slopes_at(const PlantState<double>& middle, const PlantState<double>& rate, double motor_v) const {
-    constexpr double aside = 1e-6;
-    Slopes slopes;
-    const auto set = [&](std::size_t column, double PlantState<double>::*of) {
-      PlantState<double> moved_aside = middle;
-      moved_aside.*of += aside;
-      const PlantState<double> other = plain_.derivative(moved_aside, motor_v, contacts_);
-      slopes.cart_mps2[column] = (other.cart_mps - rate.cart_mps) / aside;
-      slopes.theta_radps2[column] = (other.theta_radps - rate.theta_radps) / aside;
-    };
-    set(0, &PlantState<double>::cart_m);
-    set(2, &PlantState<double>::cart_mps);
-    if (!dynamics_.has_pendulum()) return slopes;
-    set(1, &PlantState<double>::theta_rad);
-    set(3, &PlantState<double>::theta_radps);
-    return slopes;
-  }
+  LinearisedStep<S> linearised() const { return {dynamics_, plain_, contacts_}; }
 
-  /// The motor's voltage over a step: its mean, which gives the same impulse, with the derivatives at this
-  /// length; what it ends at; and its first moment about the end beyond that of the mean.
-  struct StepVoltage {
-    S mean_v, end_v;
-    S moment_vs2{};
-  };
-  StepVoltage voltage_over(const S& h) const {
+  /// Of one voltage that is held.
+  StepVoltage<S> voltage_over(const S& h) const {
     if (!dynamics_.has_motor_lag()) return {drive_, drive_};
     const S lag_s = dynamics_.motor_time_constant_s(), gap_v = state_.motor_v - drive_;
     const S lags = S(value_of(h)) / lag_s;
@@ -433,75 +395,7 @@ class EventEngine {
     return true;
   }
 
-  /// Steps to `end`, with derivatives (dual numbers only): those of the motion linearised at the middle,
-  /// x(h) = x + (h + h^2 A / 2 + h^3 A^2 / 6) (A x + b). A lagging motor counts with its mean voltage.
-  void step_linearised(const PlantState<double>& end, const S& h,
-                       const StepVoltage& voltage) requires(!std::is_same_v<S, double>) {
-    const PlantState<double> begin = plain_state(state_);
-    // The Jacobian is evaluated at the middle, the derivatives are those at the beginning.
-    PlantState<double> middle;
-    const auto halfway = [&](double PlantState<double>::*of, S& number) {
-      number.a = middle.*of = 0.5 * (begin.*of + end.*of);
-    };
-    halfway(&PlantState<double>::cart_m, state_.cart_m);
-    halfway(&PlantState<double>::theta_rad, state_.theta_rad);
-    halfway(&PlantState<double>::cart_mps, state_.cart_mps);
-    halfway(&PlantState<double>::theta_radps, state_.theta_radps);
-    const PlantState<S> rate = dynamics_.derivative(state_, voltage.mean_v, contacts_);
-    const PlantState<double> plain_rate = plain_state(rate);
-    const double cart_moves = dynamics_.cart_locked() || cart_at_rest() ? 0.0 : 1.0;
-    const double pivot_moves = !dynamics_.has_pendulum() || pivot_at_rest() ? 0.0 : 1.0;
-    // Coordinates that started to move since the seeding have no derivatives.
-    const bool all_seeded =
-        seeded_ && state_.cart_mps.v[2] == cart_moves && state_.theta_radps.v[3] == pivot_moves;
-    const Slopes slopes =
-        all_seeded ? seeded_slopes(rate) : slopes_at(middle, plain_rate, value_of(voltage.mean_v));
-    // Derivatives of the solution: rate is A x + b, `second` A (A x + b), `third` A A (A x + b).
-    using Slope = decltype(S::v);
-    const auto bend = [](const std::array<double, 4>& slope, const auto& x, const auto& theta, const auto& v,
-                         const auto& omega) {
-      return std::decay_t<decltype(v)>(slope[0] * x + slope[1] * theta + slope[2] * v + slope[3] * omega);
-    };
-    const Slope second_v =
-        bend(slopes.cart_mps2, rate.cart_m.v, rate.theta_rad.v, rate.cart_mps.v, rate.theta_radps.v);
-    const Slope second_omega =
-        bend(slopes.theta_radps2, rate.cart_m.v, rate.theta_rad.v, rate.cart_mps.v, rate.theta_radps.v);
-    const Slope second_x = cart_moves * rate.cart_mps.v, second_theta = pivot_moves * rate.theta_radps.v;
-    const Slope third_v = bend(slopes.cart_mps2, second_x, second_theta, second_v, second_omega);
-    const Slope third_omega = bend(slopes.theta_radps2, second_x, second_theta, second_v, second_omega);
-    const double length = h.a, half_square = 0.5 * length * length, cube = half_square * length / 3.0;
-    const auto bent = [&](const std::array<double, 4>& slope) {
-      return bend(slope, plain_rate.cart_m, plain_rate.theta_rad, plain_rate.cart_mps,
-                  plain_rate.theta_radps);
-    };
-    // The step length may have derivatives too.
-    PlantState<double> late = plain_rate;
-    Slope moved_x = Slope::Zero(), moved_theta = Slope::Zero();
-    if (const double rise_v = value_of(voltage.end_v - voltage.mean_v); rise_v != 0.0) {
-      late = plain_.derivative(middle, value_of(voltage.end_v), contacts_);
-      moved_x = (late.cart_mps - plain_rate.cart_mps) / rise_v * voltage.moment_vs2.v;
-      moved_theta = (late.theta_radps - plain_rate.theta_radps) / rise_v * voltage.moment_vs2.v;
-    }
-    const double v_rate = late.cart_mps + 0.5 * length * bent(slopes.cart_mps2);
-    const double omega_rate = late.theta_radps + 0.5 * length * bent(slopes.theta_radps2);
-    const auto set = [&](S& number, double value, const Slope& first, const Slope& second, const auto& third,
-                         double rate_at_end) {
-      number.a = value;
-      number.v += length * first + half_square * second + cube * third + rate_at_end * h.v;
-    };
-    set(state_.cart_m, end.cart_m, rate.cart_m.v, second_x, cart_moves * second_v, cart_moves * end.cart_mps);
-    set(state_.theta_rad, end.theta_rad, rate.theta_rad.v, second_theta, pivot_moves * second_omega,
-        pivot_moves * end.theta_radps);
-    set(state_.cart_mps, end.cart_mps, rate.cart_mps.v, second_v, third_v, v_rate);
-    set(state_.theta_radps, end.theta_radps, rate.theta_radps.v, second_omega, third_omega, omega_rate);
-    state_.cart_m.v += moved_x;
-    state_.theta_rad.v += moved_theta;
-    state_.cart_mps.v += slopes.cart_mps2[2] * moved_x + slopes.cart_mps2[3] * moved_theta;
-    state_.theta_radps.v += slopes.theta_radps2[2] * moved_x + slopes.theta_radps2[3] * moved_theta;
-    state_.motor_v = voltage.end_v;
-  }
-
-  /// The same in plain numbers, from the present state.
+  /// A Runge-Kutta step from the present state, without derivatives.
   PlantState<double> plain_step(double h) const {
     return rk4(plain_, plain_state(state_), value_of(drive_), h);
   }
