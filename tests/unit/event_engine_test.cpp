@@ -187,17 +187,27 @@ TEST(EventEngine, QuickDerivativesAreNearlyRight) {
   }
 }
 
-// Several voltages in one step: the values are those of one step for each. An event within them leaves all
-// as it was.
-TEST(EventEngine, OneStepUnderSeveralVoltagesEndsAsOneForEach) {
-  using Jet = ceres::Jet<double, 8>;
+Plant with_dry_friction() {
   Plant plant = paper_plant();
   plant.set("viscous_friction", {3.0});
   plant.set("coulomb_friction", {0.43});
+  return plant;
+}
+
+EngineOptions of_a_fit() {
   EngineOptions options;
   options.max_step_s = 4e-3;
   options.step_fraction = 0.5;
   options.quick_derivatives = true;
+  return options;
+}
+
+// Several voltages in one step: the values are those of one step for each. An event within them leaves all
+// as it was.
+TEST(EventEngine, OneStepUnderSeveralVoltagesEndsAsOneForEach) {
+  using Jet = ceres::Jet<double, 8>;
+  const Plant plant = with_dry_friction();
+  const EngineOptions options = of_a_fit();
   const std::array<HeldVoltage<Jet>, 3> held = {{{Jet(1e-3), 4.0}, {Jet(0.5e-3), -3.0}, {Jet(1.5e-3), 1.0}}};
   const auto started = [&](double cart_mps) {
     EventEngine<Jet> engine(make_model<Jet>(plant), options);
@@ -225,13 +235,8 @@ TEST(EventEngine, OneStepUnderSeveralVoltagesEndsAsOneForEach) {
 // cart slides as in the step in which it breaks away, whose velocity has no seed.
 TEST(EventEngine, SeedsGiveTheSameDerivatives) {
   using Jet = ceres::Jet<double, 8>;
-  Plant plant = paper_plant();
-  plant.set("viscous_friction", {3.0});
-  plant.set("coulomb_friction", {0.43});
-  EngineOptions options;
-  options.max_step_s = 4e-3;
-  options.step_fraction = 0.5;
-  options.quick_derivatives = true;
+  const Plant plant = with_dry_friction();
+  const EngineOptions options = of_a_fit();
   PlantModel<Jet> model = make_model<Jet>(plant);
   model.parameters[effect_parameter_offset(effect_number("viscous_friction"))].v[5] = 1.0;
   for (const double cart_mps : {0.3, -0.2, 0.0}) {
