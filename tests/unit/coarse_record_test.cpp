@@ -62,6 +62,7 @@ TEST(CoarseRecord, HasOneCommandForEachChangeOfTheVoltage) {
                                  [](const VoltageCommand& c) { return c.voltage_v > 0.0; });
   ASSERT_NE(jump, coarse.commands.end());
   EXPECT_NEAR(jump->time_s, 0.499, 1e-12);
+  for (const VoltageCommand& command : coarse.commands) EXPECT_EQ(std::abs(command.voltage_v), 8.0);
 }
 
 // With an input delay and a motor lag, from a start within the record, on a cart that sticks and slips.
@@ -118,6 +119,12 @@ TEST(CoarseRecord, TheMeanVoltageTakesASlidingCartToTheSamePlace) {
   for (const double time_s : coarse.time_s)
     largest_m = std::max(largest_m, std::abs(place_m(coarse, time_s) - place_m(run, time_s)));
   EXPECT_LT(largest_m, shift_m);
+}
+
+TEST(CoarseRecord, KeepsAllVoltagesWhereTheCartMayStick) {
+  Measurement run = record(jitter_v);
+  for (double& x : run.cart_m) x = 0.0;
+  EXPECT_EQ(coarse_runs({run}, cart_alone(), thinning)[0].commands.size(), run.size());
 }
 
 TEST(CoarseRecord, KeepsAllVoltagesWhereTheMeanWouldMoveTheCart) {
