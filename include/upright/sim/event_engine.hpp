@@ -126,13 +126,13 @@ class EventEngine {
       state_.motor_v = voltage.end_v;
     }
     const PlantState<double> end = plain_state(state_);
-    const double length_s = value_of(duration_s);
-    const StepVoltage<S> voltage{impulse_vs / S(length_s), state_.motor_v,
-                                 S(moment_vs2 - S(0.5 * length_s) * impulse_vs)};
+    const double whole_s = value_of(duration_s);
+    const StepVoltage<S> voltage{impulse_vs / S(whole_s), state_.motor_v,
+                                 S(moment_vs2 - S(0.5 * whole_s) * impulse_vs)};
     state_ = begin;
     linearised().take(end, duration_s, voltage, seeded_, state_);
     seeded_ = false;
-    time_s_ += value_of(duration_s);
+    time_s_ += whole_s;
     step_count_ += spanned;
     return spanned;
   }
@@ -366,7 +366,11 @@ class EventEngine {
     return !std::is_same_v<S, double> && options_.quick_derivatives && !dynamics_.has_bristle_state();
   }
 
-  LinearisedStep<S> linearised() const { return {dynamics_, plain_, contacts_}; }
+  LinearisedStep<S> linearised() const {
+    const bool cart_moves = !dynamics_.cart_locked() && !cart_at_rest();
+    const bool pivot_moves = dynamics_.has_pendulum() && !pivot_at_rest();
+    return {dynamics_, plain_, contacts_, cart_moves, pivot_moves};
+  }
 
   /// Of one voltage that is held.
   StepVoltage<S> voltage_over(const S& h) const {

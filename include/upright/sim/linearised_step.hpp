@@ -30,9 +30,15 @@ struct StepVoltage {
 template <class S>
 class LinearisedStep {
  public:
-  /// `plain`: the same dynamics without derivatives.
-  LinearisedStep(const Dynamics<S>& dynamics, const Dynamics<double>& plain, const Contacts& contacts)
-      : dynamics_(dynamics), plain_(plain), contacts_(contacts) {}
+  /// `plain`: the same dynamics without derivatives. `cart_moves`, `pivot_moves`: the cart and the pendulum
+  /// are there, and neither locked nor held by dry friction.
+  LinearisedStep(const Dynamics<S>& dynamics, const Dynamics<double>& plain, const Contacts& contacts,
+                 bool cart_moves, bool pivot_moves)
+      : dynamics_(dynamics),
+        plain_(plain),
+        contacts_(contacts),
+        cart_moves_(cart_moves),
+        pivot_moves_(pivot_moves) {}
 
   /// Moves a state over a step of length h to the values of `end`, and its derivatives by
   /// x(h) = x + (h + h^2 A / 2 + h^3 A^2 / 6) (A x + b). A varying voltage counts with its mean and its first
@@ -43,12 +49,8 @@ class LinearisedStep {
     const PlantState<double> middle = moved_halfway(end, state);
     const PlantState<S> rate = dynamics_.derivative(state, voltage.mean_v, contacts_);
     const PlantState<double> plain_rate = plain_state(rate);
-    const double cart_moves =
-        dynamics_.cart_locked() || (dynamics_.cart_can_stick() && contacts_.cart == Contact::stick) ? 0.0
-                                                                                                    : 1.0;
-    const double pivot_moves =
-        !dynamics_.has_pendulum() || (dynamics_.pivot_can_stick() && contacts_.pivot == Contact::stick) ? 0.0
-                                                                                                        : 1.0;
+    const double cart_moves = cart_moves_ ? 1.0 : 0.0;
+    const double pivot_moves = pivot_moves_ ? 1.0 : 0.0;
     // Coordinates that started to move since the seeding have no derivatives.
     const bool all_seeded =
         seeded && state.cart_mps.v[2] == cart_moves && state.theta_radps.v[3] == pivot_moves;
@@ -148,6 +150,7 @@ class LinearisedStep {
   const Dynamics<S>& dynamics_;
   const Dynamics<double>& plain_;
   Contacts contacts_;
+  bool cart_moves_, pivot_moves_;
 };
 
 }  // namespace upright
