@@ -7,6 +7,7 @@
 
 #include "estimation/random_curve.hpp"
 #include "listing.hpp"
+#include "upright/model/effects/all.hpp"
 #include "without_effect.hpp"
 
 namespace upright {
@@ -25,6 +26,31 @@ CurveNodes nodes_over(const std::vector<CurveArgument>& places, std::size_t coun
   return {low_m, (high_m - low_m) / static_cast<double>(count - 1), count};
 }
 
+/// The force of an effect at the nodes [N]; absent if the place alone does not determine it.
+std::optional<Eigen::VectorXd> force_of_place(const PlantEffect& effect, const CurveNodes& nodes) {
+  std::optional<Eigen::VectorXd> force_n;
+  const double* p = effect.values.data();
+  for_each_effect([&]<std::size_t I>() {
+    using E = EffectAt<I>;
+    if constexpr (requires { E::cart_force(p, 0.0, 0.0); }) {
+      if (I != effect.number) return;
+      force_n.emplace(nodes.count);
+      for (std::size_t node = 0; node < nodes.count; ++node) {
+        const double place_m = nodes.first + nodes.spacing * static_cast<double>(node);
+        const double at_rest_n = E::cart_force(p, place_m, 0.0);
+        constexpr double any_speed_mps = 1.0;
+        if (E::cart_force(p, place_m, any_speed_mps) != at_rest_n ||
+            E::cart_force(p, place_m, -any_speed_mps) != at_rest_n) {
+          force_n.reset();
+          return;
+        }
+        (*force_n)[static_cast<Eigen::Index>(node)] = at_rest_n;
+      }
+    }
+  });
+  return force_n;
+}
+
 class PlaceNull {
  public:
   PlaceNull(const Search& search, const Hypothesis& known)
@@ -39,19 +65,38 @@ class PlaceNull {
   /// Null if there is none.
   const RandomCurve* track_force() const { return track_ && track_->is_there() ? &*track_ : nullptr; }
 
-  /// What the effect saves beside the force, after the penalty of its parameters.
+  /// What the effect saves beside the force, after the penalty of its parameters. Without the effect, the
+  /// force has a size and a length of its own.
   double evidence_of(std::size_t effect) const {
-    const FitPoint& with = known_.train.point;
-    if (!is_removable(with.plant, effect, search_.given())) return std::numeric_limits<double>::infinity();
-    FitOptions same_noise;
-    same_noise.noise_rounds = 0;
-    const FitResult without = fit_without(all_, with, effect, known_.free, search_.given(), same_noise);
-    if (!std::isfinite(without.objective)) return std::numeric_limits<double>::infinity();
-    return without.objective + track_->change_at(equations_at(without.point)) - known_.train.objective -
-           track_->change() - search_.penalty_of(known_, effect);
+    const Plant& plant = known_.train.point.plant;
+    if (!is_removable(plant, effect, search_.given())) return std::numeric_limits<double>::infinity();
+    const auto force_n = force_of_place(*plant.find(effect), nodes_);
+    return (force_n ? replaced_by_track(*force_n) : fitted_without(effect)) - track_->change() -
+           search_.penalty_of(known_, effect);
   }
 
  private:
+  /// By how much the objective rises if the track's force has to supply this one too. The innovations are
+  /// linear in such a force, so nothing is fitted anew.
+  double replaced_by_track(const Eigen::VectorXd& force_n) const {
+    CurveEquations equations = equations_at(known_.train.point);
+    const Eigen::VectorXd shift = equations.information * force_n;
+    const double rise = force_n.dot(shift + 2.0 * equations.score);
+    equations.score += shift;
+    return rise + RandomCurve(equations, nodes_).change();
+  }
+
+  /// By how much it rises in a fit without the effect, beside the track's force.
+  double fitted_without(std::size_t effect) const {
+    FitOptions same_noise;
+    same_noise.noise_rounds = 0;
+    const FitResult without =
+        fit_without(all_, known_.train.point, effect, known_.free, search_.given(), same_noise);
+    if (!std::isfinite(without.objective)) return std::numeric_limits<double>::infinity();
+    return without.objective + RandomCurve(equations_at(without.point), nodes_).change() -
+           known_.train.objective;
+  }
+
   CurveEquations equations_at(const FitPoint& point) const {
     return curve_equations(linearise(all_, point), nodes_, places_);
   }

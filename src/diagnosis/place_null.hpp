@@ -3,8 +3,8 @@
 // Every track is a little rough: its force depends on the place, and is the same whenever the cart passes it.
 // The likelihood counts each pass as new evidence, so an effect that resembles the track's force, such as a
 // cogging force of the best pitch, is found with more evidence the longer the record is. So each effect is
-// tested once more beside a random force of the place, whose values are integrated out. Values of the
-// parameters stay those of the fit without it.
+// tested once more beside a random force of the place, whose values are integrated out. Its size and
+// correlation length are estimated with and without the effect.
 #pragma once
 
 #include <optional>

@@ -25,8 +25,6 @@ class RandomCurve {
   /// Correlation length.
   double length() const { return length_; }
 
-  /// The same change at another fit, with the size and the length held.
-  double change_at(const CurveEquations& equations) const;
   /// The expected values at the nodes, from these equations and the prior.
   Eigen::VectorXd mean(const CurveEquations& equations) const;
   /// Inverse of the prior covariance of its values at these nodes.

@@ -6,11 +6,12 @@
 namespace upright {
 namespace {
 
-/// Runs on a track whose force has a standard deviation of 0.08 N.
-std::vector<Measurement> runs_on_rough_track(const Plant& plant, unsigned seed) {
+/// Runs on a track whose force has a standard deviation of `rough_n`.
+std::vector<Measurement> runs_on_rough_track(const Plant& plant, unsigned seed, double rough_n = 0.08,
+                                             double length_m = 0.015) {
   blind::Rig rig{.plant = plant};
-  rig.rough_n = 0.08;
-  rig.rough_length_m = 0.015;
+  rig.rough_n = rough_n;
+  rig.rough_length_m = length_m;
   rig.track_seed = seed;
   return three_runs(rig, 6.0, seed);
 }
@@ -19,6 +20,15 @@ TEST(PlaceNull, ARoughTrackIsNoNamedEffect) {
   for (const unsigned seed : {1, 2, 3, 4, 5, 6})
     EXPECT_EQ(named_effects(runs_on_rough_track(cart_with_friction(), seed), cart_with_friction()),
               std::set<std::string>{})
+        << seed;
+}
+
+/// The waves of such a track are as long as a tenth of the travel: some resemble a periodic force.
+TEST(PlaceNull, AVeryRoughTrackIsNoCoggingForce) {
+  for (const unsigned seed : {1, 2, 3})
+    EXPECT_FALSE(
+        named_effects(runs_on_rough_track(cart_with_friction(), seed, 0.6, 0.025), cart_with_friction())
+            .contains("cogging_force"))
         << seed;
 }
 
