@@ -282,6 +282,8 @@ class Diagnostician {
     }
     if (const auto outdone = outdone_by_disturbance(search_, fits_.known(), fits_.judged(), reproductions_)) {
       withdraw(outdone->effect, outdone->where);
+      if (outdone->was_average && !withdrawn_.contains(effect_number("constant_force")))
+        selection_.find_again();
       return true;
     }
     options_.tell(0.94, "measuring the gap");

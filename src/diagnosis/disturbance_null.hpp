@@ -11,8 +11,9 @@ namespace upright {
 
 /// An effect, and what does as well as it.
 struct OutdoneEffect {
-  std::size_t effect = 0;  ///< number in the registry
-  std::string where;       ///< a sentence for the listing of effects that help here only
+  std::size_t effect = 0;    ///< number in the registry
+  std::string where;         ///< a sentence for the listing of effects that help here only
+  bool was_average = false;  ///< a constant force is needed in its place
 };
 
 /// One of these effects that a disturbance outdoes: one that varies slowly (coloured_null.hpp), or one that

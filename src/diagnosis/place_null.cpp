@@ -65,12 +65,17 @@ class PlaceNull {
   /// Null if there is none.
   const RandomCurve* track_force() const { return track_ && track_->is_there() ? &*track_ : nullptr; }
 
+  /// Of an effect: its force at the nodes, if the place alone determines it.
+  std::optional<Eigen::VectorXd> force_of(std::size_t effect) const {
+    return force_of_place(*known_.train.point.plant.find(effect), nodes_);
+  }
+
   /// What the effect saves beside the force, after the penalty of its parameters. Without the effect, the
   /// force has a size and a length of its own.
   double evidence_of(std::size_t effect) const {
     const Plant& plant = known_.train.point.plant;
     if (!is_removable(plant, effect, search_.given())) return std::numeric_limits<double>::infinity();
-    const auto force_n = force_of_place(*plant.find(effect), nodes_);
+    const auto force_n = force_of(effect);
     return (force_n ? replaced_by_track(*force_n) : fitted_without(effect)) - track_->change() -
            search_.penalty_of(known_, effect);
   }
@@ -109,23 +114,42 @@ class PlaceNull {
   std::optional<RandomCurve> track_;
 };
 
-/// Whether a simulation of held-out data without the effect is far worse.
-bool is_needed(Search& search, const Hypothesis& judged, const std::vector<Reproduction>& effects,
-               std::size_t effect) {
+/// Whether the force grows in proportion to the place, or not at all.
+bool is_trend(const Eigen::VectorXd& force_n) {
+  const Eigen::Index inner = force_n.size() - 2;
+  const Eigen::VectorXd bend = force_n.head(inner) - 2.0 * force_n.segment(1, inner) + force_n.tail(inner);
+  constexpr double rounding = 1e-9;
+  return bend.cwiseAbs().maxCoeff() <= rounding * force_n.cwiseAbs().maxCoeff();
+}
+
+/// What a model would lack without an effect.
+enum class Needed { no, as_average, by_itself };
+
+/// Judged by simulations of held-out data: far worse ones without the effect, with a constant force in its
+/// place or not.
+Needed how_needed(Search& search, const Hypothesis& judged, const std::vector<Reproduction>& effects,
+                  std::size_t effect) {
   std::vector<std::size_t> all, others;
   for (const Reproduction& other : effects) {
     all.push_back(other.effect);
     if (other.effect != effect) others.push_back(other.effect);
   }
-  return held_out_error(search, judged, others) >
-         search.policy().power.clear_gap * held_out_error(search, judged, all);
+  const double far_worse = search.policy().power.clear_gap * held_out_error(search, judged, all);
+  if (held_out_error(search, judged, others) <= far_worse) return Needed::no;
+  const std::size_t constant = effect_number("constant_force");
+  if (judged.train.point.plant.find(constant) != nullptr) return Needed::by_itself;
+  Hypothesis replaced = judged;
+  replaced.train.point.plant.set(constant, std::array{0.0});
+  others.push_back(constant);
+  return held_out_error(search, replaced, others) > far_worse ? Needed::by_itself : Needed::as_average;
 }
 
 }  // namespace
 
-std::optional<std::size_t> outdone_by_place(Search& search, const Hypothesis& known, const Hypothesis& judged,
-                                            const std::vector<Reproduction>& effects) {
-  std::optional<std::size_t> worst;
+std::optional<OutdoneByPlace> outdone_by_place(Search& search, const Hypothesis& known,
+                                               const Hypothesis& judged,
+                                               const std::vector<Reproduction>& effects) {
+  std::optional<OutdoneByPlace> worst;
   if (known.train.point.starts.size() != search.all_data().segments.size()) return worst;
   std::optional<PlaceNull> null;
   double least = search.policy().acceptance.min_evidence;
@@ -134,9 +158,13 @@ std::optional<std::size_t> outdone_by_place(Search& search, const Hypothesis& kn
     if (!null) null.emplace(search, known);
     if (null->track_force() == nullptr) break;
     const double evidence = null->evidence_of(found.effect);
-    if (!(evidence < least) || is_needed(search, judged, effects, found.effect)) continue;
+    if (!(evidence < least)) continue;
+    const auto force_n = null->force_of(found.effect);
+    const bool may_be_average = !force_n || is_trend(*force_n);
+    const Needed needed = may_be_average ? how_needed(search, judged, effects, found.effect) : Needed::no;
+    if (needed == Needed::by_itself) continue;
     least = evidence;
-    worst = found.effect;
+    worst = OutdoneByPlace{found.effect, needed == Needed::as_average};
   }
   return worst;
 }

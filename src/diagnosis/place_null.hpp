@@ -15,12 +15,19 @@
 
 namespace upright {
 
+/// An effect that such a force accounts for.
+struct OutdoneByPlace {
+  std::size_t effect = 0;    ///< number in the registry
+  bool was_average = false;  ///< a constant force is needed in its place, as the average of the track's
+};
+
 /// Of these effects, the one that such a force leaves the least evidence, if that is less than an effect
-/// needs. An effect without which a simulation of held-out data is far worse stays: as an average of the
-/// track's force the model needs it. `known`: a fit to all data, `judged`: to the training data. Corrections
-/// of the plant file's numbers are not tested.
-std::optional<std::size_t> outdone_by_place(Search& search, const Hypothesis& known, const Hypothesis& judged,
-                                            const std::vector<Reproduction>& effects);
+/// needs. An effect stays if a simulation of held-out data is far worse without it and with a constant force
+/// in its place, unless its force goes up and down with the place. `known`: a fit to all data, `judged`: to
+/// the training data. Corrections of the plant file's numbers are not tested.
+std::optional<OutdoneByPlace> outdone_by_place(Search& search, const Hypothesis& known,
+                                               const Hypothesis& judged,
+                                               const std::vector<Reproduction>& effects);
 
 /// A sentence on the random force of the place that is left, if there is one. `known`: a fit to all data.
 std::optional<std::string> place_force_left(const Search& search, const Hypothesis& known);

@@ -144,9 +144,10 @@ struct PowerPolicy {
   /// grows with the rate). Chosen.
   double share_of_gravity_torque = 0.01;
   /// [noise floors] A larger gap is clearly above the floor: "no discrepancy" would be wrong, and what was
-  /// found explains the data only if it closes most of the excess. An effect without which the held-out error
-  /// is so many times larger is needed, even if a force of the place accounts for it. A curve that lowers
-  /// this error by more than this factor becomes part of the model. Chosen.
+  /// found explains the data only if it closes most of the excess. An effect stays, even if a force of the
+  /// place accounts for it, if the held-out error is so many times larger without it and with a constant
+  /// force in its place. A curve that lowers this error by more than this factor becomes part of the model.
+  /// Chosen.
   double clear_gap = 2.0;
   /// [1] The share of the excess above the floor that it must close then. Less than half explains less than
   /// it leaves.
