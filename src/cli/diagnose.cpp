@@ -322,7 +322,8 @@ void write_traces(const Diagnosis& d, const Plant& given, const std::vector<Meas
   }
 }
 
-/// The 95 percent intervals of the found effects' parameters, within the ranges of plant files.
+/// The 95 percent intervals of the found effects' parameters. None ends at an open end of its range, which a
+/// plant file cannot have.
 std::vector<NumberInterval> intervals_of(const Diagnosis& d) {
   constexpr double above_open_end = 1e-3;  // of the distance from the value, which is allowed
   std::vector<NumberInterval> intervals;
@@ -331,9 +332,9 @@ std::vector<NumberInterval> intervals_of(const Diagnosis& d) {
       const ParameterEstimate& p = effect.parameters[i];
       if (!(std::isfinite(p.low) && std::isfinite(p.high) && p.low < p.high)) continue;
       const Range& range = effect_registry()[effect.effect].parameters[i].range;
-      const double lowest = range.low_open ? range.low + above_open_end * (p.value - range.low) : range.low;
-      intervals.push_back(
-          {kind_of(effect.effect) + "." + p.name, std::max(p.low, lowest), std::min(p.high, range.high)});
+      const bool ends_open = range.low_open && p.low <= range.low;
+      intervals.push_back({kind_of(effect.effect) + "." + p.name,
+                           ends_open ? range.low + above_open_end * (p.value - range.low) : p.low, p.high});
     }
   return intervals;
 }

@@ -109,8 +109,12 @@ std::vector<ParameterEstimate> estimates_of(std::size_t effect, const Hypothesis
       if (h.free[j].effect != effect || h.free[j].index != i) continue;
       const auto at = static_cast<Eigen::Index>(j);
       const double sigma = std::sqrt(std::max(h.train.covariance(at, at), 0.0));
-      e.low = e.value - 1.96 * sigma;
-      e.high = e.value + 1.96 * sigma;
+      const double reach = h.train.bound_reach[at], half_width = 1.96 * sigma + reach;
+      const Range& possible = info.parameters[i].range;
+      const bool at_low = reach > 0.0 && e.value <= h.free[j].low;
+      const bool at_high = reach > 0.0 && e.value >= h.free[j].high;
+      if (!at_low) e.low = std::max(e.value - half_width, possible.low);
+      if (!at_high) e.high = std::min(e.value + half_width, possible.high);
     }
     result.push_back(e);
   }

@@ -81,8 +81,10 @@ FitResult result_of(const GaussNewton& solver, const std::vector<FreeParameter>&
   const GaussNewton::Information information = solver.information();
   result.information = information.total;
   result.dispersion = dispersion(information.total - solver.prior().information(), information.scatter);
-  result.covariance = sandwich_covariance(information.total, information.scatter,
-                                          solver.prior().information(), at_bounds(result.point.plant, free));
+  const std::vector<bool> held = at_bounds(result.point.plant, free);
+  result.covariance =
+      sandwich_covariance(information.total, information.scatter, solver.prior().information(), held);
+  result.bound_reach = reach_from_bounds(information.total, information.score, result.dispersion, held);
   if (!std::isfinite(result.objective)) return result;
   const GaussNewton::Step further = solver.further_step();
   result.bounded_reduction = further.predicted_reduction;

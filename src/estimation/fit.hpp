@@ -59,7 +59,9 @@ struct FitResult {
   std::vector<double> block_objective;     ///< the same by blocks of a quarter of a second, in order
   std::vector<double> segment_chi_square;  ///< sum of squared whitened residuals, by segment
   std::vector<double> segment_samples;     ///< number of residuals in that sum, weighted
-  Eigen::MatrixXd covariance;   ///< of the free parameters, robust to coloured noise (sandwich estimator)
+  Eigen::MatrixXd covariance;  ///< of the free parameters, robust to coloured noise (sandwich estimator)
+  /// How far from its bound each free parameter that is there may be (95 %); zero for the others.
+  Eigen::VectorXd bound_reach;
   Eigen::MatrixXd information;  ///< of the free parameters, initial states eliminated
   /// Variance of the scores of segments relative to what the likelihood says: 1 if the noise is as modelled.
   double dispersion = 1.0;

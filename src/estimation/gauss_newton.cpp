@@ -239,14 +239,16 @@ std::vector<ParameterEquations> parameter_equations(const FitData& data, const F
 GaussNewton::Information GaussNewton::information() const {
   const auto np = static_cast<Eigen::Index>(free_.size());
   Matrix h = prior_.information(), spread = Matrix::Zero(np, np);
+  Eigen::VectorXd score = -prior_.information() * prior_.deviation(point_.plant);
   for (const LinearisedSegment& segment : linearised_) {
     const ParameterEquations reduced = without_initial_state(segment.normal, np);
     h += reduced.information;
     spread += reduced.score * reduced.score.transpose();
+    score += reduced.score;
   }
   const auto segments = static_cast<double>(linearised_.size());
   const double small_sample = segments > np + 1.0 ? segments / (segments - 1.0) : 2.0;
-  return {h, spread * small_sample};
+  return {h, spread * small_sample, score};
 }
 
 /// The Gauss-Newton step of all segments: parameters first (initial states eliminated), then each initial

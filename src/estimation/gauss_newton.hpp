@@ -44,10 +44,12 @@ class GaussNewton {
   /// Descends from an evaluated point of this objective. A step counts only if the whole objective falls,
   /// weights and log variances included.
   void descend(double& objective);
-  /// The information on the parameters without damping, and the scatter of their scores over segments as if
-  /// there were more of them (small-sample correction).
+  /// The information on the parameters without damping, the scatter of their scores over segments as if there
+  /// were more of them (small-sample correction), and the sum of the scores. Priors are in all but the
+  /// scatter.
   struct Information {
     Eigen::MatrixXd total, scatter;
+    Eigen::VectorXd score;
   };
   Information information() const;
   /// The next step, were it hardly damped.

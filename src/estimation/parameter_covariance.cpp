@@ -4,6 +4,7 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 namespace upright {
 
@@ -50,12 +51,46 @@ Matrix without_held(Matrix h, const std::vector<bool>& held) {
   return h;
 }
 
+/// Below which a normal deviate is with 95 % confidence that is at least `lowest`; by how much it is above
+/// it.
+double reach_above(double lowest) {
+  constexpr double share_above = 0.05, exponential_from = 30.0;
+  // The tail is nearly exponential there.
+  if (lowest > exponential_from) return -std::log(share_above) / lowest;
+  const auto above = [](double deviate) { return std::erfc(deviate * std::numbers::sqrt2 / 2.0); };
+  double low = 0.0, high = exponential_from;
+  constexpr int halvings = 40;
+  for (int i = 0; i < halvings; ++i) {
+    const double middle = 0.5 * (low + high);
+    (above(lowest + middle) > share_above * above(lowest) ? low : high) = middle;
+  }
+  return high;
+}
+
 }  // namespace
 
 Matrix sandwich_covariance(const Matrix& information, const Matrix& spread, const Matrix& prior,
                            const std::vector<bool>& held) {
   const Matrix inverse = inverse_of(without_held(information, held));
   return inverse * (robust_spread(information - prior, spread) + prior) * inverse;
+}
+
+Eigen::VectorXd reach_from_bounds(const Matrix& information, const Eigen::VectorXd& score, double dispersion,
+                                  const std::vector<bool>& held) {
+  Eigen::VectorXd reach = Eigen::VectorXd::Zero(score.size());
+  const Matrix of_others = inverse_of(without_held(information, held));
+  for (Eigen::Index j = 0; j < score.size(); ++j) {
+    if (!held[static_cast<std::size_t>(j)]) continue;
+    // The others follow it.
+    Eigen::VectorXd coupled = information.col(j);
+    for (Eigen::Index i = 0; i < coupled.size(); ++i)
+      if (held[static_cast<std::size_t>(i)]) coupled[i] = 0.0;
+    const double own = information(j, j) - coupled.dot(of_others * coupled);
+    if (!(own > 0.0)) continue;
+    const double sigma = std::sqrt(dispersion / own);
+    reach[j] = sigma * reach_above(std::abs(score[j]) / own / sigma);
+  }
+  return reach;
 }
 
 double dispersion(const Matrix& information, const Matrix& spread) {
