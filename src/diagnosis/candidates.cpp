@@ -21,10 +21,13 @@ bool is_table(std::size_t effect) {
 /// Of the forces at work in these runs, whatever the size of the rig: a few percent of the motor's.
 double order_of_magnitude(const ParameterInfo& info, const DataRange& range, const PriorPolicy& prior) {
   const double force = prior.share_of_motor_force * range.largest_force_n;
-  if (info.unit == "N") return std::max(info.typical, force);
-  if (info.unit == "N/(m/s)" && range.largest_speed_mps > 0.0)
-    return std::max(info.typical, force / range.largest_speed_mps);
-  return info.typical;
+  const double speed = range.largest_speed_mps, travel = range.longest_travel_m;
+  double order = 0.0;
+  if (info.unit == "N") order = force;
+  if (info.unit == "N/m" && travel > 0.0) order = force / travel;
+  if (info.unit == "N/(m/s)" && speed > 0.0) order = force / speed;
+  if (info.unit == "N s^2/m^2" && speed > 0.0) order = force / (speed * speed);
+  return std::max(info.typical, order);
 }
 
 FreeParameter free_parameter(std::size_t effect, std::size_t index, const DataRange& range,
@@ -325,7 +328,8 @@ std::vector<std::vector<double>> search_starts(std::size_t effect, const DataRan
   if (is_named(effect, "stribeck_friction"))
     return {{0.2, std::max(0.005, std::min(0.1, 0.2 * speed)), 2.0},
             {0.2, std::max(0.003, 0.03 * speed), 2.0}};
-  if (is_named(effect, "cable_spring")) return {{0.5, range.cart_mean_m}};
+  if (is_named(effect, "cable_spring"))
+    return {{0.25 * order_of_magnitude(info.parameters[0], range, prior), range.cart_mean_m}};
   if (is_named(effect, "bristle_friction")) return {{120.0, 20.0}, {2000.0, 20.0}};
   if (is_named(effect, "input_delay")) return {{0.5 * range.shortest_period_s}, {0.01}};
   if (is_named(effect, "motor_lag")) return {{std::max(0.001, 0.5 * range.shortest_period_s)}, {0.01}};

@@ -1,0 +1,52 @@
+// A rig with all masses and forces larger by the same factor moves alike, so it gets the same answer.
+#include <gtest/gtest.h>
+
+#include <string>
+
+#include "named_effects.hpp"
+
+namespace upright {
+namespace {
+
+Plant heavier(Plant plant, double factor) {
+  plant.cart_mass_kg *= factor;
+  plant.motor.force_per_volt_n *= factor;
+  plant.motor.back_emf_n_per_mps *= factor;
+  for (const char* kind : {"viscous_friction", "coulomb_friction", "cable_spring", "quadratic_drag"})
+    if (const PlantEffect* effect = plant.find(kind)) {
+      std::array values = effect->values;
+      values[0] *= factor;
+      plant.set(effect->number, values);
+    }
+  return plant;
+}
+
+/// The size of an effect that is named in runs of a rig that has it; NaN if it is not.
+double found_size(const Plant& believed, const Plant& truth, std::string_view kind) {
+  const Diagnosis d = diagnose(believed, three_runs({.plant = truth}, 6.0, 11), {});
+  for (const FoundEffect& effect : d.effects)
+    if (kind_of(effect.effect) == kind) return effect.parameters[0].value;
+  return std::numeric_limits<double>::quiet_NaN();
+}
+
+void expect_alike(std::string_view kind, std::initializer_list<double> values) {
+  Plant truth = cart_with_friction();
+  truth.set(kind, values);
+  const double size = found_size(cart_with_friction(), truth, kind);
+  constexpr double factor = 85.0;
+  EXPECT_NEAR(size, *values.begin(), 0.05 * size) << kind;
+  EXPECT_NEAR(found_size(heavier(cart_with_friction(), factor), heavier(truth, factor), kind), factor * size,
+              0.01 * factor * size)
+      << kind;
+}
+
+TEST(HeavyRig, HasTheSameSpring) {
+  expect_alike("cable_spring", {40.0, 0.1});
+}
+
+TEST(HeavyRig, HasTheSameDrag) {
+  expect_alike("quadratic_drag", {15.0});
+}
+
+}  // namespace
+}  // namespace upright
