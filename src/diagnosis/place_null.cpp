@@ -51,6 +51,14 @@ std::optional<Eigen::VectorXd> force_of_place(const PlantEffect& effect, const C
   return force_n;
 }
 
+/// Whether the force grows in proportion to the place, or not at all.
+bool is_trend(const Eigen::VectorXd& force_n) {
+  const Eigen::Index inner = force_n.size() - 2;
+  const Eigen::VectorXd bend = force_n.head(inner) - 2.0 * force_n.segment(1, inner) + force_n.tail(inner);
+  constexpr double rounding = 1e-9;
+  return bend.cwiseAbs().maxCoeff() <= rounding * force_n.cwiseAbs().maxCoeff();
+}
+
 class PlaceNull {
  public:
   PlaceNull(const Search& search, const Hypothesis& known)
@@ -70,8 +78,7 @@ class PlaceNull {
     return force_of_place(*known_.train.point.plant.find(effect), nodes_);
   }
 
-  /// What the effect saves beside the force, after the penalty of its parameters. Without the effect, the
-  /// force has a size and a length of its own.
+  /// What the effect saves beside the force, after the penalty of its parameters.
   double evidence_of(std::size_t effect) const {
     const Plant& plant = known_.train.point.plant;
     if (!is_removable(plant, effect, search_.given())) return std::numeric_limits<double>::infinity();
@@ -82,16 +89,18 @@ class PlaceNull {
 
  private:
   /// By how much the objective rises if the track's force has to supply this one too. The innovations are
-  /// linear in such a force, so nothing is fitted anew.
+  /// linear in such a force, so nothing is fitted anew. The size and the length of the track's force are
+  /// estimated anew then, but not for a trend: a random force as long as the travel would be one itself.
   double replaced_by_track(const Eigen::VectorXd& force_n) const {
     CurveEquations equations = equations_at(known_.train.point);
     const Eigen::VectorXd shift = equations.information * force_n;
     const double rise = force_n.dot(shift + 2.0 * equations.score);
     equations.score += shift;
-    return rise + RandomCurve(equations, nodes_).change();
+    return rise +
+           (is_trend(force_n) ? track_->change_with(equations) : RandomCurve(equations, nodes_).change());
   }
 
-  /// By how much it rises in a fit without the effect, beside the track's force.
+  /// By how much it rises in a fit without the effect, beside a track's force of its own size and length.
   double fitted_without(std::size_t effect) const {
     FitOptions same_noise;
     same_noise.noise_rounds = 0;
@@ -113,14 +122,6 @@ class PlaceNull {
   CurveNodes nodes_;
   std::optional<RandomCurve> track_;
 };
-
-/// Whether the force grows in proportion to the place, or not at all.
-bool is_trend(const Eigen::VectorXd& force_n) {
-  const Eigen::Index inner = force_n.size() - 2;
-  const Eigen::VectorXd bend = force_n.head(inner) - 2.0 * force_n.segment(1, inner) + force_n.tail(inner);
-  constexpr double rounding = 1e-9;
-  return bend.cwiseAbs().maxCoeff() <= rounding * force_n.cwiseAbs().maxCoeff();
-}
 
 /// What a model would lack without an effect.
 enum class Needed { no, as_average, by_itself };

@@ -4,7 +4,8 @@
 // The likelihood counts each pass as new evidence, so an effect that resembles the track's force, such as a
 // cogging force of the best pitch, is found with more evidence the longer the record is. So each effect is
 // tested once more beside a random force of the place, whose values are integrated out. Its size and
-// correlation length are estimated with and without the effect.
+// correlation length are estimated with and without the effect. Without a force that grows in proportion to
+// the place they stay: a random force as long as the travel would do the same.
 #pragma once
 
 #include <optional>

@@ -75,6 +75,10 @@ double RandomCurve::deviation() const {
   return std::sqrt(variance_);
 }
 
+double RandomCurve::change_with(const CurveEquations& equations) const {
+  return PrincipalAxes(equations, nodes_, length_).marginal_change(variance_);
+}
+
 Eigen::VectorXd RandomCurve::mean(const CurveEquations& equations) const {
   const PrincipalAxes axes(equations, nodes_, length_);
   const Eigen::ArrayXd expected =

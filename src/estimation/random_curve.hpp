@@ -25,6 +25,8 @@ class RandomCurve {
   /// Correlation length.
   double length() const { return length_; }
 
+  /// The same change with other equations, with the size and the length held.
+  double change_with(const CurveEquations& equations) const;
   /// The expected values at the nodes, from these equations and the prior.
   Eigen::VectorXd mean(const CurveEquations& equations) const;
   /// Inverse of the prior covariance of its values at these nodes.
