@@ -8,7 +8,7 @@
 namespace upright {
 namespace {
 
-TEST(ReachFromBounds, IsThatOfAHalfNormalWhereTheDataAreContentWithTheBound) {
+TEST(ReachFromBounds, IsThatOfAHalfNormalWithoutADraw) {
   const Eigen::MatrixXd information{{4.0}};
   const Eigen::VectorXd score{{0.0}};
   const double two_sided_95 = 1.959964;
@@ -16,7 +16,7 @@ TEST(ReachFromBounds, IsThatOfAHalfNormalWhereTheDataAreContentWithTheBound) {
   EXPECT_NEAR(reach_from_bounds(information, score, 9.0, {true})[0], two_sided_95 * 1.5, 1e-6);
 }
 
-TEST(ReachFromBounds, IsThatOfAnExponentialWhereTheDataDrawFarBeyond) {
+TEST(ReachFromBounds, IsThatOfAnExponentialUnderAStrongDraw) {
   const Eigen::MatrixXd information{{4.0}};
   for (const double slope : {-1000.0, 1000.0})
     EXPECT_NEAR(reach_from_bounds(information, Eigen::VectorXd{{slope}}, 1.0, {true})[0],
