@@ -2,19 +2,12 @@
 #pragma once
 
 #include <optional>
-#include <string>
 #include <vector>
 
+#include "outdone_effect.hpp"
 #include "reproducibility.hpp"
 
 namespace upright {
-
-/// An effect, and what does as well as it.
-struct OutdoneEffect {
-  std::size_t effect = 0;    ///< number in the registry
-  std::string where;         ///< a sentence for the listing of effects that help here only
-  bool was_average = false;  ///< a constant force is needed in its place
-};
 
 /// One of these effects that a disturbance outdoes: one that varies slowly (coloured_null.hpp), or one that
 /// belongs to the place (place_null.hpp). `known`: a fit to all data, `judged`: to the training data.

@@ -67,7 +67,9 @@ class PlaceNull {
         all_(search.all_data()),
         places_(shown_places(all_)),
         nodes_(nodes_over(places_, search.budget().track_nodes)) {
-    if (nodes_.count > 0) track_.emplace(equations_at(known.train.point), nodes_);
+    if (nodes_.count == 0) return;
+    equations_ = equations_at(known.train.point);
+    track_.emplace(equations_, nodes_);
   }
 
   /// Null if there is none.
@@ -92,7 +94,7 @@ class PlaceNull {
   /// linear in such a force, so nothing is fitted anew. The size and the length of the track's force are
   /// estimated anew then, but not for a trend: a random force as long as the travel would be one itself.
   double replaced_by_track(const Eigen::VectorXd& force_n) const {
-    CurveEquations equations = equations_at(known_.train.point);
+    CurveEquations equations = equations_;
     const Eigen::VectorXd shift = equations.information * force_n;
     const double rise = force_n.dot(shift + 2.0 * equations.score);
     equations.score += shift;
@@ -120,6 +122,7 @@ class PlaceNull {
   FitData all_;
   std::vector<CurveArgument> places_;
   CurveNodes nodes_;
+  CurveEquations equations_;  ///< at the fit with all effects
   std::optional<RandomCurve> track_;
 };
 
@@ -147,10 +150,10 @@ Needed how_needed(Search& search, const Hypothesis& judged, const std::vector<Re
 
 }  // namespace
 
-std::optional<OutdoneByPlace> outdone_by_place(Search& search, const Hypothesis& known,
-                                               const Hypothesis& judged,
-                                               const std::vector<Reproduction>& effects) {
-  std::optional<OutdoneByPlace> worst;
+std::optional<OutdoneEffect> outdone_by_place(Search& search, const Hypothesis& known,
+                                              const Hypothesis& judged,
+                                              const std::vector<Reproduction>& effects) {
+  std::optional<OutdoneEffect> worst;
   if (known.train.point.starts.size() != search.all_data().segments.size()) return worst;
   std::optional<PlaceNull> null;
   double least = search.policy().acceptance.min_evidence;
@@ -165,7 +168,9 @@ std::optional<OutdoneByPlace> outdone_by_place(Search& search, const Hypothesis&
     const Needed needed = may_be_average ? how_needed(search, judged, effects, found.effect) : Needed::no;
     if (needed == Needed::by_itself) continue;
     least = evidence;
-    worst = OutdoneByPlace{found.effect, needed == Needed::as_average};
+    worst = OutdoneEffect{found.effect,
+                          "a random force that belongs to the place accounts for these data as well",
+                          needed == Needed::as_average};
   }
   return worst;
 }

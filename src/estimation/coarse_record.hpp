@@ -13,8 +13,8 @@ struct Thinning {
   double largest_shift;  ///< by how much a mean voltage may move the cart [of the noise of its sensor]
 };
 
-/// Samples of each run that are at most about `period_s` apart. Their voltages are `commands`: of several in
-/// a row one with their mean, but all where the cart may stick, or where the mean would move it too far.
+/// Samples of each run that are at most about `period_s` apart. Their voltages are `commands`: several
+/// in a row become one with their mean. All stay where the cart may stick, or the mean would move it too far.
 /// `voltage_v` is the mean from each sample to the next. Gaps stay gaps.
 std::vector<Measurement> coarse_runs(const std::vector<Measurement>& runs, const Plant& plant,
                                      const Thinning& thinning);

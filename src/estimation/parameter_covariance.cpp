@@ -51,8 +51,8 @@ Matrix without_held(Matrix h, const std::vector<bool>& held) {
   return h;
 }
 
-/// Below which a normal deviate is with 95 % confidence that is at least `lowest`; by how much it is above
-/// it.
+/// Of a normal deviate that is known to be above `lowest`: by how much it is above it at most, with 95 %
+/// confidence.
 double reach_above(double lowest) {
   constexpr double share_above = 0.05, exponential_from = 30.0;
   // The tail is nearly exponential there.
@@ -78,14 +78,12 @@ Matrix sandwich_covariance(const Matrix& information, const Matrix& spread, cons
 Eigen::VectorXd reach_from_bounds(const Matrix& information, const Eigen::VectorXd& score, double dispersion,
                                   const std::vector<bool>& held) {
   Eigen::VectorXd reach = Eigen::VectorXd::Zero(score.size());
+  if (std::find(held.begin(), held.end(), true) == held.end()) return reach;
   const Matrix of_others = inverse_of(without_held(information, held));
   for (Eigen::Index j = 0; j < score.size(); ++j) {
     if (!held[static_cast<std::size_t>(j)]) continue;
-    // The others follow it.
-    Eigen::VectorXd coupled = information.col(j);
-    for (Eigen::Index i = 0; i < coupled.size(); ++i)
-      if (held[static_cast<std::size_t>(i)]) coupled[i] = 0.0;
-    const double own = information(j, j) - coupled.dot(of_others * coupled);
+    // Those that are not held follow it.
+    const double own = information(j, j) - information.col(j).dot(of_others * information.col(j));
     if (!(own > 0.0)) continue;
     const double sigma = std::sqrt(dispersion / own);
     reach[j] = sigma * reach_above(std::abs(score[j]) / own / sigma);
