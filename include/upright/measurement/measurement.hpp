@@ -43,10 +43,10 @@ struct Measurement {
   std::optional<double> known_cart_noise_m;
   std::optional<double> known_theta_noise_rad;  ///< the same of theta_noise_rad()
   std::vector<std::size_t> breaks;              ///< samples preceded by missing rows: no segment crosses them
-  /// Of a record with fewer samples than commands: all commands, of which `voltage_v` is the mean, and of
-  /// each sample the first at its time. Both empty: each sample has one, `voltage_v`.
+  /// Of a record with fewer samples than commands: all commands, of which `voltage_v` is the mean. Empty:
+  /// each sample has one, `voltage_v`.
   std::vector<VoltageCommand> commands;
-  std::vector<std::size_t> first_command;
+  std::vector<std::size_t> first_command;  ///< of each sample the first of `commands` at its time, or empty
   std::vector<Unfolding> unfoldings;       ///< of an angle that its source folded
   std::shared_ptr<const Dataset> dataset;  ///< how it was read; null if not from a file
   std::size_t missing_rows = 0;            ///< rows of the file with a cell that has no number

@@ -22,7 +22,7 @@ namespace upright {
 /// A voltage that is held for a time.
 template <class S>
 struct HeldVoltage {
-  S duration_s{};
+  S duration_s{};          ///< how long [s]
   double voltage_v = 0.0;  ///< after the input delay [V]
 };
 

@@ -18,12 +18,12 @@ PlantState<double> plain_state(const PlantState<S>& s) {
           value_of(s.theta_radps), value_of(s.motor_v),   value_of(s.bristle_m)};
 }
 
-/// The motor's voltage over a step: its mean, which gives the same impulse, with the derivatives at this
-/// length; what it ends at; and its first moment about the end beyond that of the mean.
+/// The motor's voltage over a step, with the derivatives at this length.
 template <class S>
 struct StepVoltage {
-  S mean_v, end_v;
-  S moment_vs2{};
+  S mean_v{};      ///< gives the same impulse [V]
+  S end_v{};       ///< at the end of the step [V]
+  S moment_vs2{};  ///< first moment about the end of the step, beyond that of the mean [V s^2]
 };
 
 /// For dual numbers S. The dynamics must outlive it.
