@@ -36,6 +36,11 @@ void YamlKeyReader::text(const char* key, std::string& value, const std::optiona
   value = otherwise ? map_.text_or(key, *otherwise) : map_.text(key);
 }
 
+void YamlKeyReader::texts(const char* key, std::map<std::string, std::string>& values) {
+  const YamlMap texts = map_.map(key);
+  for (const std::string& name : texts.keys()) values[name] = texts.text(name);
+}
+
 void YamlKeyReader::path(const char* key, std::filesystem::path& value) {
   value = map_.path(key);
 }

@@ -9,6 +9,7 @@
 #include <filesystem>
 #include <functional>
 #include <limits>
+#include <map>
 #include <optional>
 #include <string>
 #include <type_traits>
@@ -56,6 +57,8 @@ class YamlKeys {
   virtual void text(const char* /*key*/, std::string& /*value*/,
                     const std::optional<std::string>& /*otherwise*/ = required,
                     Usual /*usual*/ = Usual::written) {}
+  /// A map with free keys and a text for each, of files that are only read.
+  virtual void texts(const char* /*key*/, std::map<std::string, std::string>& /*values*/) {}
   /// Relative to the folder of the file.
   virtual void path(const char* /*key*/, std::filesystem::path& /*value*/) {}
   /// A map of keys, on one line when written.
@@ -223,6 +226,7 @@ class YamlKeyReader : public virtual YamlKeys {
   void flag(const char* key, bool& value, bool otherwise, Usual usual) override;
   void text(const char* key, std::string& value, const std::optional<std::string>& otherwise,
             Usual usual) override;
+  void texts(const char* key, std::map<std::string, std::string>& values) override;
   void path(const char* key, std::filesystem::path& value) override;
   void map(const char* key, const Visit& visit) override;
   bool given(const char* key, bool is_set) override;

@@ -1,7 +1,6 @@
 #include "run_differences.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <sstream>
 
@@ -55,62 +54,11 @@ double certainty_of_help(const Eigen::VectorXd& size, const Eigen::VectorXd& var
   return normal_deviate(0.5 * std::abs(mean) / spread, freedom);
 }
 
-/// What a run can be told by.
-struct RunFeature {
-  const char* name;
-  double (*of)(const Measurement&);
-};
-
-double mean_position(const Measurement& run) {
-  double sum = 0.0;
-  for (const double x : run.cart_m) sum += x;
-  return sum / std::max(1.0, static_cast<double>(run.cart_m.size()));
-}
-
-double stroke(const Measurement& run) {
-  if (run.cart_m.empty()) return 0.0;
-  const auto [low, high] = std::minmax_element(run.cart_m.begin(), run.cart_m.end());
-  return *high - *low;
-}
-
-double voltage(const Measurement& run) {
-  double square = 0.0;
-  for (const double v : run.voltage_v) square += v * v;
-  return std::sqrt(square / std::max(1.0, static_cast<double>(run.voltage_v.size())));
-}
-
-constexpr std::array<RunFeature, 3> run_features = {RunFeature{"the place on the track", mean_position},
-                                                    RunFeature{"the stroke", stroke},
-                                                    RunFeature{"the voltage", voltage}};
-
-/// The correlation of two quantities as a normal deviate; 0 for too few runs.
-double certainty_of_line(const std::vector<double>& x, const Eigen::VectorXd& y) {
-  const auto n = static_cast<Eigen::Index>(x.size());
-  const double freedom = static_cast<double>(n) - 2.0;
-  if (freedom < 2.0) return 0.0;
-  const Eigen::ArrayXd a =
-      Eigen::Map<const Eigen::ArrayXd>(x.data(), n) - Eigen::Map<const Eigen::ArrayXd>(x.data(), n).mean();
-  const Eigen::ArrayXd b = y.array() - y.mean();
-  const double scale = std::sqrt(a.square().sum() * b.square().sum());
-  if (!(scale > 0.0)) return 0.0;
-  const double r = std::clamp((a * b).sum() / scale, -1.0 + 1e-12, 1.0 - 1e-12);
-  return normal_deviate(r * std::sqrt(freedom / (1.0 - r * r)), freedom);
-}
-
-std::string what_it_goes_with(const SizeByRun& sizes, const std::vector<Measurement>& runs) {
-  // One of so many features is found by chance once in twenty times.
-  const double tail = 0.025 / static_cast<double>(run_features.size());
-  std::string best;
-  double most = 0.0;
-  for (const RunFeature& feature : run_features) {
-    std::vector<double> x;
-    for (const std::size_t run : sizes.runs) x.push_back(feature.of(runs[run]));
-    const double certainty = certainty_of_line(x, sizes.value);
-    if (!(upper_tail(certainty) < tail) || !(certainty > most)) continue;
-    most = certainty;
-    best = feature.name;
-  }
-  return best;
+/// The runs of these sizes.
+std::vector<const Measurement*> runs_of(const SizeByRun& sizes, const std::vector<Measurement>& runs) {
+  std::vector<const Measurement*> of;
+  for (const std::size_t run : sizes.runs) of.push_back(&runs[run]);
+  return of;
 }
 
 RunDifference difference_of(std::size_t effect, const SizeByRun& sizes, const std::vector<Measurement>& runs,
@@ -127,7 +75,7 @@ RunDifference difference_of(std::size_t effect, const SizeByRun& sizes, const st
     result.certainty = std::max(result.certainty, deviate);
   }
   result.certainty_of_help = certainty_of_help(sizes.value.array() - nothing, variance, policy);
-  result.goes_with = what_it_goes_with(sizes, runs);
+  result.depends = dependences_of(sizes.value, runs_of(sizes, runs));
   return result;
 }
 
@@ -166,13 +114,18 @@ std::string sentence_on(const RunDifference& difference, const std::vector<Measu
   std::ostringstream text;
   text.precision(3);
   text << "its size differs from run to run by more than its uncertainty";
-  if (!difference.goes_with.empty()) text << ", and depends on " << difference.goes_with;
-  text << ":";
-  const char* separator = " ";
-  for (const RunSize& of : difference.sizes) {
-    text << separator << of.value << " " << size.unit << " in " << runs[of.run].name;
-    separator = ", ";
+  const std::vector<std::string>* label = nullptr;
+  for (const RunDependence& feature : difference.depends) {
+    text << (&feature == &difference.depends.front() ? ", and depends on " : " or on ") << feature.on;
+    if (!label && !feature.texts.empty()) label = &feature.texts;
   }
+  text << ":";
+  for (std::size_t i = 0; i < difference.sizes.size(); ++i) {
+    const RunSize& of = difference.sizes[i];
+    text << (i > 0 ? ", " : " ") << of.value << " " << size.unit << " in " << runs[of.run].name;
+    if (label) text << " (" << (*label)[i] << ")";
+  }
+  text << "; for a model of some of these runs, diagnose them alone";
   return text.str();
 }
 

@@ -14,6 +14,7 @@
 #include <string>
 #include <vector>
 
+#include "run_features.hpp"
 #include "search.hpp"
 #include "upright/diagnosis/diagnosis.hpp"
 
@@ -27,7 +28,7 @@ struct RunDifference {
   double certainty = 0.0;
   /// By how much half of the mean size exceeds what a new run may be below it [standard errors].
   double certainty_of_help = 0.0;
-  std::string goes_with;  ///< what the size depends on, in words; empty: nothing that was tried
+  std::vector<RunDependence> depends;  ///< what the size may depend on, the surest first
 };
 
 /// Of each of these effects of `h`, a fit to all data, that the plant file lacks. Empty if there is one run.

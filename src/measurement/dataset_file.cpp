@@ -226,6 +226,7 @@ void dataset_keys(YamlKeys& document, Dataset& dataset) {
       resolution.optional_number("cart_m", dataset.cart_resolution_m, Range::positive());
       resolution.optional_number("theta_rad", dataset.theta_resolution_rad, Range::positive());
     });
+    if (keys.given("labels", false)) keys.texts("labels", dataset.labels);
     if (const YamlMap* map = keys.source()) map->finish();
     keys.check("columns", dataset.columns.contains("time_s"), "does not contain time_s",
                "map time_s to the column with the time");

@@ -48,6 +48,8 @@ struct Dataset {
   bool cart_locked = false;
   std::optional<double> cart_resolution_m, theta_resolution_rad;
   std::optional<double> from_s, to_s;
+  /// What distinguishes this run from others of the rig: a name and a text or number for each.
+  std::map<std::string, std::string> labels;
 };
 
 /// Throws ConfigError with file, line and key.

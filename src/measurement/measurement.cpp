@@ -282,13 +282,14 @@ Measurement load(Dataset dataset, const std::string& name) {
   return m;
 }
 
-/// A run directory's mapping. Of an experiment's run, what somebody's hands did is left out: before the
+/// A run directory's mapping, with the time of recording as a label. Of an experiment's run, what somebody's hands did is left out: before the
 /// pendulum was let go no equation of motion holds.
 Dataset mapping_of_run(const fs::path& directory) {
   Dataset mapping = plain_dataset(directory / "samples.csv");
   std::error_code problem;
   if (!fs::exists(directory / "run.yaml", problem)) return mapping;
   const YamlMap document = YamlMap::from_file(directory / "run.yaml");
+  mapping.labels["recorded"] = document.text_or("started_utc", "");
   if (!document.has("experiment")) return mapping;
   const Piece piece = read_piece(document.map("experiment").map("piece"));
   const bool decays = piece.as<pieces::FreeDecay>() != nullptr;

@@ -50,6 +50,9 @@ class SchemaKeys final : public PieceKeys {
     define(key, text_schema(otherwise ? 0 : 1), !otherwise);
     value = "text";
   }
+  void texts(const char* key, std::map<std::string, std::string>&) override {
+    define(key, {{"type", "object"}, {"additionalProperties", text_schema(1)}}, true);
+  }
   void path(const char* key, std::filesystem::path& value) override {
     define(key, text_schema(1), true);
     value = "file";

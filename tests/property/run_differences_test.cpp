@@ -2,28 +2,30 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <memory>
 
+#include "measurement/dataset_file.hpp"
 #include "named_effects.hpp"
 
 namespace upright {
 namespace {
 
 /// A run of a cart with Coulomb friction of 0.4 N and this constant force.
-Measurement run_with_force(double force_n, unsigned number) {
+Measurement run_with_force(double force_n, unsigned number, double duration_s) {
   blind::Rig rig{.plant = cart_with_friction()};
   rig.plant.set("constant_force", {force_n});
   blind::Plan plan;
   plan.experiment = number % 2 == 1 ? blind::Experiment::square : blind::Experiment::multisine;
   plan.rate_hz = 200.0;
-  plan.duration_s = 8.0;
+  plan.duration_s = duration_s;
   plan.seed = 500 + number;
   return measure(rig, plan, "run" + std::to_string(number));
 }
 
-std::vector<Measurement> runs_with_forces(const std::vector<double>& forces_n) {
+std::vector<Measurement> runs_with_forces(const std::vector<double>& forces_n, double duration_s = 8.0) {
   std::vector<Measurement> runs;
   for (const double force_n : forces_n)
-    runs.push_back(run_with_force(force_n, static_cast<unsigned>(runs.size())));
+    runs.push_back(run_with_force(force_n, static_cast<unsigned>(runs.size()), duration_s));
   return runs;
 }
 
@@ -65,6 +67,20 @@ TEST(RunDifferences, AForceOfTheRunIsNotNamed) {
     EXPECT_NEAR(std::abs(force->by_run[r].value), forces_n[r], 0.01) << r;
   }
   EXPECT_NE(force->where.find("differs from run to run"), std::string::npos) << force->where;
+}
+
+TEST(RunDifferences, ItSaysOfWhichLabelTheForceIs) {
+  std::vector<Measurement> runs = runs_with_forces({0.30, 0.03, 0.31, 0.02, 0.29}, 4.0);
+  for (std::size_t r = 0; r < runs.size(); ++r) {
+    auto dataset = std::make_shared<Dataset>();
+    dataset->labels = {{"cable", r % 2 == 0 ? "new" : "old"}, {"operator", r < 3 ? "Kim" : "Lee"}};
+    runs[r].dataset = dataset;
+  }
+  const Diagnosis d = diagnose(cart_with_friction(), runs);
+  const LocalEffect* force = local_constant_force(d);
+  ASSERT_NE(force, nullptr) << listed(d);
+  EXPECT_NE(force->where.find("on the label cable"), std::string::npos) << force->where;
+  EXPECT_NE(force->where.find("in run1 (old)"), std::string::npos) << force->where;
 }
 
 TEST(RunDifferences, AForceOfTheRigIsNamed) {
