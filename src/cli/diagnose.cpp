@@ -11,6 +11,7 @@
 #include "commands.hpp"
 #include "diagnosis/described_curve.hpp"
 #include "diagnosis/diagnosis_json.hpp"
+#include "diagnosis/motion_range.hpp"
 #include "diagnosis/plain_words.hpp"
 #include "diagnosis/simulated_segments.hpp"
 #include "diagnosis/validation.hpp"
@@ -204,10 +205,21 @@ std::string score_text(const ModelScore& score) {
 void print_validation(const Diagnosis& d) {
   if (d.validation.empty()) return;
   std::printf("Validation on runs that were not fitted (open-loop simulation: gap, RMS error):\n");
-  for (const ValidatedRun& run : d.validation)
+  for (const ValidatedRun& run : d.validation) {
     std::printf("  %s: %s as given; %s with the model found%s\n", run.name.c_str(),
                 score_text(run.given).c_str(), score_text(run.found).c_str(),
                 run.is_worse() ? ". WORSE: the model found is further off than the one given" : "");
+    if (!run.beyond.empty())
+      std::printf("      beyond the measured range, where the model is not tested: %s\n",
+                  range_text(run.beyond).c_str());
+  }
+}
+
+/// Where the model is tested.
+void print_range(const Diagnosis& d) {
+  if (d.measured_range.empty()) return;
+  std::printf("Measured range, beyond which the model is not tested: %s.\n",
+              range_text(d.measured_range).c_str());
 }
 
 void print(const Diagnosis& d, const std::string& out) {
@@ -232,6 +244,7 @@ void print(const Diagnosis& d, const std::string& out) {
   }
   print_local(d);
   print_numbers(d);
+  print_range(d);
   print_validation(d);
   print_steps(d);
   std::printf("Residual tests: %s.\n", in_plain_words(d.residual).c_str());
@@ -258,6 +271,9 @@ void print_trials(const Diagnosis& d) {
 std::vector<std::string> provenance(const Diagnosis& d, const DiagnoseFlags& flags) {
   std::vector<std::string> lines = {"Diagnosed from " + flags.model + " by upright " UPRIGHT_VERSION "."};
   for (const std::string& data : flags.data) lines.push_back("data: " + data);
+  if (!d.measured_range.empty())
+    lines.push_back("The model is not tested beyond the measured range: " + range_text(d.measured_range) +
+                    ".");
   if (!d.examined) lines.emplace_back("The search was not finished: nothing says that this model is right.");
   for (const FoundEffect& effect : d.effects) {
     char text[200];

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "motion_range.hpp"
+
 namespace upright {
 
 namespace {
@@ -54,9 +56,15 @@ double longest_pitch_m(const DataRange& range, const PriorPolicy& prior) {
 
 DataRange range_of(const std::vector<Measurement>& runs, const Plant& plant, const ExcitationPolicy& policy) {
   DataRange range;
-  bool first = true;
   double sum = 0.0, count = 0.0;
   range.shortest_period_s = 1.0;
+  for (const QuantityRange& of : motion_range(runs, policy.speed_window_s)) {
+    const double largest = std::max(std::abs(of.low), std::abs(of.high));
+    if (of.quantity == "cart_mps") range.largest_speed_mps = largest;
+    if (of.quantity != "cart_m") continue;
+    range.cart_low_m = of.low;
+    range.cart_high_m = of.high;
+  }
   for (const Measurement& run : runs) {
     range.theta_measured = range.theta_measured || run.has_theta();
     range.theta_resolution_rad = std::max(range.theta_resolution_rad, run.theta_resolution_rad);
@@ -68,18 +76,9 @@ DataRange range_of(const std::vector<Measurement>& runs, const Plant& plant, con
     const auto [low, high] = std::minmax_element(run.cart_m.begin(), run.cart_m.end());
     range.longest_travel_m = std::max(range.longest_travel_m, *high - *low);
     for (const double x : run.cart_m) {
-      range.cart_low_m = first ? x : std::min(range.cart_low_m, x);
-      range.cart_high_m = first ? x : std::max(range.cart_high_m, x);
-      first = false;
       sum += x;
       count += 1.0;
     }
-    const std::size_t stride =
-        std::max<std::size_t>(1, static_cast<std::size_t>(policy.speed_window_s / run.median_period_s()));
-    for (std::size_t k = stride; k < run.size(); k += stride)
-      range.largest_speed_mps =
-          std::max(range.largest_speed_mps, std::abs(run.cart_m[k] - run.cart_m[k - stride]) /
-                                                (run.time_s[k] - run.time_s[k - stride]));
   }
   range.cart_mean_m = count > 0.0 ? sum / count : 0.0;
   range.largest_force_n = plant.motor.force_per_volt_n * range.largest_voltage_v;

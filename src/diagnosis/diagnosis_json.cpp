@@ -126,17 +126,17 @@ json moved_number_json(const MovedNumber& n) {
           {"believed_within", {number(n.low), number(n.high)}}};
 }
 
+json range_json(const QuantityRange& range) {
+  return {{"quantity", range.quantity},
+          {"unit", range.unit},
+          {"low", number(range.low)},
+          {"high", number(range.high)}};
+}
+
 json score_json(const ModelScore& score) {
   return {{"gap", number(score.gap)},
           {"cart_rmse_m", number(score.cart_rmse_m)},
           {"theta_rmse_rad", number(score.theta_rmse_rad)}};
-}
-
-json validated_json(const ValidatedRun& run) {
-  return {{"file", run.name},
-          {"given", score_json(run.given)},
-          {"found", score_json(run.found)},
-          {"found_is_worse", run.is_worse()}};
 }
 
 /// Every element of a list, by its own function.
@@ -145,6 +145,14 @@ json list_json(const std::vector<T>& list, const F& as_json) {
   json items = json::array();
   for (const T& item : list) items.push_back(as_json(item));
   return items;
+}
+
+json validated_json(const ValidatedRun& run) {
+  return {{"file", run.name},
+          {"given", score_json(run.given)},
+          {"found", score_json(run.found)},
+          {"found_is_worse", run.is_worse()},
+          {"beyond", list_json(run.beyond, range_json)}};
 }
 
 json curve_json(const DescribedCurve& curve) {
@@ -207,6 +215,7 @@ json diagnosis_json(const Diagnosis& diagnosis) {
                                     [&](const LocalEffect& local) { return local_json(diagnosis, local); })},
       {"numbers", list_json(diagnosis.numbers, moved_number_json)},
       {"detectable", list_json(diagnosis.detectable, detectable_json)},
+      {"measured_range", list_json(diagnosis.measured_range, range_json)},
       {"validation", list_json(diagnosis.validation, validated_json)},
       {"candidates", candidates},
       {"next_experiment", next},

@@ -5,7 +5,9 @@
 #include <limits>
 
 #include "estimation/noise_floor.hpp"
+#include "motion_range.hpp"
 #include "search_budget.hpp"
+#include "selection_policy.hpp"
 #include "upright/base/error.hpp"
 
 namespace upright {
@@ -53,7 +55,9 @@ std::vector<ValidatedRun> validate(const Plant& given, const Diagnosis& diagnosi
         {simulation_floor(data, noisy, SearchBudget{}.floor_draws).usual, before.score.gap, after.score.gap});
     before.score.gap /= floor;
     after.score.gap /= floor;
-    validated.push_back({run.name, before.score, after.score});
+    validated.push_back(
+        {run.name, before.score, after.score,
+         beyond_range(motion_range(one, ExcitationPolicy{}.speed_window_s), diagnosis.measured_range)});
   }
   return validated;
 }

@@ -210,6 +210,27 @@ void add_numbers(HtmlPage& page, const json& d) {
   page.table(table);
 }
 
+/// In words, as "cart_m -0.1 to 0.1 m".
+std::string range_text(const json& ranges) {
+  std::string text;
+  for (const json& of : ranges)
+    text += (text.empty() ? "" : ", ") + of.at("quantity").get<std::string>() + " " +
+            number_text(number(of.at("low"))) + " to " + number_text(number(of.at("high"))) + " " +
+            of.at("unit").get<std::string>();
+  return text;
+}
+
+void add_range(HtmlPage& page, const json& d) {
+  const json ranges = d.value("measured_range", json::array());
+  if (ranges.empty()) return;
+  page.section("Measured range");
+  HtmlTable table{{"quantity", "from", "to", "unit"}, {}, "Beyond this range the model is not tested."};
+  for (const json& of : ranges)
+    table.rows.push_back({of.at("quantity"), number_text(number(of.at("low"))),
+                          number_text(number(of.at("high"))), of.at("unit")});
+  page.table(table);
+}
+
 void add_validation(HtmlPage& page, const json& d) {
   const json validation = d.value("validation", json::array());
   if (validation.empty()) return;
@@ -228,6 +249,10 @@ void add_validation(HtmlPage& page, const json& d) {
     if (run.at("found_is_worse").get<bool>())
       page.note(Tone::bad, "On " + run.at("file").get<std::string>() +
                                " the model that was found is further off than the one that was given.");
+    if (const json beyond = run.value("beyond", json::array()); !beyond.empty())
+      page.note(Tone::neutral, run.at("file").get<std::string>() +
+                                   " goes beyond the measured range, where the model is not tested: " +
+                                   range_text(beyond) + ".");
   }
   page.table(table);
 }
@@ -499,6 +524,7 @@ std::filesystem::path write_diagnosis_report(const std::filesystem::path& folder
     add_by_run(page, d);
     add_local(page, d);
     add_numbers(page, d);
+    add_range(page, d);
     add_validation(page, d);
     add_traces(page, folder / "traces.csv");
     add_residuals(page, folder / "residuals.csv");

@@ -89,6 +89,9 @@ TEST_F(Diagnose, NamesCoulombAndStribeckInThePapersOwnCase) {
   EXPECT_LT(d.at("validation")[0].at("found").at("gap"),
             0.2 * d.at("validation")[0].at("given").at("gap").get<double>());
   EXPECT_FALSE(d.at("validation")[0].at("found_is_worse"));
+  ASSERT_FALSE(d.at("measured_range").empty());
+  EXPECT_EQ(d.at("measured_range")[0].at("quantity"), "cart_m");
+  EXPECT_LT(d.at("measured_range")[0].at("low"), d.at("measured_range")[0].at("high"));
   EXPECT_EQ(run_upright("check " + in_folder("out/model.yaml")).exit_code, 0);
   std::ostringstream model;
   model << std::ifstream(folder_ / "out" / "model.yaml").rdbuf();

@@ -163,10 +163,12 @@ TEST_F(ReportPages, OfADiagnosisAreReadableOnATelephone) {
   const auto score = [](double gap) {
     return Json{{"gap", gap}, {"cart_rmse_m", 0.0012}, {"theta_rmse_rad", nullptr}};
   };
-  const Json validated = {{"file", "20261123T090248Z-demo6"},
-                          {"given", score(2.0)},
-                          {"found", score(3.0)},
-                          {"found_is_worse", true}};
+  const Json validated = {
+      {"file", "20261123T090248Z-demo6"},
+      {"given", score(2.0)},
+      {"found", score(3.0)},
+      {"found_is_worse", true},
+      {"beyond", {{{"quantity", "cart_m"}, {"unit", "m"}, {"low", -0.1}, {"high", 0.31}}}}};
   const Json detectable = {{"kind", "position_dependent_friction"},
                            {"parameter", "slope_n_per_m"},
                            {"unit", "N/m"},
@@ -185,6 +187,7 @@ TEST_F(ReportPages, OfADiagnosisAreReadableOnATelephone) {
       {"trials", {trial}},
       {"helps_here_only", {local}},
       {"numbers", {moved}},
+      {"measured_range", {{{"quantity", "cart_m"}, {"unit", "m"}, {"low", -0.1}, {"high", 0.1}}}},
       {"validation", {validated}},
       {"detectable", {detectable}},
       {"residual", "what is left is the sensors' own noise"},
@@ -211,9 +214,11 @@ TEST_F(ReportPages, OfADiagnosisAreReadableOnATelephone) {
   for (const char* bar : {">model as given<", ">with pivot_quadratic_drag<", ">with coulomb_friction<"})
     EXPECT_NE(html.find(bar), std::string::npos) << "no bar for " << bar;
   EXPECT_FALSE(std::regex_search(html, std::regex("[0-9]e[+-][0-9]+</"))) << "a number is not for people";
-  for (const char* part : {"It shows most in 20261123T090248Z-demo5 from 1.25 to 1.45 s", ">cogging_force<",
-                           ">pendulum.inertia_about_pivot_kgm2<", ">slope_n_per_m<",
-                           "On 20261123T090248Z-demo6 the model that was found is further off"})
+  for (const char* part :
+       {"It shows most in 20261123T090248Z-demo5 from 1.25 to 1.45 s", ">cogging_force<",
+        ">pendulum.inertia_about_pivot_kgm2<", ">slope_n_per_m<",
+        "On 20261123T090248Z-demo6 the model that was found is further off",
+        "demo6 goes beyond the measured range, where the model is not tested: cart_m -0.1 to 0.31 m."})
     EXPECT_NE(html.find(part), std::string::npos) << "the page does not say: " << part;
   for (const char* rule : {">shown_throughout<", "accepted: evidence and t value are above their limits"})
     EXPECT_NE(html.find(rule), std::string::npos) << "the page does not explain the decision: " << rule;

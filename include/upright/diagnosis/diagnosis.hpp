@@ -98,6 +98,14 @@ struct MovedNumber {
   double high = 0.0;    ///< the most
 };
 
+/// What was measured of a quantity.
+struct QuantityRange {
+  std::string quantity;  ///< `cart_m`, `cart_mps`, `theta_rad`, `theta_radps` or `voltage_v`
+  std::string unit;      ///< of the quantity
+  double low = 0.0;      ///< the least value
+  double high = 0.0;     ///< the largest value
+};
+
 /// An open-loop simulation of a run. Quantities that are not measured are NaN.
 struct ModelScore {
   double gap = 0.0;             ///< error divided by the noise floor
@@ -110,6 +118,8 @@ struct ValidatedRun {
   std::string name;  ///< its file
   ModelScore given;  ///< with the plant file as given
   ModelScore found;  ///< with the model found
+  /// Quantities that the run took beyond the range of the fitted runs, where the model was not tested.
+  std::vector<QuantityRange> beyond;
   /// Whether the model found is further off than the plant file.
   bool is_worse() const { return found.gap > given.gap; }
 };
@@ -182,6 +192,7 @@ struct Diagnosis {
   std::string residual;                           ///< description of the remaining residual
   std::vector<std::size_t> held_out_runs;         ///< runs that no fit saw
   std::vector<std::string> run_names;             ///< of all runs, in their order
+  std::vector<QuantityRange> measured_range;      ///< of all runs: beyond it the model is not tested
   /// What a quick diagnosis left out, in words; empty: it was a complete one.
   std::vector<std::string> not_examined;
   double work_samples = 0.0;                   ///< number of samples processed, counting repetitions
