@@ -181,7 +181,7 @@ class EventPeriod {
     if constexpr (second)
       if (pivot_sticks_) return begin_of_both(steps);
     if (!sticks_) {
-      begin.rate = unheld_rate(at, motor_v, steps.modes.cart);
+      begin.rate = frictionless_rate(at, motor_v, steps.modes.cart);
       steps.modes.cart = select(steps.settles, sign_of(begin.rate.cart_mps), steps.modes.cart);
       return begin;
     }
@@ -291,8 +291,8 @@ class EventPeriod {
     LaneModes& modes = steps.modes;
     if (sticks_ && any(at.cart_mps == Lanes(0.0))) find_static_friction(at.cart_m, begin);
     if (any(steps.settles)) {
-      const auto unheld = physics_.unheld(at, motor_of(steps), modes.cart);
-      settle_contacts(physics_, at, unheld, begin.forward_n, begin.backward_n, steps.settles, modes);
+      const auto applied = physics_.applied_forces(at, motor_of(steps), modes.cart);
+      settle_contacts(physics_, at, applied, begin.forward_n, begin.backward_n, steps.settles, modes);
     }
     const Rate found = rate_of_both(at, motor_of(steps), modes);
     begin.rate = found.of;
@@ -351,24 +351,24 @@ class EventPeriod {
   /// One copy for the stages of a step, as in SmoothPeriod.
   [[gnu::flatten, gnu::noinline]] CartRate rate_of_cart(const State& state, const Lanes& motor_v,
                                                         const Lanes& direction) const {
-    if (!sticks_) return {unheld_rate(state, motor_v, direction), Lanes(0.0)};
+    if (!sticks_) return {frictionless_rate(state, motor_v, direction), Lanes(0.0)};
     const auto balance = physics_.cart_balance(state, motor_v);
     return {physics_.derivative_by_direction(state, balance, direction), balance.load};
   }
 
   [[gnu::flatten, gnu::noinline]] BothRate rate_of_both(const State& state, const Lanes& motor_v,
                                                         const LaneModes& modes) const {
-    const auto unheld = physics_.unheld(state, motor_v, modes.cart);
+    const auto applied = physics_.applied_forces(state, motor_v, modes.cart);
     Lanes level(0.0);
     if (sticks_)
       level = physics_.cart_dry_level(state.cart_m, positive_part(modes.cart * state.cart_mps), modes.cart);
-    return {{physics_.derivative_by_directions(state, unheld, modes.cart, level, modes.pivot),
-             physics_.cart_load(unheld, modes.pivot)},
-            physics_.pivot_load(unheld, modes.cart, level)};
+    return {{physics_.derivative_by_directions(state, applied, modes.cart, level, modes.pivot),
+             physics_.cart_load(applied, modes.pivot)},
+            physics_.pivot_load(applied, modes.cart, level)};
   }
 
   /// Of a cart that nothing holds. At rest its direction makes no difference to it.
-  State unheld_rate(const State& state, const Lanes& motor_v, const Lanes& direction) const {
+  State frictionless_rate(const State& state, const Lanes& motor_v, const Lanes& direction) const {
     if constexpr (may_have_bristles<Present>)
       if (physics_.has_bristle_state())
         return physics_.bristle_derivative_by_direction(state, motor_v, direction);

@@ -113,8 +113,8 @@ struct LaneModes {
 /// the step knows already, in registers.
 template <class Physics>
 void settle_contacts(const Physics& physics, const PlantState<Lanes>& state,
-                     const typename Physics::Unheld& at, const Lanes& forward_n, const Lanes& backward_n,
-                     const LaneMask& lanes, LaneModes& modes) {
+                     const typename Physics::AppliedForces& at, const Lanes& forward_n,
+                     const Lanes& backward_n, const LaneMask& lanes, LaneModes& modes) {
   const Lanes zero(0.0), level_nm = physics.pivot_dry_level();
   const LaneMask pivot_rests = state.theta_radps == zero, cart_moves = !(state.cart_mps == zero);
   const LaneMask cart_rests = physics.cart_can_stick() ? !cart_moves : cart_moves & !cart_moves;

@@ -141,9 +141,10 @@ Json json_of(const EstimatorDesign& design) {
   if (design.widened) document["margin"] = json_of(*design.widened);
   document["estimator"] = {
       {"cart_force_noise_n2_per_s", *design.config.state_estimator.cart_force_noise_n2_per_s},
-      {"bears_delay_s", std::isfinite(design.bears_delay_s) ? Json(design.bears_delay_s) : Json(nullptr)},
-      {"bears_unmodelled_delay_s",
-       std::isfinite(design.bears_unmodelled_s) ? Json(design.bears_unmodelled_s) : Json(nullptr)}};
+      {"bears_delay_s", std::isfinite(design.delay_margin_s) ? Json(design.delay_margin_s) : Json(nullptr)},
+      {"bears_unmodelled_delay_s", std::isfinite(design.unmodelled_delay_margin_s)
+                                       ? Json(design.unmodelled_delay_margin_s)
+                                       : Json(nullptr)}};
   if (const auto& trials = design.trials)
     document["trials"] = {{"runs", trials->runs},
                           {"fell", trials->fell},
@@ -175,12 +176,12 @@ void design_estimator(const DesignOptions& options, const Plant& plant, Progress
   request.cost_loss = options.cost_loss.value_or(accepted_cost_loss);
   const EstimatorDesign design = design_with_estimator(plant, request);
   progress.end();
-  char borne[160];
+  char margins[160];
   std::snprintf(
-      borne, sizeof borne,
+      margins, sizeof margins,
       "while the cart slides it bears %.3g ms more of delay, and %.3g ms of an actuator slower than "
       "the plant file says",
-      1e3 * design.bears_delay_s, 1e3 * design.bears_unmodelled_s);
+      1e3 * design.delay_margin_s, 1e3 * design.unmodelled_delay_margin_s);
   if (!options.out.empty()) {
     refuse_replacing(options.out, options.force);
     ControlConfig config = design.config;
@@ -189,7 +190,7 @@ void design_estimator(const DesignOptions& options, const Plant& plant, Progress
     write_gain_file(
         config, options.out,
         {"Designed by `upright design --estimator " + options.estimator + "` on " + options.plant + ":",
-         borne});
+         margins});
   }
   if (options.as_json) {
     std::cout << json_of(design).dump(2) << "\n";
@@ -198,7 +199,7 @@ void design_estimator(const DesignOptions& options, const Plant& plant, Progress
   print(design.gains.design, design.gains);
   if (design.widened) print(*design.widened);
   std::printf("estimator: force noise %.4g N^2/s; %s\n",
-              *design.config.state_estimator.cart_force_noise_n2_per_s, borne);
+              *design.config.state_estimator.cart_force_noise_n2_per_s, margins);
   if (design.trials) print(*design.trials, request.uncertainty);
   std::fflush(stdout);
 }

@@ -31,7 +31,7 @@ constexpr double predicted_force_decay_s = 0.115;
 /// With a long delay it fades the quicker the longer the delay: decay times delay is at most this.
 constexpr double decay_times_delay_s2 = 0.015;
 
-double borne_s(const Plant& plant, const ControlConfig& config, ExtraDelay extra) {
+double remaining_delay_margin_s(const Plant& plant, const ControlConfig& config, ExtraDelay extra) {
   const LoopMargin margin = sampled_margin(plant, config, any_smoothing, false, extra);
   return margin.stable_without_delay ? std::max(0.0, margin.critical_delay_s - config.delay_s) : 0.0;
 }
@@ -77,7 +77,7 @@ void refuse_falls(const ParameterTrials& trials, double uncertainty) {
 
 }  // namespace
 
-std::string parameter_not_borne(const Plant& plant, const ControlConfig& config, double uncertainty) {
+std::string destabilising_parameter(const Plant& plant, const ControlConfig& config, double uncertainty) {
   for (const UncertainParameter& parameter : uncertain_parameters(large_motion_plant(plant)))
     for (const double by : {1.0 - uncertainty, 1.0 + uncertainty}) {
       Plant off = large_motion_plant(plant);
@@ -108,21 +108,22 @@ EstimatorDesign design_with_estimator(const Plant& plant, const EstimatorRequest
   }
   constexpr int max_halvings = 12;
   for (int i = 0; i <= max_halvings; ++i) {
-    design.bears_unmodelled_s = borne_s(sliding, design.config, ExtraDelay::unmodelled);
-    if (design.bears_unmodelled_s >= wanted_s) break;
+    design.unmodelled_delay_margin_s =
+        remaining_delay_margin_s(sliding, design.config, ExtraDelay::unmodelled);
+    if (design.unmodelled_delay_margin_s >= wanted_s) break;
     if (i < max_halvings) *noise *= 0.5;
   }
-  if (design.bears_unmodelled_s <= 0.0)
+  if (design.unmodelled_delay_margin_s <= 0.0)
     throw ConfigError(
         "the loop is unstable even with the slowest estimator of the force on the cart: raise --r or the "
         "sample rate, or shorten the delay");
-  refuse_sensitive(parameter_not_borne(plant, design.config, request.uncertainty));
+  refuse_sensitive(destabilising_parameter(plant, design.config, request.uncertainty));
   if (!request.delay_s) {
     constexpr int together = 40;
     design.trials = try_parameters(plant, design.config, request.uncertainty, together);
     refuse_falls(*design.trials, request.uncertainty);
   }
-  design.bears_delay_s = borne_s(sliding, design.config, ExtraDelay::known);
+  design.delay_margin_s = remaining_delay_margin_s(sliding, design.config, ExtraDelay::known);
   return design;
 }
 

@@ -44,8 +44,8 @@ struct EstimatorRequest {
 struct EstimatorDesign {
   SampledDesign gains;
   ControlConfig config;
-  double bears_delay_s = 0.0;       ///< in the delay line, sampled and sliding
-  double bears_unmodelled_s = 0.0;  ///< in the actuator, on top of the gain file's
+  double delay_margin_s = 0.0;             ///< in the delay line, sampled and sliding
+  double unmodelled_delay_margin_s = 0.0;  ///< in the actuator, on top of the gain file's
   /// Runs on the plant with its friction; none with a predictor, whose horizon is judged by its margin.
   std::optional<ParameterTrials> trials;
   std::optional<WidenedMargin> widened;  ///< for a delay without a predictor
@@ -57,6 +57,6 @@ EstimatorDesign design_with_estimator(const Plant& plant, const EstimatorRequest
 
 /// Name and share of the first of the base parameters which, off by `uncertainty` one way or the other, makes
 /// the sliding loop unstable while the estimator keeps its model; empty where none does.
-std::string parameter_not_borne(const Plant& plant, const ControlConfig& config, double uncertainty);
+std::string destabilising_parameter(const Plant& plant, const ControlConfig& config, double uncertainty);
 
 }  // namespace upright

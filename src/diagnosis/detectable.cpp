@@ -14,12 +14,12 @@ constexpr double small_share = 1e-3;
 
 /// The standard error of the size of an effect once it is left open: infinite where the data say nothing of
 /// it, 0 where it is held at the end of its range.
-double standard_error(const Hypothesis& open, std::size_t effect) {
-  for (std::size_t j = 0; j < open.free.size(); ++j) {
-    if (open.free[j].effect != effect || open.free[j].index != 0) continue;
+double standard_error(const Hypothesis& fit, std::size_t effect) {
+  for (std::size_t j = 0; j < fit.free.size(); ++j) {
+    if (fit.free[j].effect != effect || fit.free[j].index != 0) continue;
     const auto at = static_cast<Eigen::Index>(j);
-    if (!(open.train.information(at, at) > 0.0)) return std::numeric_limits<double>::infinity();
-    return std::sqrt(std::max(open.train.covariance(at, at), 0.0));
+    if (!(fit.train.information(at, at) > 0.0)) return std::numeric_limits<double>::infinity();
+    return std::sqrt(std::max(fit.train.covariance(at, at), 0.0));
   }
   return 0.0;
 }
@@ -51,10 +51,10 @@ double standard_errors_to_be_shown(std::size_t effect, bool is_correction, const
 }
 
 std::vector<Detectable> detectable_sizes(const Search& search, const Hypothesis& h,
-                                         const std::vector<OpenedEffect>& opened) {
+                                         const std::vector<FreedEffect>& freed) {
   std::vector<Detectable> sizes;
-  for (const auto& [effect, open] : opened) {
-    double sigma = standard_error(open, effect);
+  for (const auto& [effect, fit] : freed) {
+    double sigma = standard_error(fit, effect);
     // A contact without a level is no contact, so nothing depends on the level there: open a small one.
     if (std::isinf(sigma) && effect_registry()[effect].dry)
       sigma = standard_error(search.with_effect_free(h, effect, small_share), effect);
@@ -64,7 +64,7 @@ std::vector<Detectable> detectable_sizes(const Search& search, const Hypothesis&
     d.effect = effect;
     d.size = sigma * standard_errors_to_be_shown(effect, search.is_nuisance(effect), search.policy());
     d.usual = usual_size(effect, search);
-    const PlantEffect* at = open.train.point.plant.find(effect);
+    const PlantEffect* at = fit.train.point.plant.find(effect);
     for (std::size_t i = 1; i < info.parameters.size(); ++i) d.at.push_back(at->values[i]);
     sizes.push_back(d);
   }

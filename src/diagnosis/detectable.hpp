@@ -9,10 +9,10 @@
 
 namespace upright {
 
-/// Of each opened effect that the plant lacks the smallest size, of a number of the plant file how far it may
+/// Of each freed effect that the plant lacks the smallest size, of a number of the plant file how far it may
 /// be off.
 std::vector<Detectable> detectable_sizes(const Search& search, const Hypothesis& h,
-                                         const std::vector<OpenedEffect>& opened);
+                                         const std::vector<FreedEffect>& freed);
 
 /// How many standard errors of its size an effect must have to be accepted with a high probability.
 double standard_errors_to_be_shown(std::size_t effect, bool is_correction, const SelectionPolicy& policy);

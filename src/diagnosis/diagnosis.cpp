@@ -81,7 +81,7 @@ class Diagnostician {
   /// is added to the answer; one that lowers it by more than chance shows that something is missing.
   void describe_what_is_left(Diagnosis& diagnosis) {
     if (!beyond_sensors_) return;
-    options_.tell(0.98, "describing what is left");
+    options_.report_progress(0.98, "describing what is left");
     try {
       const auto force = describe_force(search_, fits_.judged(), fits_.known());
       const double named = std::min(listing_.numbers_moved.value_or(listing_.after), listing_.after);
@@ -220,7 +220,7 @@ class Diagnostician {
 
   /// At the settled model.
   ResidualTests what_is_left() const {
-    options_.tell(0.92, "measuring the gap");
+    options_.report_progress(0.92, "measuring the gap");
     // At what all runs say, so that what few training runs left uncertain is not taken for something missing.
     return tests_of(fits_.known().train.point, fits_.judged().train.point.noise);
   }
@@ -243,7 +243,7 @@ class Diagnostician {
   ResidualTests beside_coloured_noise(const ResidualTests& left) {
     noise_ = fits_.known().train.point.noise;
     if (!left.structured) return left;
-    options_.tell(0.945, "estimating a coloured disturbance");
+    options_.report_progress(0.945, "estimating a coloured disturbance");
     const FitResult coloured = search_.with_coloured_noise(fits_.known());
     if (!(minus_log_likelihood(fits_.known().train) - minus_log_likelihood(coloured) >
           policy_.acceptance.min_evidence))
@@ -264,7 +264,7 @@ class Diagnostician {
   /// An effect that does not reproduce, or that takes held-out data further from the model, is not named: one
   /// of these goes. False: there is none.
   bool withdraw_next() {
-    options_.tell(0.93, "comparing parts of the data");
+    options_.report_progress(0.93, "comparing parts of the data");
     reproductions_ = reproduce(search_, fits_.known(), fits_.effects());
     if (options_.quick && withdraw_doubtful()) return true;
     const Reproduction* worst = nullptr;
@@ -288,7 +288,7 @@ class Diagnostician {
         selection_.find_again();
       return true;
     }
-    options_.tell(0.94, "measuring the gap");
+    options_.report_progress(0.94, "measuring the gap");
     listing_ = list_effects(search_, fits_.judged(), fits_.effects());
     if (listing_.raises) {
       withdraw(*listing_.raises, "it helps the runs that were fitted, and takes held-out data further off");
@@ -340,7 +340,7 @@ class Diagnostician {
   }
 
   void conclude(const ResidualTests& tests) {
-    options_.tell(0.95, "measuring the noise floor");
+    options_.report_progress(0.95, "measuring the noise floor");
     note_runs();
     result_.noise = noise_;
     const std::vector<std::size_t> all = fits_.effects();
@@ -388,8 +388,8 @@ class Diagnostician {
     for (const std::string& note : notes_on_doubtful_numbers(fits_.reported(), all, policy_.correction))
       result_.notes.push_back(note);
     beyond_sensors_ = tests.beyond_sensors;
-    opened_ = open_effects(search_, fits_.judged(), all);
-    result_.detectable = detectable_sizes(search_, fits_.judged(), opened_);
+    freed_effects_ = freed_effects(search_, fits_.judged(), all);
+    result_.detectable = detectable_sizes(search_, fits_.judged(), freed_effects_);
     decide(tests);
     trace_residuals();
     if (!options_.quick) find_indistinguishable();
@@ -419,10 +419,10 @@ class Diagnostician {
   /// Other effects that do as well in the place of one that was found: from sensitivities, or fitted where an
   /// effect does not act in proportion to its size.
   void find_indistinguishable() {
-    options_.tell(0.96, "searching for confusable effects");
+    options_.report_progress(0.96, "searching for confusable effects");
     std::vector<std::pair<std::size_t, Plant>> alternatives;
     for (const Alternative& alternative :
-         linear_alternatives(search_, fits_.judged(), fits_.effects(), opened_)) {
+         linear_alternatives(search_, fits_.judged(), fits_.effects(), freed_effects_)) {
       declare(alternative.instead_of, alternative.effect);
       alternatives.emplace_back(alternative.effect, alternative.plant);
     }
@@ -431,7 +431,7 @@ class Diagnostician {
       std::optional<Hypothesis> without;
       for (const std::size_t other : selection_.similar_effects(effect)) {
         if (is_listed(other) || is_declared(effect, other)) continue;
-        options_.tell(0.97, "fitting " + kind_of(other) + " in place of " + kind_of(effect));
+        options_.report_progress(0.97, "fitting " + kind_of(other) + " in place of " + kind_of(effect));
         if (!without) without = search_.without(selection_.current(), effect);
         if (!std::isfinite(without->train.objective)) break;
         Hypothesis alternative = search_.screened(*without, other);
@@ -491,7 +491,7 @@ class Diagnostician {
   std::vector<Reproduction> reproductions_;
   std::vector<RunDifference> differences_;
   Listing listing_;
-  std::vector<OpenedEffect> opened_;
+  std::vector<FreedEffect> freed_effects_;
 };
 
 /// The search with other runs held out, where that may show more, and what is left in the end.
@@ -502,7 +502,7 @@ void look_further(const Plant& plant, const Record& record, const DiagnosisOptio
   try {
     // A weak effect may show too little in the runs that are left once one is held out.
     if (unexplained ? first.misses_held_out_excitation() : !first.found_missing_effect()) {
-      options.tell(0.02, "repeating the search with other runs held out");
+      options.report_progress(0.02, "repeating the search with other runs held out");
       second.emplace(plant, record, options, HeldOut::other);
       Diagnosis other = second->run(!unexplained);
       if (other.verdict == Verdict::explained && (unexplained || second->found_missing_effect())) {

@@ -42,13 +42,13 @@ void FinalFits::settle(const std::set<std::size_t>& withdrawn) {
 void FinalFits::fit_last(std::vector<std::size_t>& corrections) {
   const Hypothesis* from = &selection_.current();
   for (;;) {
-    options_.tell(0.88, "final fit to the training runs");
+    options_.report_progress(0.88, "final fit to the training runs");
     std::vector<std::size_t> all = selection_.found();
     all.insert(all.end(), corrections.begin(), corrections.end());
     judged_ = search_.fitted_separately(all, *from, nullptr, true);
     search_.filter_held_out(judged_, judged_.train.point.noise);
     from = &judged_;
-    options_.tell(0.9, "final fit to all runs");
+    options_.report_progress(0.9, "final fit to all runs");
     known_ = search_.fitted_to_all_runs(judged_);
     const auto includes_nothing = [&](std::size_t effect) {
       return !is_certain_of_all_runs(search_.certainty(known_, effect), policy_.correction);
@@ -84,7 +84,7 @@ void FinalFits::order_corrections(const std::vector<std::size_t>& corrections) {
 }
 
 void FinalFits::fit_all_samples() {
-  options_.tell(0.94, "fitting all samples");
+  options_.report_progress(0.94, "fitting all samples");
   reported_ =
       all_samples_ == nullptr ? known_ : fitted_to_all_samples(known_, search_.all_data(), *all_samples_);
 }

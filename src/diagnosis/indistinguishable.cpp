@@ -69,32 +69,32 @@ bool is_indistinguishable(double evidence_lost, double t_value, const Distinctio
          (evidence_lost < policy.max_scattered_evidence && t_value < policy.scattered_t);
 }
 
-std::vector<OpenedEffect> open_effects(const Search& search, const Hypothesis& h,
+std::vector<FreedEffect> freed_effects(const Search& search, const Hypothesis& h,
                                        const std::vector<std::size_t>& listed) {
   std::vector<std::size_t> effects = candidate_effects(h.train.point.plant, search.range());
   effects.insert(effects.end(), search.nuisances().begin(), search.nuisances().end());
-  std::vector<OpenedEffect> opened;
+  std::vector<FreedEffect> freed;
   for (const std::size_t effect : effects) {
     if (!grows_from_nothing(effect)) continue;
     if (std::find(listed.begin(), listed.end(), effect) != listed.end()) continue;
     Hypothesis with = search.with_effect_free(h, effect);
-    if (with.valid) opened.push_back({effect, std::move(with)});
+    if (with.valid) freed.push_back({effect, std::move(with)});
   }
-  return opened;
+  return freed;
 }
 
 std::vector<Alternative> linear_alternatives(const Search& search, const Hypothesis& h,
                                              const std::vector<std::size_t>& listed,
-                                             const std::vector<OpenedEffect>& opened) {
+                                             const std::vector<FreedEffect>& freed) {
   std::vector<Alternative> alternatives;
-  for (const auto& [other, open] : opened) {
+  for (const auto& [other, fit] : freed) {
     if (!is_proportional(other)) continue;
     for (const std::size_t effect : listed) {
-      const Eigen::Index before = size_place(h, effect), after = size_place(open, effect);
+      const Eigen::Index before = size_place(h, effect), after = size_place(fit, effect);
       if (before < 0 || after < 0 || !std::isfinite(absent_value(h, before))) continue;
-      const double doubt = distance(open, after);
+      const double doubt = distance(fit, after);
       if (reduces_certainty(doubt, distance(h, before), search.policy().distinction))
-        alternatives.push_back({effect, other, without(open, after)});
+        alternatives.push_back({effect, other, without(fit, after)});
     }
   }
   return alternatives;

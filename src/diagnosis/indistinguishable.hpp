@@ -16,14 +16,14 @@ struct Alternative {
 };
 
 /// A fit with one effect more left open, with nothing believed of it and where it does nothing.
-struct OpenedEffect {
+struct FreedEffect {
   std::size_t effect = 0;
   Hypothesis with;
 };
 
 /// Each effect in turn that is not `listed` and grows from nothing: what `h` lacks, and what the plant file
 /// says within a belief. Effects that these data do not show are left out.
-std::vector<OpenedEffect> open_effects(const Search& search, const Hypothesis& h,
+std::vector<FreedEffect> freed_effects(const Search& search, const Hypothesis& h,
                                        const std::vector<std::size_t>& listed);
 
 /// Whether an effect that is so many standard errors from nothing may be another, which leaves it fewer once
@@ -34,11 +34,11 @@ bool reduces_certainty(double distance_with_other, double distance_alone, const 
 /// the t value of the loss.
 bool is_indistinguishable(double evidence_lost, double t_value, const DistinctionPolicy& policy);
 
-/// Alternatives of `listed` effects of `h` among the `opened` ones that act in proportion to their size where
+/// Alternatives of `listed` effects of `h` among the `freed` ones that act in proportion to their size where
 /// they do nothing. What acts otherwise (saturation, lag, delay, ...) does not show here and has to be
 /// fitted.
 std::vector<Alternative> linear_alternatives(const Search& search, const Hypothesis& h,
                                              const std::vector<std::size_t>& listed,
-                                             const std::vector<OpenedEffect>& opened);
+                                             const std::vector<FreedEffect>& freed);
 
 }  // namespace upright

@@ -25,7 +25,7 @@ struct Part {
 };
 
 /// What a part saves with an effect. Unknown: infinite.
-struct Saving {
+struct PartEvidence {
   double evidence = without_limit, t_value = without_limit;
 };
 
@@ -128,7 +128,7 @@ class Parts {
           fit_without(part.data, part.with.point, effect, free_, given_, parameters_only());
       note_savings(parts_[i], without, result);
       if (parts_.size() < 2 || !is_excited(parts_[1 - i], effect)) continue;
-      const Saving saved = transferred(parts_[1 - i], parts_[i], effect, without);
+      const PartEvidence saved = transferred(parts_[1 - i], parts_[i], effect, without);
       if (!(saved.t_value < result.t_value)) continue;
       result.transferred_evidence = saved.evidence;
       result.t_value = saved.t_value;
@@ -148,19 +148,20 @@ class Parts {
   }
 
   /// What a part saves with what another says of an effect.
-  Saving transferred(const Part& from, const Part& to, std::size_t effect, const FitResult& without) const {
+  PartEvidence transferred(const Part& from, const Part& to, std::size_t effect,
+                           const FitResult& without) const {
     Plant plant = to.with.point.plant;
     plant.set(effect, from.with.point.plant.find(effect)->values);
     FitOptions options = parameters_only();
     options.joint_prior = prior_from(from, effect, free_);
     const FitResult with = fit(to.data, moved_to(to.with.point, plant), free_, options);
-    return saved_over(without, with, static_cast<double>(places_of(effect, free_).size()));
+    return evidence_over(without, with, static_cast<double>(places_of(effect, free_).size()));
   }
 
   /// What is saved, the beliefs of the parameters included, and by how many standard errors that is more than
   /// nothing. The segments are independent witnesses. Of a right effect of so many parameters a part falls
   /// short by chance, with the variance of chi-square.
-  static Saving saved_over(const FitResult& without, const FitResult& with, double parameters) {
+  static PartEvidence evidence_over(const FitResult& without, const FitResult& with, double parameters) {
     const auto n = static_cast<double>(with.segment_objective.size());
     if (!std::isfinite(with.objective) || n < 2.0) return {};
     const double saved = without.objective - with.objective;

@@ -15,7 +15,7 @@ bool StepwiseSelection::find_without_each() {
 }
 
 bool StepwiseSelection::find_without(std::size_t effect) {
-  options_.tell(0.84, "searching without " + kind_of(effect));
+  options_.report_progress(0.84, "searching without " + kind_of(effect));
   Checkpoint other{search_.without(current_, effect), found_};
   if (!std::isfinite(other.hypothesis.train.objective)) return false;
   std::erase(other.found, effect);

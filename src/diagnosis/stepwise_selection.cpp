@@ -19,7 +19,7 @@ StepwiseSelection::StepwiseSelection(Search& search, const DiagnosisOptions& opt
       record_(record) {}
 
 void StepwiseSelection::begin() {
-  options_.tell(0.02, "fitting the model as given");
+  options_.report_progress(0.02, "fitting the model as given");
   given_ = search_.baseline();
   if (!std::isfinite(given_.train.objective))
     throw ConfigError("the model cannot be simulated with these runs: check the plant file");
@@ -33,7 +33,7 @@ void StepwiseSelection::find() {
 }
 
 bool StepwiseSelection::renew_initial_states() {
-  options_.tell(0.83, "fitting again from new initial states");
+  options_.report_progress(0.83, "fitting again from new initial states");
   Hypothesis h = search_.with_new_initial_states(current_);
   if (!is_better_optimum(current_.train.objective - h.train.objective, policy_.acceptance)) return false;
   current_ = std::move(h);
@@ -294,15 +294,16 @@ bool StepwiseSelection::add_best(int round, bool with_low_noise) {
 
 std::vector<StepwiseSelection::ScreenedCandidate> StepwiseSelection::screen(int round, bool with_low_noise,
                                                                             double done) {
-  options_.tell(done, "ranking the candidates");
+  options_.report_progress(done, "ranking the candidates");
   Hypothesis from = current_;
   if (with_low_noise) from.train.point.noise = reduced_process_noise(from.train.point.noise);
   const std::vector<std::size_t> candidates = promising_candidates(from, open_candidates(), round);
   const double on_screening_subset = search_.on_screening_subset(from).train.objective;
   std::vector<ScreenedCandidate> screened;
   for (std::size_t c = 0; c < candidates.size(); ++c) {
-    options_.tell(done + 0.02 + 0.1 * static_cast<double>(c) / static_cast<double>(candidates.size()),
-                  "trying " + kind_of(candidates[c]));
+    options_.report_progress(
+        done + 0.02 + 0.1 * static_cast<double>(c) / static_cast<double>(candidates.size()),
+        "trying " + kind_of(candidates[c]));
     Hypothesis h = search_.screened(from, candidates[c]);
     const double gain = on_screening_subset - h.train.objective - penalty_of(candidates[c]);
     if (round == 0) note_candidate(candidates[c], gain);
@@ -329,7 +330,7 @@ std::vector<StepwiseSelection::Finalist> StepwiseSelection::fit_finalists(
   for (std::size_t place = 0; place < std::min(budget_.max_finalists, ranking.size()); ++place) {
     const ScreenedCandidate& finalist = *ranking[place];
     if (finalist.gain < std::max(min_gain, budget_.min_gain_share * ranking[0]->gain)) break;
-    options_.tell(
+    options_.report_progress(
         done + 0.12 + 0.08 * static_cast<double>(place) / static_cast<double>(budget_.max_finalists),
         "fitting " + kind_of(finalist.effect));
     Finalist fitted{finalist.effect, finalist.hypothesis, 0.0};
@@ -378,7 +379,7 @@ std::size_t StepwiseSelection::choose(std::vector<Finalist>& accepted) {
       1)
     for (Finalist& b : accepted) {
       if (b.score <= to_reach) continue;
-      options_.tell(0.8, "completing the fit of " + kind_of(b.effect));
+      options_.report_progress(0.8, "completing the fit of " + kind_of(b.effect));
       Hypothesis further = b.hypothesis;
       search_.refine(b.hypothesis, further);
       const double gain = b.hypothesis.train.objective - further.train.objective;
@@ -421,7 +422,7 @@ bool StepwiseSelection::exchange() {
       if (!is_found(other) && !withdrawn_.contains(other) && !exchanged_.contains({effect, other}))
         others.push_back(other);
     if (others.empty()) continue;
-    options_.tell(0.8, "looking for a replacement of " + kind_of(effect));
+    options_.report_progress(0.8, "looking for a replacement of " + kind_of(effect));
     const Hypothesis without = search_.without(current_, effect);
     if (!std::isfinite(without.train.objective)) continue;
     const double to_beat = search_.on_screening_subset(current_).train.objective - penalty_of(effect);
@@ -480,7 +481,7 @@ bool StepwiseSelection::simplify() {
                     [&](const PlantEffect& other) { return withdrawn_.contains(other.number); }))
       continue;
     if (!simplified_.insert({form.effect, found_.size()}).second) continue;
-    options_.tell(0.8, "trying to simplify " + kind_of(form.effect));
+    options_.report_progress(0.8, "trying to simplify " + kind_of(form.effect));
     Hypothesis h = search_.exchanged(current_, form.effect, form.others);
     std::vector<std::size_t> brought;
     for (const PlantEffect& other : form.others) brought.push_back(other.number);
@@ -510,7 +511,7 @@ bool StepwiseSelection::try_pairs(const std::vector<std::pair<std::size_t, Hypot
       const std::size_t first = contenders[a].first, second = contenders[b].first;
       if (found_.size() > 2 || (found_.size() == 2 && is_found(first) && is_found(second))) continue;
       if (!paired_.insert(std::minmax(first, second)).second) continue;
-      options_.tell(0.83, "trying " + kind_of(first) + " with " + kind_of(second));
+      options_.report_progress(0.83, "trying " + kind_of(first) + " with " + kind_of(second));
       const Hypothesis& so_far = best ? *best : current_;
       const Hypothesis quick = search_.screened_pair(given_, contenders[a].second, contenders[b].second);
       if (!to_beat) to_beat = search_.on_screening_subset(so_far).train.objective;
@@ -537,7 +538,7 @@ void StepwiseSelection::eliminate_backward() {
   while (again) {
     again = false;
     for (std::size_t i = 0; i < found_.size(); ++i) {
-      options_.tell(0.85, "checking whether " + kind_of(found_[i]) + " is needed");
+      options_.report_progress(0.85, "checking whether " + kind_of(found_[i]) + " is needed");
       Hypothesis h = search_.without(current_, found_[i]);
       if (!std::isfinite(h.train.objective)) continue;
       Evidence e = evidence_of(Change::keep, h, current_, {});

@@ -99,7 +99,7 @@ class Identifier {
     whole_ = {&runs_, thinned(segments, max_samples)};
     trial_ = {&runs_, thinned(segments, trial_samples)};
     few_ = {&runs_, thinned(segments, few_samples)};
-    tell(0.05, "force balance");
+    report_progress(0.05, "force balance");
     Model model = start();
     model = fitted(model, trial_, 8, 1);
     so_far_ = model;
@@ -108,10 +108,10 @@ class Identifier {
     const bool transition = range_.cart_moves && starts_from_rest() && grow(model);
     so_far_ = model;
     if (transition) model = or_with_less_noise(model);
-    tell(0.6, "fitting all parameters");
+    report_progress(0.6, "fitting all parameters");
     model = fitted(model, whole_, 12, 2);
     so_far_ = model;
-    tell(0.75, "testing the residual");
+    report_progress(0.75, "testing the residual");
     judge(model);
     report(model);
     if (result_.verdict == Verdict::explained) {
@@ -187,7 +187,7 @@ class Identifier {
     }
   }
 
-  void tell(double done, const std::string& what) const {
+  void report_progress(double done, const std::string& what) const {
     if (options_.progress) options_.progress(done, what);
   }
 
@@ -392,16 +392,16 @@ class Identifier {
         }
       }
     }
-    tell(0.15, "fitting Stribeck friction");
+    report_progress(0.15, "fitting Stribeck friction");
     const Model risen = best_of(
         richer(plain, {on_top(0.05, 1.5), on_top(0.15, 2.0), on_top(0.3, 2.0), part(plain, 0.15, 2.0)}));
     bool found = keep(model, risen, {"stribeck_friction"});
-    tell(0.25, "fitting bristle friction");
+    report_progress(0.25, "fitting bristle friction");
     const Model bristled = best_of(richer(plain, bristles));
     found = keep(model, bristled, {"bristle_friction"}) || found;
     // Each may hide behind the other: a rise that is seen through bristles, and bristles through a rise. And
     // what has both can do no worse than what has one, from where that one ended.
-    tell(0.4, "fitting Stribeck and bristle friction");
+    report_progress(0.4, "fitting Stribeck and bristle friction");
     std::vector<Model> models = richer(plain, both);
     if (std::isfinite(risen.fit.objective))
       for (const Start& start : bristles) models.push_back(richer(risen, start));

@@ -175,7 +175,7 @@ class LiveServer::Implementation {
       // Those who are here before those who come: a request that has arrived is answered before its
       // connection could give way to a new one.
       for (std::size_t i = 2; i < polled_.size(); ++i)
-        attend(*polled_connections_[i - 2], polled_[i].revents, now);
+        serve_connection(*polled_connections_[i - 2], polled_[i].revents, now);
       if ((polled_[0].revents & POLLIN) != 0) bell_.silence();
       for (HttpConnection& connection : connections_) {
         connection.take_events(now);
@@ -201,7 +201,7 @@ class LiveServer::Implementation {
     for (pollfd& one : polled_) one.revents = 0;
   }
 
-  void attend(HttpConnection& connection, int revents, Time now) {
+  void serve_connection(HttpConnection& connection, int revents, Time now) {
     if ((revents & POLLOUT) != 0) connection.send(now);
     if ((revents & (POLLIN | POLLHUP | POLLERR)) == 0) return;
     connection.receive(now);
@@ -233,7 +233,7 @@ class LiveServer::Implementation {
       ::setsockopt(socket, IPPROTO_TCP, TCP_NODELAY, &yes, sizeof yes);
       if (connections_.size() == max_connections) make_room();
       // Its request may have arrived already.
-      attend(connections_.emplace_back(socket, now), POLLIN, now);
+      serve_connection(connections_.emplace_back(socket, now), POLLIN, now);
     }
   }
 

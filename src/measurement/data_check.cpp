@@ -27,7 +27,7 @@ constexpr double contradicts = 0.9;
 /// what was left before.
 constexpr double explains = 0.75, far_better = 5.0;
 /// An equation of which nothing shows in the data as they are must account for this share.
-constexpr double bears_out = 0.5;
+constexpr double min_share_alone = 0.5;
 /// Nor may another equation lose more than this by it.
 constexpr double as_well = 0.05;
 /// No record of such a rig has rows further apart.
@@ -76,9 +76,11 @@ std::string text(const char* format, double value) {
   return buffer;
 }
 
-class Suspicion {
+class MistakeSearch {
  public:
-  Suspicion(const Measurement& run, const Plant& plant) : judge_(run, plant), fold_(judge_.fold()) { list(); }
+  MistakeSearch(const Measurement& run, const Plant& plant) : judge_(run, plant), fold_(judge_.fold()) {
+    list();
+  }
 
   /// The reading that undoes what is wrong; nothing where nothing is certain.
   std::optional<DataReading> resolve() {
@@ -96,7 +98,7 @@ class Suspicion {
     return late ? late : only_folded();
   }
 
-  const Accounted& as_read() const { return as_read_; }
+  const ExplainedShares& as_read() const { return as_read_; }
   /// Other readings that may be right instead, the best of each set of mistakes.
   std::vector<DataReading> alternatives() const {
     std::vector<DataReading> others;
@@ -255,7 +257,7 @@ class Suspicion {
   /// Whether an equation bears the reading out, or as well as the data as they are.
   static bool undoes(const std::optional<double>& had, const std::optional<double>& has) {
     if (!has) return !had;
-    if (!had) return *has >= bears_out;
+    if (!had) return *has >= min_share_alone;
     return *has >= explains || *has >= *had - as_well;
   }
 
@@ -266,7 +268,7 @@ class Suspicion {
   }
 
   void consider(const DataReading& reading, const std::vector<int>& kinds) {
-    const Accounted now = judge_.judge(reading);
+    const ExplainedShares now = judge_.judge(reading);
     if (!undoes(as_read_.cart, now.cart) || !undoes(as_read_.pendulum, now.pendulum)) return;
     if (!(settles(as_read_.cart, now.cart) || settles(as_read_.pendulum, now.pendulum))) return;
     const double rank = now.left_over + worth_of_mistake * static_cast<double>(reading.mistakes.size());
@@ -295,7 +297,7 @@ class Suspicion {
   std::optional<double> fold_;
   std::vector<Correction> corrections_;
   std::vector<int> used_;
-  Accounted as_read_;
+  ExplainedShares as_read_;
   std::vector<Fitting> fitting_;
 };
 
@@ -395,7 +397,7 @@ std::string implausible(const Measurement& run) {
 }
 
 /// What of the motion nothing accounts for, in words.
-std::string unaccounted(const Accounted& as_read) {
+std::string unaccounted(const ExplainedShares& as_read) {
   if (as_read.cart && *as_read.cart < 0.0 && as_read.voltage_needed > implausible_voltage)
     return text(
         "the recorded motion needs %.3g times the recorded voltage even with a quarter of the plant "
@@ -416,7 +418,7 @@ std::string unaccounted(const Accounted& as_read) {
 }
 
 std::optional<DataMistake> mistake_in(const Measurement& run, const Plant& plant, std::size_t number) {
-  Suspicion suspicion(run, plant);
+  MistakeSearch suspicion(run, plant);
   if (const auto reading = with_steady_clock(run, suspicion.resolve())) {
     DataMistake mistake{number, joined(reading->mistakes, ", and "), lines_of(run, *reading), {}};
     for (const DataReading& other : suspicion.alternatives())

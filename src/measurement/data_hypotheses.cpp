@@ -208,7 +208,8 @@ std::optional<ReadingJudge::Share> ReadingJudge::cart_share(const DataReading& r
                fit.squares()};
 }
 
-void ReadingJudge::judge_cart(const DataReading& reading, const Motion& motion, Accounted& accounted) const {
+void ReadingJudge::judge_cart(const DataReading& reading, const Motion& motion,
+                              ExplainedShares& accounted) const {
   if (!motion.cart_shows || plant_.motor.force_per_volt_n <= 0.0) return;
   Share best;
   for (const std::vector<double>& volts : motion.volts)
@@ -251,15 +252,15 @@ ReadingJudge::Share ReadingJudge::pendulum_share(const DataReading& reading, con
 }
 
 void ReadingJudge::judge_pendulum(const DataReading& reading, const Motion& motion,
-                                  Accounted& accounted) const {
+                                  ExplainedShares& accounted) const {
   if (!motion.theta_shows || !plant_.pendulum || !cart_known(reading)) return;
   const Share share = pendulum_share(reading, motion.cart, motion.theta, {0, motion.theta.level.size()});
   accounted.pendulum = share.generously;
   accounted.left_over += log_left(share.closely);
 }
 
-Accounted ReadingJudge::judge(const DataReading& reading) {
-  Accounted accounted;
+ExplainedShares ReadingJudge::judge(const DataReading& reading) {
+  ExplainedShares accounted;
   // The sign is in the factor: what a window shows is turned with it.
   const Motion& motion = motion_of(reading);
   judge_cart(reading, motion, accounted);

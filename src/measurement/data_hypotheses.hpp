@@ -37,7 +37,7 @@ double folded_every_rad(const DataReading& reading);
 
 /// The shares of the motor voltage and of the pendulum's acceleration that the equations account for. Empty
 /// if the data show too little. Negative if the equations make it worse.
-struct Accounted {
+struct ExplainedShares {
   std::optional<double> cart, pendulum;
   /// To choose between readings: logarithms of the unexplained shares, with numbers close to those of the
   /// plant file.
@@ -66,7 +66,7 @@ class ReadingJudge {
   /// The period of the folded angle in the file's unit, if it is an integer fraction of a turn but not a
   /// whole turn.
   std::optional<double> fold() const;
-  Accounted judge(const DataReading& reading);
+  ExplainedShares judge(const DataReading& reading);
   /// The delay of the angle relative to the cart, from the equation of the pendulum. Empty if the data show
   /// too little.
   std::optional<Lateness> lateness_of_angle(const DataReading& reading) const;
@@ -92,8 +92,8 @@ class ReadingJudge {
   Share pendulum_share(const DataReading& reading, const WindowedMotion& cart, const WindowedMotion& pendulum,
                        WindowRange range) const;
   std::vector<double> channel_of(const DataReading& reading, std::size_t channel) const;
-  void judge_cart(const DataReading& reading, const Motion& motion, Accounted& accounted) const;
-  void judge_pendulum(const DataReading& reading, const Motion& motion, Accounted& accounted) const;
+  void judge_cart(const DataReading& reading, const Motion& motion, ExplainedShares& accounted) const;
+  void judge_pendulum(const DataReading& reading, const Motion& motion, ExplainedShares& accounted) const;
 
   const Measurement& run_;
   const Plant& plant_;

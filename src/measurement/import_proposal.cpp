@@ -60,7 +60,7 @@ std::string unit_word(std::string_view quantity, const std::vector<std::string>&
 }
 
 /// How sure a name is for a quantity; 0: it is not. A derivative or a set-point is another quantity.
-int sureness(std::string_view name, const NamesOfQuantity& quantity) {
+int match_score(std::string_view name, const NamesOfQuantity& quantity) {
   constexpr std::array<std::string_view, 9> others = {"dot",   "vel", "velocity", "speed",  "rate",
                                                       "accel", "ref", "setpoint", "desired"};
   const std::vector<std::string> words = words_of(name);
@@ -89,16 +89,16 @@ std::vector<std::string> column_names(const fs::path& file) {
 /// Each quantity gets the surest column that no surer quantity has.
 void choose_columns(const std::vector<std::string>& names, ImportProposal& proposal) {
   struct Match {
-    int sureness;
+    int match_score;
     std::size_t quantity, column;
   };
   std::vector<Match> matches;
   for (std::size_t q = 0; q < names_of_quantities.size(); ++q)
     for (std::size_t c = 0; c < names.size(); ++c)
-      if (const int sure = sureness(names[c], names_of_quantities[q]); sure > 0)
+      if (const int sure = match_score(names[c], names_of_quantities[q]); sure > 0)
         matches.push_back({sure, q, c});
   std::stable_sort(matches.begin(), matches.end(),
-                   [](const Match& a, const Match& b) { return a.sureness > b.sureness; });
+                   [](const Match& a, const Match& b) { return a.match_score > b.match_score; });
   std::vector<bool> used(names.size(), false);
   for (const Match& match : matches) {
     ProposedColumn& column = proposal.columns[match.quantity];

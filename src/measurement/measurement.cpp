@@ -282,8 +282,8 @@ Measurement load(Dataset dataset, const std::string& name) {
   return m;
 }
 
-/// A run directory's mapping, with the time of recording as a label. Of an experiment's run, what somebody's hands did is left out: before the
-/// pendulum was let go no equation of motion holds.
+/// A run directory's mapping, with the time of recording as a label. Of an experiment's run, what somebody's
+/// hands did is left out: before the pendulum was let go no equation of motion holds.
 Dataset mapping_of_run(const fs::path& directory) {
   Dataset mapping = plain_dataset(directory / "samples.csv");
   std::error_code problem;

@@ -87,7 +87,7 @@ pid_t start(const MemoryFile& in, const MemoryFile& out, const MemoryFile& err) 
 }
 
 /// The last line that is not empty. Before it, gnuplot repeats the part of the script that failed.
-std::string complaint_of(const std::string& text) {
+std::string error_line_of(const std::string& text) {
   const std::size_t end = text.find_last_not_of(" \n");
   if (end == std::string::npos) return "no message";
   const std::size_t begin = text.rfind('\n', end);
@@ -104,7 +104,7 @@ std::string gnuplot_output(const std::string& script) {
   const int exit_code = wait_for(start(in, out, err));
   if (exit_code == 127) fail("gnuplot, which draws the plots, is not installed: apt-get install gnuplot-nox");
   if (exit_code != 0)
-    fail("gnuplot failed (" + complaint_of(err.read()) + "): check that gnuplot 5 works here");
+    fail("gnuplot failed (" + error_line_of(err.read()) + "): check that gnuplot 5 works here");
   return out.read();
 }
 

@@ -202,8 +202,8 @@ TEST(EstimatorDesign, RefusesWhatNoForceNoiseMends) {
 
 TEST(EstimatorDesign, NamesTheParameterThatALoopDoesNotBear) {
   ControlConfig config = quiet_config(viscous());
-  EXPECT_EQ(parameter_not_borne(viscous(), config, 0.2), "");
-  EXPECT_NE(parameter_not_borne(viscous(), config, 0.9), "");
+  EXPECT_EQ(destabilising_parameter(viscous(), config, 0.2), "");
+  EXPECT_NE(destabilising_parameter(viscous(), config, 0.9), "");
 }
 
 TEST(GainFile, AngleNoiseWithoutAKeyIsThatOfRounding) {

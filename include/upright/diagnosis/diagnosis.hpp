@@ -224,7 +224,7 @@ struct DiagnosisOptions {
   /// Called from time to time with the progress (0 to 1) and the current activity.
   std::function<void(double, const std::string&)> progress;
   /// Reports progress, where anybody listens: `done` from 0 to 1.
-  void tell(double done, const std::string& what) const {
+  void report_progress(double done, const std::string& what) const {
     if (progress) progress(done, what);
   }
 };

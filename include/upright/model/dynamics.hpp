@@ -329,51 +329,51 @@ class Dynamics {
 
   /// The motion before the dry friction of cart and pivot acts, for engines whose lanes differ in the modes
   /// of both contacts. Modes are numbers: -1 or 1 slides in that direction, 0 sticks.
-  struct Unheld {
-    S push;         ///< on the cart [N]
-    S turn;         ///< about the pivot [N m]
+  struct AppliedForces {
+    S force;        ///< on the cart [N]
+    S torque;       ///< about the pivot [N m]
     S coupling;     ///< between both, m l cos(th) [kg m]
     S bristle_mps;  ///< rate of the bristles
   };
   /// For plants with a pendulum. `cart`: the direction of its motion, for bristles.
-  Unheld unheld(const PlantState<S>& state, const S& motor_v, const S& cart) const {
+  AppliedForces applied_forces(const PlantState<S>& state, const S& motor_v, const S& cart) const {
     const Balance at = balance(state, motor_v);
-    Unheld all{at.force, gravity_torque_ * at.sine + at.torque, coupling_ * at.cosine, S(0.0)};
+    AppliedForces all{at.force, gravity_torque_ * at.sine + at.torque, coupling_ * at.cosine, S(0.0)};
     if (bristles_) {
       all.bristle_mps = bristle_rate(state, S(cart * state.cart_mps), cart);
-      all.push = all.push - bristle_stiffness() * state.bristle_m - bristle_damping() * all.bristle_mps;
+      all.force = all.force - bristle_stiffness() * state.bristle_m - bristle_damping() * all.bristle_mps;
     }
-    all.push = all.push + coupling_ * at.sine * state.theta_radps * state.theta_radps;
+    all.force = all.force + coupling_ * at.sine * state.theta_radps * state.theta_radps;
     return all;
   }
   /// The force that holds a resting cart, with the pivot in this mode.
-  S cart_load(const Unheld& at, const S& pivot) const {
-    const S turn = (at.turn - pivot_dry_level() * pivot) / inertia_;
-    return at.push - at.coupling * select(pivot == S(0.0), S(0.0), turn);
+  S cart_load(const AppliedForces& at, const S& pivot) const {
+    const S theta_radps2 = (at.torque - pivot_dry_level() * pivot) / inertia_;
+    return at.force - at.coupling * select(pivot == S(0.0), S(0.0), theta_radps2);
   }
   /// The torque that holds a resting pendulum, with the cart in this mode, at this level of its friction.
-  S pivot_load(const Unheld& at, const S& cart, const S& level) const {
-    const S push = (at.push - level * cart) / mass_;
-    if (!cart_can_stick()) return at.turn - at.coupling * push;
-    return at.turn - at.coupling * select(cart == S(0.0), S(0.0), push);
+  S pivot_load(const AppliedForces& at, const S& cart, const S& level) const {
+    const S cart_mps2 = (at.force - level * cart) / mass_;
+    if (!cart_can_stick()) return at.torque - at.coupling * cart_mps2;
+    return at.torque - at.coupling * select(cart == S(0.0), S(0.0), cart_mps2);
   }
   /// As `derivative`. `level`: of the cart's friction, 0 where nothing holds it.
-  PlantState<S> derivative_by_directions(const PlantState<S>& state, const Unheld& at, const S& cart,
+  PlantState<S> derivative_by_directions(const PlantState<S>& state, const AppliedForces& at, const S& cart,
                                          const S& level, const S& pivot) const {
-    const S push = at.push - level * cart, turn = at.turn - pivot_dry_level() * pivot;
+    const S f_n = at.force - level * cart, tau_nm = at.torque - pivot_dry_level() * pivot;
     const S& inertia = base_.inertia_about_pivot_kgm2;
     const S inverse = S(1.0) / (total_mass_ * inertia - at.coupling * at.coupling);
-    const auto pivot_rests = pivot == S(0.0);
+    const auto pivot_held = pivot == S(0.0);
     PlantState<S> rate{};
     rate.cart_m = state.cart_mps;
     rate.theta_rad = state.theta_radps;
     rate.bristle_m = at.bristle_mps;
-    rate.cart_mps = select(pivot_rests, push / mass_, (inertia * push - at.coupling * turn) * inverse);
-    rate.theta_radps = select(pivot_rests, S(0.0), S((total_mass_ * turn - at.coupling * push) * inverse));
+    rate.cart_mps = select(pivot_held, f_n / mass_, (inertia * f_n - at.coupling * tau_nm) * inverse);
+    rate.theta_radps = select(pivot_held, S(0.0), S((total_mass_ * tau_nm - at.coupling * f_n) * inverse));
     if (!cart_can_stick()) return rate;
-    const auto cart_rests = cart == S(0.0);
-    rate.cart_mps = select(cart_rests, S(0.0), rate.cart_mps);
-    rate.theta_radps = select(cart_rests, select(pivot_rests, S(0.0), S(turn / inertia_)), rate.theta_radps);
+    const auto cart_held = cart == S(0.0);
+    rate.cart_mps = select(cart_held, S(0.0), rate.cart_mps);
+    rate.theta_radps = select(cart_held, select(pivot_held, S(0.0), S(tau_nm / inertia_)), rate.theta_radps);
     return rate;
   }
 
@@ -559,21 +559,21 @@ class Dynamics {
   /// The same with a pendulum. Eight parameters: callers know the sine and cosine of its angle already.
   void accelerate(const PlantState<S>& state, const S& s, const S& c, const S& force, const S& torque,
                   bool cart_rests, bool pivot_rests, PlantState<S>& rate) const {
-    const S push = force + coupling_ * s * state.theta_radps * state.theta_radps;
+    const S f_n = force + coupling_ * s * state.theta_radps * state.theta_radps;
     if (pivot_rests) {
-      if (!cart_rests) rate.cart_mps = push / mass_;
+      if (!cart_rests) rate.cart_mps = f_n / mass_;
       return;
     }
-    const S turn = gravity_torque_ * s + torque;
+    const S tau_nm = gravity_torque_ * s + torque;
     if (cart_rests) {
-      rate.theta_radps = turn / inertia_;
+      rate.theta_radps = tau_nm / inertia_;
       return;
     }
     const S off_diagonal = coupling_ * c;
     const S inverse_determinant =
         S(1.0) / (total_mass_ * base_.inertia_about_pivot_kgm2 - off_diagonal * off_diagonal);
-    rate.cart_mps = (base_.inertia_about_pivot_kgm2 * push - off_diagonal * turn) * inverse_determinant;
-    rate.theta_radps = (total_mass_ * turn - off_diagonal * push) * inverse_determinant;
+    rate.cart_mps = (base_.inertia_about_pivot_kgm2 * f_n - off_diagonal * tau_nm) * inverse_determinant;
+    rate.theta_radps = (total_mass_ * tau_nm - off_diagonal * f_n) * inverse_determinant;
   }
 
   template <bool Stiffness>
