@@ -9,6 +9,7 @@
 
 #include "fake_device.hpp"
 #include "runtime/zero_volts.hpp"
+#include "upright/base/error.hpp"
 #include "upright/hal/rig_factory.hpp"
 #include "virtual_rig_process.hpp"
 
@@ -35,9 +36,20 @@ struct Driven {
     const std::filesystem::path file = folder / "rig.yaml";
     // The machine may be busy: what is tested here is what is done, not how fast.
     std::ofstream(file) << device.rig_text(0.03);
-    rig = make_rig(read_rig_file(file), {loop_period_s});
-    rig->open();
+    open(file);
     drive();
+  }
+  /// Opening is not tested here: a busy machine may let the device answer later than the rig waits.
+  void open(const std::filesystem::path& file) {
+    constexpr int attempts = 10;
+    for (int attempt = 1;; ++attempt) {
+      rig = make_rig(read_rig_file(file), {loop_period_s});
+      try {
+        return rig->open();
+      } catch (const DeviceError&) {
+        if (attempt == attempts) throw;
+      }
+    }
   }
   /// Until the voltage is on: a busy machine may let the device's own watchdog take it away again.
   void drive() {
