@@ -58,7 +58,8 @@ DataRange range_of(const std::vector<Measurement>& runs, const Plant& plant, con
   DataRange range;
   double sum = 0.0, count = 0.0;
   range.shortest_period_s = 1.0;
-  for (const QuantityRange& of : motion_range(runs, policy.speed_window_s)) {
+  range.measured = motion_range(runs, policy.speed_window_s);
+  for (const QuantityRange& of : range.measured) {
     const double largest = std::max(std::abs(of.low), std::abs(of.high));
     if (of.quantity == "cart_mps") range.largest_speed_mps = largest;
     if (of.quantity != "cart_m") continue;

@@ -7,12 +7,14 @@
 #include "estimation/fit.hpp"
 #include "search_budget.hpp"
 #include "selection_policy.hpp"
+#include "upright/diagnosis/diagnosis.hpp"
 
 namespace upright {
 
 /// What the runs can show at all: decides which effects are candidates and where searches start.
 struct DataRange {
-  bool cart_moves = false;  ///< some run has a free cart that is measured
+  std::vector<QuantityRange> measured;  ///< of each quantity that some run measured
+  bool cart_moves = false;              ///< some run has a free cart that is measured
   bool theta_measured = false;
   double largest_voltage_v = 0.0;
   double largest_force_n = 0.0;  ///< of the motor at that voltage

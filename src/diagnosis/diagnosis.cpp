@@ -21,7 +21,6 @@
 #include "force_description.hpp"
 #include "indistinguishable.hpp"
 #include "listing.hpp"
-#include "motion_range.hpp"
 #include "next_experiment.hpp"
 #include "place_null.hpp"
 #include "plant_scale.hpp"
@@ -196,7 +195,7 @@ class Diagnostician {
     result_.effects.clear();
     result_.run_names.clear();
     for (const Measurement& run : runs_) result_.run_names.push_back(run.name);
-    result_.measured_range = motion_range(runs_, policy_.excitation.speed_window_s);
+    result_.measured_range = search_.range().measured;
     for (const Measurement& run : runs_)
       result_.notes.insert(result_.notes.end(), run.notes.begin(), run.notes.end());
     if (runs_.size() == 1) result_.notes.push_back("one run only: a third of its segments is held out");

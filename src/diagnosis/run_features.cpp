@@ -96,7 +96,7 @@ double scatter(const Eigen::ArrayXd& values) {
 }
 
 /// The probability of such a correlation by chance (t test of the slope of a line). Empty if there are too
-/// few runs, or if all have the same number.
+/// few runs or no numbers, or if all have the same number.
 std::optional<double> chance_of_line(const std::vector<double>& numbers, const Eigen::VectorXd& sizes) {
   const auto n = static_cast<Eigen::Index>(numbers.size());
   const double freedom = static_cast<double>(n) - 2.0;
@@ -112,7 +112,7 @@ std::optional<double> chance_of_line(const std::vector<double>& numbers, const E
 }
 
 /// The probability that groups of runs with the same text differ so much by chance (one-way analysis of
-/// variance). Empty if there is one group, or fewer than two runs more than groups.
+/// variance). Empty if there are no texts, one group, or fewer than two runs more than groups.
 std::optional<double> chance_of_groups(const std::vector<std::string>& texts, const Eigen::VectorXd& sizes) {
   std::map<std::string, std::vector<double>> groups;
   for (std::size_t i = 0; i < texts.size(); ++i)
@@ -140,14 +140,14 @@ std::vector<RunDependence> dependences_of(const Eigen::VectorXd& sizes,
   for (const RunFeature& feature : features_of(runs)) {
     double least = 1.0;
     for (const auto& chance :
-         {feature.numbers.empty() ? std::nullopt : chance_of_line(feature.numbers, sizes),
-          feature.texts.empty() ? std::nullopt : chance_of_groups(feature.texts, sizes)}) {
-      tests += chance ? 1.0 : 0.0;
-      least = std::min(least, chance.value_or(1.0));
+         {chance_of_line(feature.numbers, sizes), chance_of_groups(feature.texts, sizes)}) {
+      if (!chance) continue;
+      tests += 1.0;
+      least = std::min(least, *chance);
     }
-    found.push_back({feature.name, feature.texts, least});
+    if (least < 1.0) found.push_back({feature.name, feature.texts, least});
   }
-  std::erase_if(found, [&](const RunDependence& d) { return d.chance * std::max(tests, 1.0) > max_chance; });
+  std::erase_if(found, [&](const RunDependence& d) { return d.chance * tests > max_chance; });
   std::stable_sort(found.begin(), found.end(),
                    [](const RunDependence& a, const RunDependence& b) { return a.chance < b.chance; });
   return found;

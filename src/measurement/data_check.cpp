@@ -418,16 +418,16 @@ std::string unaccounted(const ExplainedShares& as_read) {
 }
 
 std::optional<DataMistake> mistake_in(const Measurement& run, const Plant& plant, std::size_t number) {
-  MistakeSearch suspicion(run, plant);
-  if (const auto reading = with_steady_clock(run, suspicion.resolve())) {
+  MistakeSearch search(run, plant);
+  if (const auto reading = with_steady_clock(run, search.resolve())) {
     DataMistake mistake{number, joined(reading->mistakes, ", and "), lines_of(run, *reading), {}};
-    for (const DataReading& other : suspicion.alternatives())
+    for (const DataReading& other : search.alternatives())
       mistake.or_else.push_back(joined(other.mistakes, ", and ") + " (" + joined(lines_of(run, other), "; ") +
                                 ")");
     return mistake;
   }
   std::string cause = implausible(run);
-  if (cause.empty()) cause = unaccounted(suspicion.as_read());
+  if (cause.empty()) cause = unaccounted(search.as_read());
   if (cause.empty()) return std::nullopt;
   return DataMistake{number, std::move(cause), {}, {}};
 }

@@ -209,7 +209,7 @@ std::optional<ReadingJudge::Share> ReadingJudge::cart_share(const DataReading& r
 }
 
 void ReadingJudge::judge_cart(const DataReading& reading, const Motion& motion,
-                              ExplainedShares& accounted) const {
+                              ExplainedShares& shares) const {
   if (!motion.cart_shows || plant_.motor.force_per_volt_n <= 0.0) return;
   Share best;
   for (const std::vector<double>& volts : motion.volts)
@@ -219,9 +219,9 @@ void ReadingJudge::judge_cart(const DataReading& reading, const Motion& motion,
       best.voltage_needed = std::min(best.voltage_needed, share->voltage_needed);
     }
   if (!std::isfinite(best.generously)) return;
-  accounted.cart = best.generously;
-  accounted.left_over += log_left(best.closely);
-  accounted.voltage_needed = best.voltage_needed;
+  shares.cart = best.generously;
+  shares.left_over += log_left(best.closely);
+  shares.voltage_needed = best.voltage_needed;
 }
 
 /// Whether the cart's place is known: from its column, or because it was held.
@@ -252,20 +252,20 @@ ReadingJudge::Share ReadingJudge::pendulum_share(const DataReading& reading, con
 }
 
 void ReadingJudge::judge_pendulum(const DataReading& reading, const Motion& motion,
-                                  ExplainedShares& accounted) const {
+                                  ExplainedShares& shares) const {
   if (!motion.theta_shows || !plant_.pendulum || !cart_known(reading)) return;
   const Share share = pendulum_share(reading, motion.cart, motion.theta, {0, motion.theta.level.size()});
-  accounted.pendulum = share.generously;
-  accounted.left_over += log_left(share.closely);
+  shares.pendulum = share.generously;
+  shares.left_over += log_left(share.closely);
 }
 
 ExplainedShares ReadingJudge::judge(const DataReading& reading) {
-  ExplainedShares accounted;
+  ExplainedShares shares;
   // The sign is in the factor: what a window shows is turned with it.
   const Motion& motion = motion_of(reading);
-  judge_cart(reading, motion, accounted);
-  judge_pendulum(reading, motion, accounted);
-  return accounted;
+  judge_cart(reading, motion, shares);
+  judge_pendulum(reading, motion, shares);
+  return shares;
 }
 
 namespace {

@@ -92,8 +92,8 @@ class ReadingJudge {
   Share pendulum_share(const DataReading& reading, const WindowedMotion& cart, const WindowedMotion& pendulum,
                        WindowRange range) const;
   std::vector<double> channel_of(const DataReading& reading, std::size_t channel) const;
-  void judge_cart(const DataReading& reading, const Motion& motion, ExplainedShares& accounted) const;
-  void judge_pendulum(const DataReading& reading, const Motion& motion, ExplainedShares& accounted) const;
+  void judge_cart(const DataReading& reading, const Motion& motion, ExplainedShares& shares) const;
+  void judge_pendulum(const DataReading& reading, const Motion& motion, ExplainedShares& shares) const;
 
   const Measurement& run_;
   const Plant& plant_;
