@@ -11,6 +11,7 @@
 #include <string>
 
 #include "upright/base/error.hpp"
+#include "upright/sim/event_root.hpp"
 
 namespace upright {
 

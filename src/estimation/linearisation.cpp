@@ -25,6 +25,7 @@ EngineOptions engine_options() {
   options.max_step_s = 4e-3;
   options.step_fraction = 0.5;
   options.resolve_bristles = false;
+  options.resolve_lag = false;
   options.quick_derivatives = true;
   options.event_tolerance_s = 1e-9;
   return options;

@@ -47,6 +47,9 @@ struct EngineOptions {
   /// Whether Runge-Kutta steps resolve the cart's oscillation on its bristles where their relaxation
   /// damps it. False: stiff bristles cost nothing, with position errors of about 1e-6 m.
   bool resolve_bristles = true;
+  /// Whether Runge-Kutta steps stay below the motor's time constant. False: a short lag costs nothing. The
+  /// impulse of its voltage, and the moments of that, are exact in either case.
+  bool resolve_lag = true;
   /// Relative tolerance of the reference engine.
   double relative_tolerance = 1e-10;
   /// Tolerance of event times of the Runge-Kutta engine.
@@ -233,47 +236,6 @@ inline std::optional<EventKind> ended_at(double theta_rad, double cart_m, bool h
     return EventKind::fall;
   if (options.track_limit_m && std::abs(cart_m) > *options.track_limit_m) return EventKind::track_end;
   return std::nullopt;
-}
-
-/// Time within [0, h] at which f becomes positive, given f(h) = f_high > 0. If f(0) = f_low is not
-/// negative (the last event was this one), the search starts at a time at which f is negative; 0 where
-/// there is none. At most about 120 evaluations.
-template <class F>
-double turning_positive(F&& f, double f_low, double f_high, double h, double tolerance_s = 1e-14) {
-  constexpr int max_iterations = 60;
-  constexpr double nearest_s = 1e-14;
-  double low = 0.0, high = h;
-  if (!(f_low < 0.0)) {
-    double inside = h;
-    for (int i = 0; i < max_iterations && inside > nearest_s; ++i) {
-      inside *= 0.5;
-      const double f_inside = f(inside);
-      if (f_inside < 0.0) {
-        low = inside;
-        f_low = f_inside;
-        break;
-      }
-      high = inside;
-      f_high = f_inside;
-    }
-    if (!(f_low < 0.0)) return 0.0;
-  }
-  for (int i = 0; i < max_iterations && high - low > tolerance_s; ++i) {
-    double t = high - f_high * (high - low) / (f_high - f_low);
-    if (!(t > low && t < high) || i % 4 == 3) t = 0.5 * (low + high);
-    const double f_t = f(t);
-    if (f_t == 0.0) return t;
-    if (f_t > 0.0) {
-      high = t;
-      f_high = f_t;
-      f_low *= 0.5;
-    } else {
-      low = t;
-      f_low = f_t;
-      f_high *= 0.5;
-    }
-  }
-  return high;
 }
 
 /// Counts events in windows of time. In a window with too many events, engines keep contacts at rest, so

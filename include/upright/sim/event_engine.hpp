@@ -11,8 +11,8 @@
 #include <type_traits>
 
 #include "upright/model/dynamics.hpp"
-#include "upright/model/elementary.hpp"
 #include "upright/sim/contacts.hpp"
+#include "upright/sim/event_root.hpp"
 #include "upright/sim/linearised_step.hpp"
 #include "upright/sim/motor_lag.hpp"
 #include "upright/sim/runge_kutta.hpp"
@@ -119,9 +119,11 @@ class EventEngine {
       }
       const StepVoltage<S> voltage = voltage_over(h);
       const S within_s = i + 1 < spanned ? h : left_s;
-      const S part_vs = voltage.mean_v * S(length_s) + voltage.end_v * S(within_s - S(length_s));
+      const S longer_s = within_s - S(length_s);
+      const S part_vs = voltage.mean_v * S(length_s) + voltage.end_v * longer_s;
       impulse_vs += part_vs;
-      moment_vs2 += part_vs * (left_s - S(0.5) * within_s);
+      moment_vs2 += part_vs * (left_s - S(0.5) * within_s) + voltage.moment_vs2 -
+                    S(0.5 * length_s) * (voltage.end_v - voltage.mean_v) * longer_s;
       left_s -= within_s;
       state_.motor_v = voltage.end_v;
     }
@@ -306,17 +308,15 @@ class EventEngine {
   double rate_step(double rate) const {
     return std::clamp(options_.step_fraction / rate, options_.min_step_s, options_.max_step_s);
   }
-
   static S even_step(const S& remaining, double limit) {
     const double pieces = std::ceil(value_of(remaining) / limit - 1e-9);
     return pieces <= 1.0 ? remaining : S(remaining / S(pieces));
   }
-
   S next_step(const S& remaining) const { return even_step(remaining, rate_step(with_lag(motion_rate()))); }
 
   /// A rate of motion, and that of a lagging motor where its voltage changes.
   double with_lag(double rate) const {
-    if (!dynamics_.has_motor_lag()) return rate;
+    if (!dynamics_.has_motor_lag() || !options_.resolve_lag) return rate;
     const double gap_v = std::abs(value_of(drive_) - value_of(state_.motor_v));
     constexpr double settled_v = 1e-9;
     if (gap_v <= settled_v) return rate;
@@ -375,10 +375,7 @@ class EventEngine {
   /// Of one voltage that is held.
   StepVoltage<S> voltage_over(const S& h) const {
     if (!dynamics_.has_motor_lag()) return {drive_, drive_};
-    const S lag_s = dynamics_.motor_time_constant_s(), gap_v = state_.motor_v - drive_;
-    const S lags = S(value_of(h)) / lag_s;
-    const S mean = (S(1.0) - elementary::exp(S(-lags))) / lags;
-    return {drive_ + gap_v * mean, drive_ + gap_v * elementary::exp(S(-h / lag_s))};
+    return lagged_voltage(state_.motor_v, drive_, dynamics_.motor_time_constant_s(), h);
   }
 
   /// One step of the values of the coordinates under the present drive, without derivatives. False, with
@@ -391,17 +388,14 @@ class EventEngine {
       return rk4(plain_, plain_state(state_), value_of(drive_), t, &begin);
     };
     const PlantState<double> end = along(h);
-    if (first_event(end, *begin, h, false, along)) return false;
+    bool meets_event = false;
+    visit_events(end, *begin, h, false, along, [&](const Watch&, double, double) { meets_event = true; });
+    if (meets_event) return false;
     state_.cart_m.a = end.cart_m;
     state_.theta_rad.a = end.theta_rad;
     state_.cart_mps.a = end.cart_mps;
     state_.theta_radps.a = end.theta_radps;
     return true;
-  }
-
-  /// A Runge-Kutta step from the present state, without derivatives.
-  PlantState<double> plain_step(double h) const {
-    return rk4(plain_, plain_state(state_), value_of(drive_), h);
   }
 
   struct DrivenStep {
@@ -457,25 +451,17 @@ class EventEngine {
     return dense;
   }
 
-  /// The first event within a step that ends at `end`; `rate` is that at its beginning, `along(t)` the state
-  /// at a time within it.
-  template <class Along>
-  std::optional<Found> first_event(const PlantState<double>& end, const PlantState<double>& rate, double h,
-                                   bool held, const Along& along) const {
-    const double v = value_of(state_.cart_mps);
-    const double omega = value_of(state_.theta_radps);
-    const WatchList list = next_events(plain_, v, omega, contacts_, options_, held);
-    std::optional<Found> first;
-    const auto consider = [&](const Watch& watch, double within_s, double at_end) {
-      const auto f = [&](double t) { return event_indicator(plain_, along(t), contacts_, watch, options_); };
-      const double now = event_indicator(plain_, plain_state(state_), contacts_, watch, options_);
-      const double after = turning_positive(f, now, at_end, within_s, options_.event_tolerance_s);
-      if (!first || after < first->after_s) first = Found{watch, after};
-    };
-    for (const Watch& watch : list) {
+  /// Calls `visit(watch, within_s, at_end)` for each event within a step that ends at `end`: it is between
+  /// the beginning and `within_s`, where its indicator is `at_end` > 0. `rate` is that at the beginning,
+  /// `along(t)` the state at a time within the step.
+  template <class Along, class Visit>
+  void visit_events(const PlantState<double>& end, const PlantState<double>& rate, double h, bool held,
+                    const Along& along, const Visit& visit) const {
+    const double v = value_of(state_.cart_mps), omega = value_of(state_.theta_radps);
+    for (const Watch& watch : next_events(plain_, v, omega, contacts_, options_, held)) {
       const double at_end = event_indicator(plain_, end, contacts_, watch, options_);
       if (at_end > 0.0) {
-        consider(watch, h, at_end);
+        visit(watch, h, at_end);
         continue;
       }
       const bool cart = watch.kind == EventKind::cart_stick || watch.kind == EventKind::cart_reversal;
@@ -489,31 +475,96 @@ class EventEngine {
       const double lowest_s = -slope / (2.0 * curvature);
       if (!(lowest_s > 0.0 && lowest_s < h)) continue;
       const double at_lowest = event_indicator(plain_, along(lowest_s), contacts_, watch, options_);
-      if (at_lowest > 0.0) consider(watch, lowest_s, at_lowest);
+      if (at_lowest > 0.0) visit(watch, lowest_s, at_lowest);
     }
+  }
+
+  /// The first of them.
+  template <class Along>
+  std::optional<Found> first_event(const PlantState<double>& end, const PlantState<double>& rate, double h,
+                                   bool held, const Along& along) const {
+    std::optional<Found> first;
+    visit_events(end, rate, h, held, along, [&](const Watch& watch, double within_s, double at_end) {
+      const double after_s = time_of_event(watch, rate, within_s, at_end, along);
+      if (!first || after_s < first->after_s) first = Found{watch, after_s};
+    });
     return first;
+  }
+
+  template <class Along>
+  double time_of_event(const Watch& watch, const PlantState<double>& rate, double within_s, double at_end,
+                       const Along& along) const {
+    const auto f = [&](double t) { return event_indicator(plain_, along(t), contacts_, watch, options_); };
+    const PlantState<double> begin = plain_state(state_);
+    const double now = event_indicator(plain_, begin, contacts_, watch, options_);
+    if (now < 0.0 && linearises_in_middle()) {
+      const auto with_slope = [&](double t) {
+        const PlantState<double> at = along(t);
+        const PlantState<double> rate_at = plain_.derivative(at, at.motor_v, contacts_);
+        return IndicatorSlope{event_indicator(plain_, at, contacts_, watch, options_),
+                              indicator_slope(watch, at, rate_at)};
+      };
+      const double guess_s = first_guess(now, indicator_slope(watch, begin, rate), at_end, within_s);
+      if (const auto root = newton_root(with_slope, guess_s, within_s, options_.event_tolerance_s))
+        return *root;
+    }
+    return turning_positive(f, now, at_end, within_s, options_.event_tolerance_s);
+  }
+
+  /// A state a little later, at this rate, under the present drive.
+  template <class T>
+  PlantState<T> moved_on(const Dynamics<T>& dynamics, const PlantState<T>& at, const PlantState<T>& rate,
+                         const T& drive, const T& shift_s) const {
+    PlantState<T> to = moved(at, rate, shift_s);
+    if (dynamics.has_motor_lag())
+      to.motor_v = at.motor_v + shift_s * (drive - at.motor_v) / dynamics.motor_time_constant_s();
+    return to;
+  }
+
+  /// Rate of an indicator in a state that changes at this rate [1/s].
+  double indicator_slope(const Watch& watch, const PlantState<double>& at,
+                         const PlantState<double>& rate) const {
+    constexpr double aside_s = 1e-7;
+    const auto g = [&](const PlantState<double>& s) {
+      return event_indicator(plain_, s, contacts_, watch, options_);
+    };
+    return (g(moved_on(plain_, at, rate, value_of(drive_), aside_s)) - g(at)) / aside_s;
   }
 
   /// Advances to an event and through it. Returns the elapsed time with its derivative.
   S pass(const Found& found, bool held, BeginRate<S>& begin) {
     S taken(found.after_s);
-    PlantState<S> at = rk4(dynamics_, state_, drive_, taken, &begin);
+    state_ = moved_to(taken, begin);
     if constexpr (!std::is_same_v<S, double>) {
+      const PlantState<S> rate = dynamics_.derivative(state_, state_.motor_v, contacts_);
       // The root depends on the parameters: dt = -dg / (dg/dt).
-      const S g = event_indicator(dynamics_, at, contacts_, found.watch, options_);
-      const double slope = indicator_slope(found);
+      const S g = event_indicator(dynamics_, state_, contacts_, found.watch, options_);
+      const double slope = indicator_slope(found.watch, plain_state(state_), plain_state(rate));
       constexpr double flattest = 1e-9;  // a grazing event has no derivative; keep it finite
       const S shift = (S(value_of(g)) - g) / S(std::max(slope, flattest));
-      at = moved(at, dynamics_.derivative(at, at.motor_v, contacts_), shift);
-      if (dynamics_.has_motor_lag())
-        at.motor_v = at.motor_v + shift * (drive_ - at.motor_v) / dynamics_.motor_time_constant_s();
+      state_ = moved_on(dynamics_, state_, rate, drive_, shift);
       taken = taken + shift;
     }
-    state_ = at;
     seeded_ = false;
     time_s_ += found.after_s;
     enter(found.watch, held);
     return taken;
+  }
+
+  /// The present state after `taken`, without an event.
+  PlantState<S> moved_to(const S& taken, BeginRate<S>& begin) const {
+    // Over a much shorter step the mean of a lagging voltage is a difference of nearly equal numbers.
+    constexpr double min_quick_s = 1e-7;
+    if constexpr (!std::is_same_v<S, double>) {
+      if (linearises_in_middle() && value_of(taken) > min_quick_s) {
+        PlantState<S> at = state_;
+        const PlantState<double> plain_at =
+            rk4(plain_, plain_state(state_), value_of(drive_), value_of(taken));
+        linearised().take(plain_at, taken, voltage_over(taken), seeded_, at);
+        return at;
+      }
+    }
+    return rk4(dynamics_, state_, drive_, taken, &begin);
   }
 
   /// Changes the contact modes for an event at the present state.
@@ -525,15 +576,6 @@ class EventEngine {
     contacts_ = contacts_after(plain_, plain_state(state_), contacts_, kind, held);
     if (kind == EventKind::fall || kind == EventKind::track_end) halted_ = kind;
     note(resolved_kind(kind, contacts_));
-  }
-
-  /// Rate of the indicator at its zero [1/s].
-  double indicator_slope(const Found& found) const {
-    constexpr double aside_s = 1e-7;
-    const auto g = [&](double t) {
-      return event_indicator(plain_, plain_step(t), contacts_, found.watch, options_);
-    };
-    return (g(found.after_s + aside_s) - g(found.after_s)) / aside_s;
   }
 
   Dynamics<S> dynamics_;

@@ -26,6 +26,17 @@ struct StepVoltage {
   S moment_vs2{};  ///< first moment about the end of the step, beyond that of the mean [V s^2]
 };
 
+/// Of a motor that lags behind a held drive with this time constant, over a step of length h.
+template <class S>
+StepVoltage<S> lagged_voltage(const S& motor_v, const S& drive_v, const S& time_constant_s, const S& h) {
+  const double length_s = value_of(h);
+  const S gap_v = motor_v - drive_v, lags = S(length_s) / time_constant_s;
+  const S mean = (S(1.0) - elementary::exp(S(-lags))) / lags;
+  const S moment = (S(1.0) - mean) / lags - S(0.5) * mean;
+  return {drive_v + gap_v * mean, drive_v + gap_v * elementary::exp(S(-h / time_constant_s)),
+          S(length_s * length_s) * gap_v * moment};
+}
+
 /// For dual numbers S. The dynamics must outlive it.
 template <class S>
 class LinearisedStep {
