@@ -12,8 +12,9 @@ namespace upright {
 
 struct SearchBudget {
   // Samples: the diagnosis works on a part of them, where the record is finer than the motion.
-  /// [s] From sample to sample: the longest step of the simulation in a fit, so that longer periods save
-  /// less. The numbers of the model that was found are fitted to all samples.
+  /// [s] From sample to sample. Fewer samples say less of weak effects: 8 ms took 0.75 of the time in four
+  /// laboratory cases, for half of the samples. The numbers of the model that was found are fitted to all
+  /// samples. Chosen.
   double thinned_period_s = 4e-3;
   /// [of the noise of the cart's sensor] By how much the mean of some voltages may move the cart. A
   /// controller answers the noise with its voltage, so that this does not average out: 1 biased estimates

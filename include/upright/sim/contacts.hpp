@@ -56,9 +56,10 @@ struct EngineOptions {
   double event_tolerance_s = 1e-14;
   std::optional<double> fall_angle_rad;  ///< the simulation halts where |theta| reaches it
   std::optional<double> track_limit_m;   ///< the simulation halts where |x| reaches it
-  /// Derivatives of the Runge-Kutta engine with dual numbers, for steps without event and bristles: those
+  /// Derivatives of the Runge-Kutta engine with dual numbers, for plants without bristles: those
   /// of the motion linearised at the middle of the step, at a third of the cost. Their relative error is
-  /// about 1e-4 (1e-3 beside a motor lag), second order in the step; the motion itself is unchanged.
+  /// about 1e-4 (1e-3 beside a motor lag) in steps of 4 ms, second order in the step; the motion itself is
+  /// unchanged.
   bool quick_derivatives = false;
 };
 
