@@ -29,9 +29,9 @@ TEST(EventRoot, NewtonFindsWhatBisectionFinds) {
   std::uniform_real_distribution<double> share(0.01, 0.99), unit(-1.0, 1.0);
   constexpr double h = 4e-3, tolerance_s = 1e-9;
   for (int i = 0; i < 1000; ++i) {
-    const Cubic f{share(random) * h, std::exp(5.0 * unit(random)), 0.0, 0.0};
-    const Cubic bent{f.root_s, f.slope_per_s, 50.0 * f.slope_per_s * unit(random),
-                     2000.0 * f.slope_per_s * unit(random)};
+    const double root_s = share(random) * h, slope_per_s = std::exp(5.0 * unit(random));
+    const Cubic bent{root_s, slope_per_s, 50.0 * slope_per_s * unit(random),
+                     2000.0 * slope_per_s * unit(random)};
     int evaluations = 0;
     const auto counted = [&](double t) {
       ++evaluations;

@@ -308,10 +308,12 @@ class EventEngine {
   double rate_step(double rate) const {
     return std::clamp(options_.step_fraction / rate, options_.min_step_s, options_.max_step_s);
   }
+
   static S even_step(const S& remaining, double limit) {
     const double pieces = std::ceil(value_of(remaining) / limit - 1e-9);
     return pieces <= 1.0 ? remaining : S(remaining / S(pieces));
   }
+
   S next_step(const S& remaining) const { return even_step(remaining, rate_step(with_lag(motion_rate()))); }
 
   /// A rate of motion, and that of a lagging motor where its voltage changes.
@@ -500,11 +502,10 @@ class EventEngine {
     if (now < 0.0 && linearises_in_middle()) {
       const auto with_slope = [&](double t) {
         const PlantState<double> at = along(t);
-        const PlantState<double> rate_at = plain_.derivative(at, at.motor_v, contacts_);
-        return IndicatorSlope{event_indicator(plain_, at, contacts_, watch, options_),
-                              indicator_slope(watch, at, rate_at)};
+        return indicator_with_slope(watch, at, plain_.derivative(at, at.motor_v, contacts_));
       };
-      const double guess_s = first_guess(now, indicator_slope(watch, begin, rate), at_end, within_s);
+      const double slope_per_s = indicator_with_slope(watch, begin, rate).slope_per_s;
+      const double guess_s = first_guess(now, slope_per_s, at_end, within_s);
       if (const auto root = newton_root(with_slope, guess_s, within_s, options_.event_tolerance_s))
         return *root;
     }
@@ -521,14 +522,13 @@ class EventEngine {
     return to;
   }
 
-  /// Rate of an indicator in a state that changes at this rate [1/s].
-  double indicator_slope(const Watch& watch, const PlantState<double>& at,
-                         const PlantState<double>& rate) const {
+  /// An indicator in a state that changes at this rate.
+  IndicatorSlope indicator_with_slope(const Watch& watch, const PlantState<double>& at,
+                                      const PlantState<double>& rate) const {
     constexpr double aside_s = 1e-7;
-    const auto g = [&](const PlantState<double>& s) {
-      return event_indicator(plain_, s, contacts_, watch, options_);
-    };
-    return (g(moved_on(plain_, at, rate, value_of(drive_), aside_s)) - g(at)) / aside_s;
+    const PlantState<double> aside = moved_on(plain_, at, rate, value_of(drive_), aside_s);
+    const double value = event_indicator(plain_, at, contacts_, watch, options_);
+    return {value, (event_indicator(plain_, aside, contacts_, watch, options_) - value) / aside_s};
   }
 
   /// Advances to an event and through it. Returns the elapsed time with its derivative.
@@ -539,7 +539,8 @@ class EventEngine {
       const PlantState<S> rate = dynamics_.derivative(state_, state_.motor_v, contacts_);
       // The root depends on the parameters: dt = -dg / (dg/dt).
       const S g = event_indicator(dynamics_, state_, contacts_, found.watch, options_);
-      const double slope = indicator_slope(found.watch, plain_state(state_), plain_state(rate));
+      const double slope =
+          indicator_with_slope(found.watch, plain_state(state_), plain_state(rate)).slope_per_s;
       constexpr double flattest = 1e-9;  // a grazing event has no derivative; keep it finite
       const S shift = (S(value_of(g)) - g) / S(std::max(slope, flattest));
       state_ = moved_on(dynamics_, state_, rate, drive_, shift);
