@@ -53,7 +53,7 @@ def aau_pendulum(data):
 
     # The angle of swing1 is positive toward -x. Column 12 is the current that was applied.
     swing = real_data.dataset(data / "aau" / "swing1.csv",
-                              {"time_s": 1, "voltage_v": 12, "cart_m": 5, "theta_rad": "{column: 2, scale: -1}"},
+                              {"time_s": 1, "voltage_v": 12, "cart_m": 6, "theta_rad": "{column: 4, scale: -1}"},
                               header="false")
     runs = {"decay-early": decay(from_s=10, to_s=40), "decay-late": decay(from_s=40), "swing1": swing}
     return Rig(real_data.AAU_PENDULUM_PLANT, runs, 2.0, from_each(runs), falls=("swing1",))
