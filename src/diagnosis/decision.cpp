@@ -78,19 +78,14 @@ Decision decide_certain(const Evidence& e, const Improvement& improvement, const
   return enough(*e.certainty_converged) ? accepted(Rule::shown_throughout) : rejected(Rule::uncertain_size);
 }
 
-/// Forces that look right a sample ahead can simulate badly: then the name is wrong. By how much segments are
-/// further off, as far as their number can show it.
-bool simulates_as_well(const SimulationChange& change, const AcceptancePolicy& p) {
-  if (change.segments == 0) return true;
-  const double scatter = std::max(p.min_simulation_scatter, change.scatter);
-  return change.mean <
-         p.worse_simulation_by_chance + scatter / std::sqrt(static_cast<double>(change.segments));
-}
-
-/// The last question of a change that is accepted otherwise, by `rule`.
+/// The last question of a change that is accepted otherwise, by `rule`. Forces that look right a sample ahead
+/// can simulate badly: then the name is wrong.
 Decision decide_simulation(const Evidence& e, Rule rule, const AcceptancePolicy& p) {
   if (!e.simulated_segments) return waiting(MissingFit::simulated_segments);
-  return simulates_as_well(*e.simulated_segments, p) ? accepted(rule) : rejected(Rule::simulates_worse);
+  const SimulationChange& change = *e.simulated_segments;
+  if (change.segments == 0) return accepted(rule);
+  const double by_chance = p.worse_simulation_by_chance + change.standard_error(p.min_simulation_scatter);
+  return change.mean < by_chance ? accepted(rule) : rejected(Rule::simulates_worse);
 }
 
 bool is_open(const Decision& decision) {
@@ -166,6 +161,22 @@ Decision decide_trust(const Evidence& e, const AcceptancePolicy& p) {
 }
 
 }  // namespace
+
+SimulationChange simulation_change(const std::vector<double>& before, const std::vector<double>& now) {
+  const auto n = static_cast<double>(now.size());
+  double mean = 0.0, square = 0.0;
+  for (std::size_t s = 0; s < now.size(); ++s) {
+    const double change = std::log(std::max(now[s], 1e-9) / std::max(before[s], 1e-9));
+    mean += change / n;
+    square += change * change / n;
+  }
+  return {now.size(), mean, std::sqrt(std::max(square - mean * mean, 0.0))};
+}
+
+double SimulationChange::standard_error(double min_scatter) const {
+  if (segments == 0) return 0.0;
+  return std::max(min_scatter, scatter) / std::sqrt(static_cast<double>(segments));
+}
 
 std::string_view name_of(Rule rule) {
   switch (rule) {

@@ -23,7 +23,12 @@ struct Improvement {
 struct SimulationChange {
   std::size_t segments = 0;  ///< 0 where no data are held out
   double mean = 0.0, scatter = 0.0;
+  /// Of the mean, with at least this scatter.
+  double standard_error(double min_scatter = 0.0) const;
 };
+
+/// From the errors of the same segments before and now [any unit, one for both].
+SimulationChange simulation_change(const std::vector<double>& before, const std::vector<double>& now);
 
 /// What is to be decided.
 enum class Change {

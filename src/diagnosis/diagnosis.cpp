@@ -288,9 +288,14 @@ class Diagnostician {
       return true;
     }
     options_.report_progress(0.94, "measuring the gap");
-    listing_ = list_effects(search_, fits_.judged(), fits_.effects());
+    listing_ = list_effects(search_, fits_.judged(), {fits_.effects(), fits_.corrections()});
+    if (listing_.number_raises) {
+      put_back(*listing_.number_raises);
+      return true;
+    }
     if (listing_.raises) {
-      withdraw(*listing_.raises, "it helps the runs that were fitted, and takes held-out data further off");
+      withdraw(*listing_.raises,
+               "it helps the runs that were fitted, but held-out data are simulated better without it");
       return true;
     }
     fits_.fit_all_samples();
@@ -304,6 +309,16 @@ class Diagnostician {
       return true;
     }
     return false;
+  }
+
+  /// A fitted number stands for something else where that of the file simulates held-out data better: the
+  /// search goes on with this one.
+  void put_back(std::size_t number) {
+    const std::vector<std::size_t>& corrections = fits_.corrections();
+    if (std::find(corrections.begin(), corrections.end(), number) != corrections.end())
+      withdraw(number, "held-out data are simulated better with the number of the plant file");
+    selection_.hold(number);
+    selection_.find_again();
   }
 
   /// Of a quick diagnosis: all that are not certain enough go. False: there are none.
@@ -384,6 +399,9 @@ class Diagnostician {
     }
     std::stable_sort(result_.candidates.begin(), result_.candidates.end(),
                      [](const auto& a, const auto& b) { return a.evidence > b.evidence; });
+    for (const std::size_t number : search_.held_numbers())
+      result_.notes.push_back("the value of the plant file stays: with a fitted " + kind_of(number) +
+                              ", held-out data are simulated worse");
     for (const std::string& note : notes_on_doubtful_numbers(fits_.reported(), all, policy_.correction))
       result_.notes.push_back(note);
     beyond_sensors_ = tests.beyond_sensors;

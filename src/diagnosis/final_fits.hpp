@@ -36,6 +36,7 @@ class FinalFits {
   const Hypothesis& reported() const { return reported_; }
   /// What was found, and the corrections.
   std::vector<std::size_t> effects() const;
+  const std::vector<std::size_t>& corrections() const { return corrections_; }
 
  private:
   /// The last fits, of training runs and of all. A correction that these leave uncertain is none: it goes.

@@ -3,74 +3,120 @@
 #include <algorithm>
 #include <cmath>
 
+#include "decision.hpp"
+
 namespace upright {
 
 namespace {
 
-class HeldOutError {
+class HeldOutSimulation {
  public:
-  HeldOutError(Search& search, const Hypothesis& judged)
+  HeldOutSimulation(Search& search, const Hypothesis& judged)
       : search_(search), judged_(judged), noise_(judged.train.point.noise) {}
 
-  /// With these effects; `settled`: the numbers of the plant file within what is believed of them.
-  double of(const std::vector<std::size_t>& effects, bool settled) const {
-    Hypothesis h = search_.fitted_separately(effects, judged_, &noise_, settled);
-    search_.filter_held_out(h, sensors_only(noise_));
-    return search_.gap_of(h);
+  /// With these effects and the numbers of the plant file as given.
+  FreeRunSimulation as_given(const std::vector<std::size_t>& effects) const { return of(effects, false); }
+  /// The same with the numbers within what is believed of them, but for one that may be as given.
+  FreeRunSimulation settled(const std::vector<std::size_t>& effects,
+                            std::optional<std::size_t> as_given = {}) const {
+    return of(effects, true, as_given);
   }
 
  private:
+  FreeRunSimulation of(const std::vector<std::size_t>& effects, bool settled,
+                       std::optional<std::size_t> held = {}) const {
+    Hypothesis h = search_.fitted_separately(effects, judged_, &noise_, settled, held);
+    return search_.simulate(h);
+  }
+
   Search& search_;
   const Hypothesis& judged_;
   const Noise noise_;
 };
 
-/// The suspect without which the error is lowest, if that is below `to_beat`.
-std::optional<std::size_t> raising_effect(const HeldOutError& error, const std::vector<std::size_t>& effects,
-                                          const std::vector<std::size_t>& suspects, double to_beat) {
+/// How far the error grew, less one standard error of that [ln of a ratio].
+double certain_rise(const FreeRunSimulation& before, const FreeRunSimulation& now) {
+  const SimulationChange change = simulation_change(before.segment_gap, now.segment_gap);
+  return change.mean - change.standard_error();
+}
+
+std::vector<std::size_t> without(std::vector<std::size_t> effects, std::size_t gone) {
+  std::erase(effects, gone);
+  return effects;
+}
+
+/// The suspect without which the error is lowest, if it is lower by more than chance there.
+/// `simulated_without(suspect)`: the simulation to compare.
+template <class Simulate>
+std::optional<std::size_t> raising(const std::vector<std::size_t>& suspects,
+                                   const FreeRunSimulation& complete, double by_chance,
+                                   Simulate&& simulated_without) {
   std::optional<std::size_t> raises;
   for (const std::size_t suspect : suspects) {
-    std::vector<std::size_t> others = effects;
-    std::erase(others, suspect);
-    const double without = error.of(others, true);
-    if (!(without < to_beat)) continue;
-    to_beat = without;
+    const double rise = certain_rise(simulated_without(suspect), complete);
+    if (!(rise > by_chance)) continue;
+    by_chance = rise;
     raises = suspect;
   }
   return raises;
 }
 
+/// The corrections, and the other numbers of the plant file that moved by more than a standard deviation of
+/// what is believed of them.
+std::vector<std::size_t> moved_far(const Search& search, const Hypothesis& judged, const ListedModel& model) {
+  std::vector<std::size_t> numbers = model.corrections;
+  for (const FreeParameter& p : judged.free) {
+    const auto listed = [&](const std::vector<std::size_t>& in) {
+      return std::find(in.begin(), in.end(), p.effect) != in.end();
+    };
+    if (!search.can_hold(p.effect) || listed(model.effects) || listed(numbers)) continue;
+    const double moved = judged.train.point.plant.find(p.effect)->values[p.index] - p.prior_mean;
+    if (p.prior_sigma > 0.0 && std::abs(moved) > p.prior_sigma) numbers.push_back(p.effect);
+  }
+  return numbers;
+}
+
 }  // namespace
 
 double held_out_error(Search& search, const Hypothesis& judged, const std::vector<std::size_t>& effects) {
-  return HeldOutError(search, judged).of(effects, true);
+  return HeldOutSimulation(search, judged).settled(effects).gap;
 }
 
-Listing list_effects(Search& search, const Hypothesis& judged, const std::vector<std::size_t>& effects) {
-  const HeldOutError error(search, judged);
+Listing list_effects(Search& search, const Hypothesis& judged, const ListedModel& model) {
+  const HeldOutSimulation simulation(search, judged);
+  const FreeRunSimulation given = simulation.as_given({});
+  FreeRunSimulation complete = given;
   Listing listing;
-  listing.before = listing.after = error.of({}, false);
-  if (effects.empty()) listing.numbers_moved = error.of({}, true);
+  listing.before = given.gap;
+  if (model.effects.empty()) listing.numbers_moved = simulation.settled({}).gap;
   std::vector<std::size_t> added, raised;
-  double lowest = listing.before;
-  for (const std::size_t effect : effects) {
+  double lowest = given.gap;
+  for (const std::size_t effect : model.effects) {
     added.push_back(effect);
-    listing.after = error.of(added, added.size() == effects.size());
-    if (listing.after > lowest) raised.push_back(effect);
+    const bool last = added.size() == model.effects.size();
+    complete = last ? simulation.settled(added) : simulation.as_given(added);
+    if (complete.gap > lowest) raised.push_back(effect);
     const double before = lowest;
-    lowest = std::min(lowest, listing.after);
+    lowest = std::min(lowest, complete.gap);
     listing.rows.push_back({effect, before, lowest});
   }
+  listing.after = complete.gap;
   // No step ends below the complete model.
+  listing.before = std::max(listing.before, listing.after);
   for (Listing::Row& row : listing.rows) {
     row.before = std::max(row.before, listing.after);
     row.after = std::max(row.after, listing.after);
   }
-  const bool worse = listing.after > listing.before;
-  const double by_chance = std::exp(-search.policy().acceptance.worse_simulation_by_chance);
-  if (!raised.empty())
-    listing.raises = raising_effect(error, effects, raised, listing.after * (worse ? 1.0 : by_chance));
-  if (!listing.raises && worse) listing.raises = raised.back();
+  if (model.effects.empty()) return listing;
+  const double by_chance = search.policy().acceptance.worse_simulation_by_chance;
+  listing.number_raises =
+      raising(moved_far(search, judged, model), complete, by_chance,
+              [&](std::size_t number) { return simulation.settled(without(model.effects, number), number); });
+  if (listing.number_raises || raised.empty()) return listing;
+  listing.raises = raising(raised, complete, by_chance, [&](std::size_t effect) {
+    return simulation.settled(without(model.effects, effect));
+  });
+  if (!listing.raises && certain_rise(given, complete) > by_chance) listing.raises = raised.back();
   return listing;
 }
 

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <functional>
 #include <limits>
-#include <numeric>
 
 #include "belief.hpp"
 #include "estimation/significant_digits.hpp"
@@ -43,57 +42,7 @@ double log_determinant(const Eigen::MatrixXd& information) {
   return symmetric_pivots(information).array().abs().max(1e-300).log().sum();
 }
 
-/// Mean over its standard error.
-double t_of(const std::vector<double>& values) {
-  if (values.size() < 2) return 0.0;
-  const auto n = static_cast<double>(values.size());
-  double mean = 0.0, spread = 0.0;
-  for (const double v : values) mean += v / n;
-  for (const double v : values) spread += (v - mean) * (v - mean) / (n - 1.0);
-  return mean / std::sqrt(std::max(spread / n, 1e-12));
-}
-
 }  // namespace
-
-/// Minus twice the log of likelihood and priors if the data count `dispersion` times less than the likelihood
-/// says. The parameters are where that is least: a step from the fit, in which they count in full.
-double tempered_objective(const Hypothesis& h, double dispersion) {
-  const double likelihood = minus_log_likelihood(h.train) / dispersion;
-  const auto n = static_cast<Eigen::Index>(h.free.size());
-  if (n == 0) return likelihood;
-  Eigen::VectorXd prior(n), off(n);
-  for (Eigen::Index j = 0; j < n; ++j) {
-    const FreeParameter& p = h.free[static_cast<std::size_t>(j)];
-    prior[j] = p.prior_sigma > 0.0 ? 1.0 / (p.prior_sigma * p.prior_sigma) : 0.0;
-    off[j] = h.train.point.plant.find(p.effect)->values[p.index] - p.prior_mean;
-  }
-  const Eigen::VectorXd pull = prior.cwiseProduct(off);
-  Eigen::MatrixXd information = h.train.information / dispersion;
-  information.diagonal() += (1.0 - 1.0 / dispersion) * prior;
-  const double share = 1.0 - 1.0 / dispersion;
-  return likelihood + off.dot(pull) -
-         share * share * pull.dot(Eigen::VectorXd(solve_symmetric(information, pull)));
-}
-
-Improvement compare(const Hypothesis& simpler, const Hypothesis& richer, double dispersion) {
-  Improvement result;
-  if (!std::isfinite(richer.train.objective)) return {-infinity, -infinity, -infinity, -infinity};
-  std::vector<double> falls;
-  const std::size_t blocks =
-      std::min(simpler.train.block_objective.size(), richer.train.block_objective.size());
-  for (std::size_t b = 0; b < blocks; ++b)
-    falls.push_back(simpler.train.block_objective[b] - richer.train.block_objective[b]);
-  result.train = tempered_objective(simpler, dispersion) - tempered_objective(richer, dispersion);
-  result.prior = result.train - std::accumulate(falls.begin(), falls.end(), 0.0) / dispersion;
-  result.held =
-      (simpler.negative_log_predictive_density - richer.negative_log_predictive_density) / dispersion;
-  result.t_value = t_of(falls);
-  return result;
-}
-
-Improvement compare(const Hypothesis& simpler, const Hypothesis& richer) {
-  return compare(simpler, richer, std::max(richer.train.dispersion, 1.0));
-}
 
 std::vector<ParameterEstimate> estimates_of(std::size_t effect, const Hypothesis& h) {
   std::vector<ParameterEstimate> result;
@@ -156,6 +105,14 @@ bool Search::is_nuisance(std::size_t effect) const {
   return std::find(nuisances_.begin(), nuisances_.end(), effect) != nuisances_.end();
 }
 
+bool Search::is_unknown_zero(std::size_t effect) const {
+  return effect == effect_number("angle_offset") && given_.find(effect) == nullptr;
+}
+
+bool Search::can_hold(std::size_t effect) const {
+  return is_nuisance(effect) && !is_unknown_zero(effect) && !held_numbers_.contains(effect);
+}
+
 void Search::choose_screening_subset(std::size_t stride) {
   screening_subset_ = {train_.runs, {}, train_.bound};
   screening_places_.clear();
@@ -172,6 +129,7 @@ void Search::screen_on_all() {
 std::vector<FreeParameter> Search::free_of(const std::set<std::size_t>& added) const {
   std::vector<FreeParameter> free;
   for (const std::size_t effect : nuisances_) {
+    if (held_numbers_.contains(effect)) continue;
     const auto parameters = added.contains(effect)
                                 ? free_parameters(effect, range_, policy_.prior)
                                 : correction_parameters(given_, effect, range_, policy_.prior);
@@ -450,6 +408,14 @@ Hypothesis Search::exchanged(const Hypothesis& base, std::size_t effect,
   return h;
 }
 
+Hypothesis Search::with_held_numbers(const Hypothesis& base) {
+  Plant plant = base.train.point.plant;
+  for (const std::size_t number : held_numbers_) plant.set(number, plant_.find(number)->values);
+  Hypothesis h = fitted(base.added, moved_to(base.train.point, plant), FitOptions{}, free_of(base.added));
+  predict_held_out(h);
+  return h;
+}
+
 Hypothesis Search::without(const Hypothesis& base, std::size_t effect) {
   std::set<std::size_t> added = base.added;
   added.erase(effect);
@@ -465,7 +431,8 @@ Hypothesis Search::without(const Hypothesis& base, std::size_t effect) {
 }
 
 Hypothesis Search::fitted_separately(const std::vector<std::size_t>& effects, const Hypothesis& from,
-                                     const Noise* fixed_noise, bool settled) {
+                                     const Noise* fixed_noise, bool settled,
+                                     std::optional<std::size_t> as_given) {
   Plant plant = plant_;
   std::vector<FreeParameter> free;
   const auto include = [&](std::size_t effect, const std::vector<FreeParameter>& parameters) {
@@ -483,9 +450,9 @@ Hypothesis Search::fitted_separately(const std::vector<std::size_t>& effects, co
   }
   for (const std::size_t effect : nuisances_) {
     if (std::find(effects.begin(), effects.end(), effect) != effects.end()) continue;
-    // The zero of the angle is known to a count only, whatever else is.
-    const bool zero = effect == effect_number("angle_offset") && given_.find(effect) == nullptr;
-    if (settled || zero) include(effect, correction_parameters(given_, effect, range_, policy_.prior));
+    const bool held = held_numbers_.contains(effect) || effect == as_given;
+    if (is_unknown_zero(effect) || (settled && !held))
+      include(effect, correction_parameters(given_, effect, range_, policy_.prior));
   }
   FitPoint point = moved_to(from.train.point, plant);
   FitOptions options;

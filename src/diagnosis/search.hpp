@@ -99,6 +99,14 @@ class Search {
   void refine(const Hypothesis& base, Hypothesis& hypothesis);
   /// The same without judging it, from the noise that it has.
   void refit(const Hypothesis& base, Hypothesis& hypothesis);
+  /// From now on, no fit moves this number of the plant file.
+  void hold(std::size_t number) { held_numbers_.insert(number); }
+  /// Whether a number of the plant file, or an effect of it, can be held and is not yet. The zero of the
+  /// angle cannot: it is known to a count only, whatever else is.
+  bool can_hold(std::size_t effect) const;
+  const std::set<std::size_t>& held_numbers() const { return held_numbers_; }
+  /// The same hypothesis with held numbers as in the plant file.
+  Hypothesis with_held_numbers(const Hypothesis& base);
   /// The same hypothesis without one effect.
   Hypothesis without(const Hypothesis& base, std::size_t effect);
   /// The same hypothesis from initial states that are guessed from the data once more: those that suited a
@@ -107,9 +115,10 @@ class Search {
   /// The same hypothesis with others, at these values to begin with, in the place of one effect.
   Hypothesis exchanged(const Hypothesis& base, std::size_t effect, const std::vector<PlantEffect>& others);
   /// These effects free with nothing believed of them beforehand. Everything else as in the plant file, or
-  /// `settled`: within what is believed of it. Not judged.
+  /// `settled`: within what is believed of it, but for the number `as_given`. Not judged.
   Hypothesis fitted_separately(const std::vector<std::size_t>& effects, const Hypothesis& from,
-                               const Noise* fixed_noise, bool settled = false);
+                               const Noise* fixed_noise, bool settled = false,
+                               std::optional<std::size_t> as_given = {});
   /// The same point with one effect more left open, with nothing believed of it and where it does nothing:
   /// what the data then still say of the others. Or where it has this share of its typical size.
   Hypothesis with_effect_free(const Hypothesis& h, std::size_t effect, double share_of_typical = 0.0) const;
@@ -148,6 +157,8 @@ class Search {
   double negative_log_predictive_density_of(const Hypothesis& h) const;
   /// Bristles that bend over a good part of the track before they slide are a spring by another name.
   bool bristles_are_short(const Hypothesis& h) const;
+  /// The zero of the angle where the plant file does not state it.
+  bool is_unknown_zero(std::size_t effect) const;
   /// A few steps with the noise as it is.
   FitOptions screening() const;
   /// A hypothesis's point on the screening subset alone.
@@ -179,6 +190,7 @@ class Search {
   DataRange range_;
   mutable EffectStarts starts_;
   std::vector<std::size_t> nuisances_;
+  std::set<std::size_t> held_numbers_;
   std::vector<PlantState<double>> train_starts_, held_starts_;
 };
 

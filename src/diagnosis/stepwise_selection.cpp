@@ -87,6 +87,12 @@ std::vector<std::size_t> StepwiseSelection::withdraw(std::size_t effect) {
   return gone;
 }
 
+void StepwiseSelection::hold(std::size_t number) {
+  search_.hold(number);
+  withdrawn_.insert(number);
+  current_ = search_.with_held_numbers(current_);
+}
+
 std::vector<std::size_t> StepwiseSelection::open_candidates() const {
   std::vector<std::size_t> candidates = candidate_effects(current_.train.point.plant, search_.range());
   for (const std::size_t effect : search_.nuisances())
@@ -166,7 +172,7 @@ Decision StepwiseSelection::decided(Evidence& e, Hypothesis& h, std::size_t effe
         break;
       case MissingFit::simulated_segments:
         // What stands in the place of something else is compared where both were fitted, too.
-        e.simulated_segments = simulation_change(h, e.change == Change::pair);
+        e.simulated_segments = change_of_simulation(h, e.change == Change::pair);
         break;
       case MissingFit::all_runs:
         e.certainty_of_all_runs = search_.certainty(search_.fitted_to_all_runs(h), effect);
@@ -189,23 +195,18 @@ void StepwiseSelection::converge(Hypothesis& h) {
   }
 }
 
-SimulationChange StepwiseSelection::simulation_change(Hypothesis& h, bool of_training_too) {
+SimulationChange StepwiseSelection::change_of_simulation(Hypothesis& h, bool of_training_too) {
   if (search_.held_data().segments.empty()) return {};
-  std::vector<double> worse;
-  const auto compare_segments = [&](const std::vector<double>& before, const std::vector<double>& now) {
-    for (std::size_t s = 0; s < now.size(); ++s)
-      worse.push_back(std::log(std::max(now[s], 1e-9) / std::max(before[s], 1e-9)));
-  };
-  compare_segments(search_.simulate(current_).segment_gap, search_.simulate(h).segment_gap);
+  std::vector<double> before = search_.simulate(current_).segment_gap;
+  std::vector<double> now = search_.simulate(h).segment_gap;
   if (found_.empty()) given_.simulation = current_.simulation;
-  if (of_training_too) compare_segments(search_.simulate_training(current_), search_.simulate_training(h));
-  const auto n = static_cast<double>(worse.size());
-  double mean = 0.0, square = 0.0;
-  for (const double change : worse) {
-    mean += change / n;
-    square += change * change / n;
+  if (of_training_too) {
+    const std::vector<double>& training_before = search_.simulate_training(current_);
+    const std::vector<double>& training_now = search_.simulate_training(h);
+    before.insert(before.end(), training_before.begin(), training_before.end());
+    now.insert(now.end(), training_now.begin(), training_now.end());
   }
-  return {worse.size(), mean, std::sqrt(std::max(square - mean * mean, 0.0))};
+  return simulation_change(before, now);
 }
 
 void StepwiseSelection::resolve_doubt() {

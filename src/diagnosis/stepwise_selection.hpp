@@ -45,6 +45,9 @@ class StepwiseSelection {
   /// No candidate from now on.
   void exclude(const std::vector<std::size_t>& effects) { withdrawn_.insert(effects.begin(), effects.end()); }
 
+  /// A number of the plant file that was not found to be off stays as it is from now on.
+  void hold(std::size_t number);
+
   /// Takes an effect out, for good, and before it what cannot be without it. What went.
   std::vector<std::size_t> withdraw(std::size_t effect);
 
@@ -112,7 +115,7 @@ class StepwiseSelection {
   void converge(Hypothesis& h);
   /// By how much `h` simulates held-out segments worse than `current_` does, and training segments if these
   /// count too: while more is missing, one and the other come out better or worse by half.
-  SimulationChange simulation_change(Hypothesis& h, bool of_training_too);
+  SimulationChange change_of_simulation(Hypothesis& h, bool of_training_too);
   /// What held-out runs spoke against while more was missing must have them on its side in the end, or all
   /// that was added since goes.
   void resolve_doubt();

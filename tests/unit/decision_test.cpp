@@ -167,6 +167,21 @@ TEST(Addition, MayBeMadeCertainByAllRuns) {
   EXPECT_EQ(rule_of(e), Rule::uncertain_size);
 }
 
+TEST(SimulationChange, IsTheMeanLogarithmOverTheSegments) {
+  const SimulationChange change = simulation_change({1.0, 2.0, 4.0, 8.0}, {2.0, 2.0, 8.0, 8.0});
+  EXPECT_EQ(change.segments, 4u);
+  EXPECT_NEAR(change.mean, std::log(2.0) / 2.0, 1e-12);
+  EXPECT_NEAR(change.scatter, std::log(2.0) / 2.0, 1e-12);
+  EXPECT_NEAR(change.standard_error(), std::log(2.0) / 4.0, 1e-12);
+  EXPECT_EQ(change.standard_error(3.0), 1.5);
+  EXPECT_EQ(simulation_change({}, {}).standard_error(3.0), 0.0) << "no data are held out";
+}
+
+TEST(SimulationChange, OfOneSegmentDoesNotOutweighTheOthers) {
+  const SimulationChange change = simulation_change({1.0, 1.0, 1.0, 1.0, 1.0}, {3.0, 0.8, 0.8, 0.8, 0.8});
+  EXPECT_LT(change.mean - change.standard_error(), 0.0);
+}
+
 TEST(Addition, MustSimulateAsWellAsSegmentsCanShow) {
   const auto rule = [](std::size_t segments, double scatter, double mean) {
     Evidence e = addition(500.0, 0.0, 5.0);

@@ -19,6 +19,7 @@ namespace upright {
 namespace {
 
 const std::size_t force = effect_number("constant_force");
+const std::size_t cart_mass = effect_number("cart_mass");
 
 Plant file_plant() {
   Plant plant;
@@ -29,8 +30,9 @@ Plant file_plant() {
 }
 
 /// One run of the rig of the file with a constant force beside it.
-Measurement run_with(double force_n, unsigned seed, double amplitude_v = 2.0) {
+Measurement run_with(double force_n, unsigned seed, double amplitude_v = 2.0, double load_kg = 0.0) {
   blind::Rig rig{.plant = file_plant()};
+  rig.plant.cart_mass_kg += load_kg;
   if (force_n != 0.0) rig.plant.set("constant_force", {force_n});
   blind::Plan plan;
   plan.rate_hz = 200.0;
@@ -56,7 +58,8 @@ class Fitted {
   }
   Reproduction reproduction() const { return reproduce(*search_, known_, {force}).front(); }
   bool is_contradicted() const { return upright::is_contradicted(reproduction(), policy_.reproducibility); }
-  Listing listing() { return list_effects(*search_, final_, {force}); }
+  Listing listing() { return list_effects(*search_, final_, {.effects = {force}, .corrections = {}}); }
+  double fitted_mass_scale() const { return final_.train.point.plant.find(cart_mass)->values[0]; }
 
  private:
   const SelectionPolicy policy_;
@@ -102,6 +105,17 @@ TEST(Listing, NamesAnEffectThatRaisesTheError) {
   const Listing listing = Fitted({run_with(0.4, 1), run_with(-0.4, 2)}).listing();
   EXPECT_EQ(listing.raises, force);
   for (const Listing::Row& row : listing.rows) EXPECT_LE(row.after, row.before);
+}
+
+TEST(Listing, NamesANumberOfThePlantFileThatIsBetterAsGiven) {
+  constexpr double load_kg = 0.2;
+  Fitted fitted({run_with(0.3, 1, 2.0, load_kg), run_with(0.3, 2)});
+  EXPECT_GT(fitted.fitted_mass_scale(), 1.1);
+  const Listing listing = fitted.listing();
+  EXPECT_EQ(listing.number_raises, cart_mass);
+  EXPECT_FALSE(listing.raises) << "the number goes back first";
+  EXPECT_FALSE(
+      Fitted({run_with(0.3, 1, 2.0, load_kg), run_with(0.3, 2, 2.0, load_kg)}).listing().number_raises);
 }
 
 TEST(Halves, TakeEverySecondSegmentOfOneRun) {
