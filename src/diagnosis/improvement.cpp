@@ -10,8 +10,6 @@ namespace upright {
 
 namespace {
 
-constexpr double infinity = std::numeric_limits<double>::infinity();
-
 /// Mean over its standard error.
 double t_of(const std::vector<double>& values) {
   if (values.size() < 2) return 0.0;
@@ -46,7 +44,8 @@ double tempered_objective(const Hypothesis& h, double dispersion) {
 
 Improvement compare(const Hypothesis& simpler, const Hypothesis& richer, double dispersion) {
   Improvement result;
-  if (!std::isfinite(richer.train.objective)) return {-infinity, -infinity, -infinity, -infinity};
+  constexpr double never = -std::numeric_limits<double>::infinity();
+  if (!std::isfinite(richer.train.objective)) return {never, never, never, never};
   std::vector<double> falls;
   const std::size_t blocks =
       std::min(simpler.train.block_objective.size(), richer.train.block_objective.size());
