@@ -1,4 +1,5 @@
 // How much better one hypothesis is than another.
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <numeric>
