@@ -260,8 +260,8 @@ class Diagnostician {
     return what_is_left();
   }
 
-  /// An effect that does not reproduce, or that takes held-out data further from the model, is not named: one
-  /// of these goes. False: there is none.
+  /// An effect is not named if it does not reproduce, or if held-out data are simulated better without it.
+  /// One of these goes, or a fitted number of the plant file. False: there is none.
   bool withdraw_next() {
     options_.report_progress(0.93, "comparing parts of the data");
     reproductions_ = reproduce(search_, fits_.known(), fits_.effects());

@@ -51,7 +51,8 @@ def aau_pendulum(data):
         return real_data.dataset(data / "aau" / "test1pend1.csv", {"time_s": 1, "theta_rad": 2}, header="false",
                                  cart_locked="true", **stretch)
 
-    # The angle of swing1 is positive toward -x. Column 12 is the current that was applied.
+    # The angle of swing1 is positive toward -x. Columns 2 and 5 are smoothed; 4 and 6 move in encoder steps. Column 12
+    # is the current that was applied.
     swing = real_data.dataset(data / "aau" / "swing1.csv",
                               {"time_s": 1, "voltage_v": 12, "cart_m": 6, "theta_rad": "{column: 4, scale: -1}"},
                               header="false")
