@@ -165,8 +165,11 @@ Decision decide_trust(const Evidence& e, const AcceptancePolicy& p) {
 SimulationChange simulation_change(const std::vector<double>& before, const std::vector<double>& now) {
   const auto n = static_cast<double>(now.size());
   double mean = 0.0, square = 0.0;
+  // Far beyond what noise and motion can be. A simulation that diverges has an infinite error.
+  constexpr double smallest = 1e-9, largest = 1e9;
   for (std::size_t s = 0; s < now.size(); ++s) {
-    const double change = std::log(std::max(now[s], 1e-9) / std::max(before[s], 1e-9));
+    const double change =
+        std::log(std::clamp(now[s], smallest, largest) / std::clamp(before[s], smallest, largest));
     mean += change / n;
     square += change * change / n;
   }

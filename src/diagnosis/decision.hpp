@@ -27,7 +27,7 @@ struct SimulationChange {
   double standard_error(double min_scatter = 0.0) const;
 };
 
-/// From the errors of the same segments before and now [any unit, one for both].
+/// From the errors of the same segments before and now [any unit, one for both]. They may be infinite.
 SimulationChange simulation_change(const std::vector<double>& before, const std::vector<double>& now);
 
 /// What is to be decided.

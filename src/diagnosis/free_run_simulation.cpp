@@ -2,6 +2,7 @@
 // fitted.
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "search.hpp"
 
@@ -20,6 +21,13 @@ std::vector<double> gaps_of_segments(const FitResult& simulated) {
 
 const FreeRunSimulation& Search::simulate(Hypothesis& h) const {
   if (h.simulation) return *h.simulation;
+  if (!std::isfinite(h.train.objective)) {
+    // What cannot be fitted cannot be simulated: it is further off than anything that can.
+    constexpr double infinite = std::numeric_limits<double>::infinity();
+    const std::size_t segments = held_.segments.empty() ? train_.segments.size() : held_.segments.size();
+    h.simulation.emplace(FreeRunSimulation{infinite, std::vector<double>(segments, infinite)});
+    return *h.simulation;
+  }
   Hypothesis plain = h;
   filter_held_out(plain, sensors_only(h.train.point.noise));
   const FitResult& simulated = held_.segments.empty() ? plain.train : plain.held;

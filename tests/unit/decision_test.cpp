@@ -175,6 +175,10 @@ TEST(SimulationChange, IsTheMeanLogarithmOverTheSegments) {
   EXPECT_NEAR(change.standard_error(), std::log(2.0) / 4.0, 1e-12);
   EXPECT_EQ(change.standard_error(3.0), 1.5);
   EXPECT_EQ(simulation_change({}, {}).standard_error(3.0), 0.0) << "no data are held out";
+  const double diverged = std::numeric_limits<double>::infinity();
+  EXPECT_EQ(simulation_change({diverged, diverged}, {diverged, diverged}).mean, 0.0);
+  EXPECT_LT(simulation_change({diverged, diverged}, {1.0, 2.0}).mean, -10.0);
+  EXPECT_GT(simulation_change({1.0, 2.0}, {diverged, diverged}).mean, 10.0);
 }
 
 TEST(SimulationChange, OfOneSegmentDoesNotOutweighTheOthers) {
