@@ -111,6 +111,7 @@ class CvodeEngine::Work {
     step_count_ = 0;
     budget_.restart(time_s);
     if (dynamics_.cart_locked()) state_.cart_mps = 0.0;
+    dynamics_.set_time(time_s);
     if (!dynamics_.has_motor_lag()) state_.motor_v = dynamics_.actuate(voltage_v);
     contacts_ = contacts_of(state_);
     settle();
@@ -172,13 +173,15 @@ class CvodeEngine::Work {
     note(*end);
   }
 
-  double indicator(const Watch& watch, double t, const PlantState<double>& s) const {
+  double indicator(const Watch& watch, double t, const PlantState<double>& s) {
+    dynamics_.set_time(t);
     if (watch.kind == EventKind::actuator_corner) return watch.sign * ((*volts_)(t, s) - watch.corner_v);
     return event_indicator(dynamics_, with_motor(t, s), contacts_, watch, options_);
   }
 
   static int rate(double t, N_Vector y, N_Vector ydot, void* self) {
-    const Work& work = *static_cast<const Work*>(self);
+    Work& work = *static_cast<Work*>(self);
+    work.dynamics_.set_time(t);
     const PlantState<double> s = unpack(N_VGetArrayPointer(y));
     const double drive = work.drive(t, s);
     PlantState<double> result = work.dynamics_.derivative(s, work.lag_ ? s.motor_v : drive, work.contacts_);
@@ -190,7 +193,7 @@ class CvodeEngine::Work {
   }
 
   static int roots(double t, N_Vector y, double* g, void* self) {
-    const Work& work = *static_cast<const Work*>(self);
+    Work& work = *static_cast<Work*>(self);
     const PlantState<double> s = unpack(N_VGetArrayPointer(y));
     for (std::size_t i = 0; i < work.watches_.count; ++i) g[i] = work.indicator(work.watches_.items[i], t, s);
     return 0;
@@ -236,6 +239,7 @@ class CvodeEngine::Work {
       }
       state_ = unpack(N_VGetArrayPointer(y_.at));
       time_s_ = to_s;
+      dynamics_.set_time(time_s_);
       set_motor_state();
       if (event) {
         enter(*event, held);

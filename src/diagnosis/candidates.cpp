@@ -67,6 +67,7 @@ DataRange range_of(const std::vector<Measurement>& runs, const Plant& plant, con
     range.cart_high_m = of.high;
   }
   for (const Measurement& run : runs) {
+    range.longest_run_s = std::max(range.longest_run_s, run.time_s.back() - run.time_s.front());
     range.theta_measured = range.theta_measured || run.has_theta();
     range.theta_resolution_rad = std::max(range.theta_resolution_rad, run.theta_resolution_rad);
     range.shortest_period_s = std::min(range.shortest_period_s, run.median_period_s());
@@ -118,6 +119,9 @@ std::vector<FreeParameter> free_parameters(std::size_t effect, const DataRange& 
     } else if (is_named(effect, "stribeck_friction") && name == "velocity_mps") {
       p.low = prior.min_stribeck_mps;
       p.high = std::max(prior.fastest_stribeck_mps, prior.max_stribeck_share * range.largest_speed_mps);
+    } else if (is_named(effect, "warming_friction") && name == "time_constant_s") {
+      p.low = prior.min_warming_share * range.longest_run_s;
+      p.high = prior.max_warming_share * range.longest_run_s;
     } else if (name == "pitch_m") {
       p.low = prior.min_pitch_m;
       p.high = longest_pitch_m(range, prior);
@@ -333,6 +337,11 @@ std::vector<std::vector<double>> search_starts(std::size_t effect, const DataRan
   if (is_named(effect, "bristle_friction")) return {{120.0, 20.0}, {2000.0, 20.0}};
   if (is_named(effect, "input_delay")) return {{0.5 * range.shortest_period_s}, {0.01}};
   if (is_named(effect, "motor_lag")) return {{std::max(0.001, 0.5 * range.shortest_period_s)}, {0.01}};
+  if (is_named(effect, "warming_friction")) {
+    const double force_n = 0.3 * order_of_magnitude(info.parameters[0], range, prior);
+    const double time_constant_s = 0.3 * range.longest_run_s;
+    return {{force_n, time_constant_s}, {-force_n, time_constant_s}};
+  }
   if (info.enters == Enters::sensor) return {{info.parameters[0].neutral}};
   std::vector<double> start;
   for (const ParameterInfo& parameter : info.parameters)

@@ -329,6 +329,11 @@ struct PriorPolicy {
   double min_lag_periods = 0.2;
   /// [s] The longest lag of the motor. Chosen.
   double max_lag_s = 0.5;
+  /// [1] The shortest time constant of friction that warms up, as a share of the longest run. A shorter one
+  /// is the start of the motion. Chosen.
+  double min_warming_share = 0.05;
+  /// [1] The longest. Beyond it the friction changes evenly during the whole run. Chosen.
+  double max_warming_share = 2.0;
   /// [1] The smallest scale. If a smaller one is needed, something else is missing: a strong backlash had
   /// been explained by 0.3 times the mass.
   double min_scale = 0.3;

@@ -175,7 +175,7 @@ class SegmentLineariser {
 
   static PlantModel<Jet> model_of(const Measurement& run, const Plant& plant,
                                   const std::vector<FreeParameter>& free) {
-    PlantModel<Jet> model = make_model<Jet>(plant, run.cart_locked);
+    PlantModel<Jet> model = make_model_of_run<Jet>(plant, run);
     for (std::size_t j = 0; j < free.size(); ++j)
       model.parameters[effect_parameter_offset(free[j].effect) + free[j].index]
           .v[state_count + static_cast<int>(j)] = 1.0;

@@ -37,6 +37,14 @@ S lagged_voltage(const Dynamics<S>& dynamics, const VoltageCommands& commands, s
   return lagged;
 }
 
+/// The plant of a run that began with its first sample.
+template <class S>
+PlantModel<S> make_model_of_run(const Plant& plant, const Measurement& run) {
+  PlantModel<S> model = make_model<S>(plant, run.cart_locked);
+  model.start_s = run.time_s.front();
+  return model;
+}
+
 /// Brings a simulator to the start of a segment with the commands that can still be acting there. Before the
 /// record the motor had no voltage.
 template <class S>

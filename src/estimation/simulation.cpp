@@ -26,7 +26,7 @@ class PieceSimulation {
       : run_(run),
         piece_(piece),
         result_(result),
-        simulator_(make_model<double>(plant, run.cart_locked), {}, max_commands) {
+        simulator_(make_model_of_run<double>(plant, run), {}, max_commands) {
     start_segment(simulator_, run, piece, start);
   }
 

@@ -94,10 +94,6 @@ void hide_unknown(const std::string& kind, Size size, const Scales& scales, Rig&
   if (kind == "backlash") {
     rig.unknown = Unknown::backlash;
     rig.backlash_m = pick(size, 0.002, 0.006, 0.02) * scales.travel_m;
-  } else if (kind == "warming_friction") {
-    rig.unknown = Unknown::warming_friction;
-    rig.warming_force_n = 1.5 * force_n;
-    rig.warming_time_s = between(random, 2.0, 6.0);
   } else if (kind == "gusts") {
     rig.unknown = Unknown::gusts;
     rig.gust_force_n = 2.0 * force_n;
@@ -138,11 +134,10 @@ std::string_view name_of(Condition condition) {
 }
 
 std::vector<std::string> unknown_kinds(Condition condition) {
-  if (condition != Condition::laboratory) return {"backlash", "warming_friction", "gusts"};
+  if (condition != Condition::laboratory) return {"backlash", "gusts"};
   std::vector<std::string> kinds;
-  for (const Unknown unknown :
-       {Unknown::backlash, Unknown::warming_friction, Unknown::gusts, Unknown::torque_ripple,
-        Unknown::rough_track, Unknown::velocity_ripple, Unknown::force_drift}) {
+  for (const Unknown unknown : {Unknown::backlash, Unknown::gusts, Unknown::torque_ripple,
+                                Unknown::rough_track, Unknown::velocity_ripple, Unknown::force_drift}) {
     const std::string kind(name_of(unknown));
     if (effect_number(kind) == effect_count) kinds.push_back(kind);
   }

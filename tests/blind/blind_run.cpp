@@ -138,8 +138,6 @@ std::string_view name_of(Unknown unknown) {
       return "none";
     case Unknown::backlash:
       return "backlash";
-    case Unknown::warming_friction:
-      return "warming_friction";
     case Unknown::gusts:
       return "gusts";
     case Unknown::torque_ripple:

@@ -1,6 +1,6 @@
 // One run of a rig that is not the model's: the CVODE reference engine with true events follows the true
 // plant, sensors are quantised or noisy, reading times jitter, unmodelled forces and torques may act, and
-// what no effect of the registry says (backlash, friction that warms up, gusts, ...) may be there.
+// what no effect of the registry says (backlash, gusts, ...) may be there.
 #pragma once
 
 #include <array>
@@ -18,7 +18,6 @@ namespace upright::blind {
 enum class Unknown {
   none,
   backlash,
-  warming_friction,
   gusts,
   torque_ripple,    ///< the motor's force per volt ripples along the track
   rough_track,      ///< a random force that belongs to the place
@@ -40,10 +39,8 @@ struct ColouredDisturbance {
 struct Rig {
   Plant plant;
   Unknown unknown = Unknown::none;
-  double backlash_m = 0.0;       ///< play between cart and encoder
-  double warming_force_n = 0.0;  ///< Coulomb friction above its final level when a run starts
-  double warming_time_s = 5.0;   ///< time constant with which it goes
-  double gust_force_n = 0.0;     ///< typical peak
+  double backlash_m = 0.0;    ///< play between cart and encoder
+  double gust_force_n = 0.0;  ///< typical peak
   /// torque_ripple: share of the motor's force; rough_track: standard deviation [N]; velocity_ripple and
   /// force_drift: amplitude [N].
   double unknown_size = 0.0;

@@ -79,7 +79,6 @@ double ExtraForces::cart_force_n(double time_s, const PlantState<double>& state,
       return force + size * (2.0 * time_s / duration_s_ - 1.0);
     case Unknown::none:
     case Unknown::backlash:
-    case Unknown::warming_friction:
     case Unknown::gusts:
       break;
   }
@@ -94,8 +93,6 @@ Plant ExtraForces::plant_at(double time_s, const PlantState<double>& state, doub
   Plant plant = rig_.plant;
   const double force = cart_force_n(time_s, state, motor_n);
   if (force != 0.0) add_force(plant, "constant_force", force);
-  if (warms())
-    add_force(plant, "coulomb_friction", rig_.warming_force_n * std::exp(-time_s / rig_.warming_time_s));
   return plant;
 }
 

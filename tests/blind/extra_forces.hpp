@@ -29,7 +29,6 @@ class ExtraForces {
   Plant plant_at(double time_s, const PlantState<double>& state, double motor_n) const;
 
  private:
-  bool warms() const { return rig_.unknown == Unknown::warming_friction; }
   void add_white_bandwidth(std::mt19937_64& random);
   void add_coloured(std::uint64_t seed);
   void add_gusts(std::mt19937_64& random);

@@ -41,6 +41,7 @@ std::vector<Subject> subjects() {
   add("asymmetric_dry", exponential, E{"friction_asymmetry", {0.15}}, E{"position_dependent_friction", {0.5}},
       E{"constant_force", {0.1}});
   add("track", exponential, E{"cogging_force", {0.3, 0.01, 0.2}}, E{"cable_spring", {2.0, 0.01}});
+  add("warming", exponential, E{"warming_friction", {0.3, 1.5}}, E{"viscous_asymmetry", {0.5}});
   add("pivot", exponential, E{"pivot_coulomb_friction", {0.003}}, E{"pivot_viscous_friction", {0.001}});
   add("sensors", exponential, E{"angle_scale", {1.02}}, E{"cart_scale", {0.98}}, E{"angle_offset", {0.002}});
   add("drive", exponential, E{"drive_compliance", {2e-4}}, E{"motor_lag", {0.004}});

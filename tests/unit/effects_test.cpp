@@ -81,6 +81,21 @@ const std::map<std::string, std::function<void()>>& answers() {
          EXPECT_DOUBLE_EQ(p.cart_dry_level(0.2, 0.1, -1.0), 0.5);
          EXPECT_EQ(p.cart_dry_level(-1.0, 0.1, 1.0), 0.0);
        }},
+      {"warming_friction",
+       [] {
+         Plant plant = paper_plant();
+         plant.set("coulomb_friction", {0.4});
+         plant.set("warming_friction", {0.3, 2.0});
+         PlantModel<double> model = make_model<double>(plant);
+         model.start_s = 10.0;
+         Physics p(model);
+         EXPECT_TRUE(p.changes_with_time());
+         EXPECT_DOUBLE_EQ(p.cart_dry_level(0.0, 0.1, 1.0), 0.4);
+         p.set_time(10.0);
+         EXPECT_DOUBLE_EQ(p.cart_dry_level(0.0, 0.1, -1.0), 0.7);
+         p.set_time(12.0);
+         EXPECT_NEAR(p.cart_dry_level(0.0, 0.0, 1.0), 0.4 + 0.3 * std::exp(-1.0), 1e-15);
+       }},
       {"bristle_friction",
        [] {
          Plant plant = paper_plant();
@@ -219,7 +234,7 @@ INSTANTIATE_TEST_SUITE_P(All, Effect, testing::Range(std::size_t{0}, effect_coun
 });
 
 TEST(Registry, IsWhole) {
-  EXPECT_EQ(effect_count, 29u);
+  EXPECT_EQ(effect_count, 30u);
   std::set<std::string_view> kinds;
   std::size_t offset = 0;
   for (std::size_t i = 0; i < effect_count; ++i) {

@@ -171,6 +171,50 @@ TYPED_TEST(KnownAnswers, HoldsBelowBreakawayForEverAndMovesAboveIt) {
   EXPECT_GT(e.state().cart_m, 0.1 + 1e-5);
 }
 
+// m v' = kV - b v - Fc - F exp(-t/T) from rest.
+TYPED_TEST(KnownAnswers, FrictionThatWarmsUpAsItsClosedForm) {
+  Plant plant = paper_plant();
+  plant.pendulum.reset();
+  constexpr double fc_n = 0.4, extra_n = 0.3, constant_s = 2.0, start_s = 5.0, volts = 2.0;
+  plant.set("coulomb_friction", {fc_n});
+  plant.set("warming_friction", {extra_n, constant_s});
+  PlantModel<double> model = make_model<double>(plant);
+  model.start_s = start_s;
+  TypeParam e(model, EngineOptions{});
+  e.start({}, start_s);
+  const double back_emf = plant.motor.back_emf_n_per_mps, mass_kg = plant.cart_mass_kg;
+  const double rate = back_emf / mass_kg;
+  for (int k = 1; k <= 300; ++k) {
+    e.advance(0.01, volts);
+    const double t = 0.01 * k, fades = std::exp(-rate * t);
+    const double steady = (plant.motor.force_per_volt_n * volts - fc_n) / back_emf * (1.0 - fades);
+    const double warms = extra_n / mass_kg / (rate - 1.0 / constant_s) * (std::exp(-t / constant_s) - fades);
+    ASSERT_NEAR(e.state().cart_mps, steady - warms, 2e-7) << t;
+  }
+}
+
+TYPED_TEST(KnownAnswers, FrictionThatWarmsUpLetsGoAtItsTime) {
+  Plant plant = paper_plant();
+  plant.pendulum.reset();
+  plant.set("coulomb_friction", {0.4});
+  plant.set("warming_friction", {0.3, 2.0});
+  const double volts = 0.5 / plant.motor.force_per_volt_n, lets_go_s = 2.0 * std::log(0.3 / 0.1);
+  for (const double piece_s : {0.001, 3.0}) {
+    auto e = this->engine(plant);
+    e.start({0.1});
+    double moved_s = 0.0;
+    while (e.time_s() < 3.0) {
+      e.advance(piece_s, volts);
+      if (moved_s == 0.0 && e.state().cart_mps > 0.0) moved_s = e.time_s();
+    }
+    EXPECT_GT(e.state().cart_m, 0.1);
+    if (piece_s < 0.01) EXPECT_NEAR(moved_s, lets_go_s, 2.0 * piece_s);
+    // The cart creeps away: the force grows from nothing.
+    ASSERT_GT(e.event_count(), 0u);
+    EXPECT_NEAR(e.event(0).time_s, lets_go_s, 2e-3);
+  }
+}
+
 // The stick that must hold: motor and pendulum's reaction are balanced together, so that the voltage that
 // moves a cart under a leaning pendulum is not the one that moves the cart alone.
 TYPED_TEST(KnownAnswers, StickBalancesMotorAndPendulumTogether) {

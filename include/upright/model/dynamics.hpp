@@ -8,46 +8,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdint>
 
 #include "upright/model/elementary.hpp"
 #include "upright/model/plant_model.hpp"
+#include "upright/model/plant_state.hpp"
 #include "upright/model/scalar.hpp"
 
 namespace upright {
-
-/// State of the plant. `motor_v` is used with motor_lag only, `bristle_m` with bristle_friction only.
-template <class S>
-struct PlantState {
-  S cart_m{};       ///< position of the cart [m]
-  S theta_rad{};    ///< angle of the pendulum [rad], 0 upright
-  S cart_mps{};     ///< velocity of the cart [m/s]
-  S theta_radps{};  ///< rate of the pendulum [rad/s]
-  S motor_v{};      ///< motor voltage after the motor lag [V]
-  S bristle_m{};    ///< deflection of the bristles [m]
-};
-
-/// Mode of a contact with dry friction: sticking, or sliding in one direction.
-enum class Contact : std::int8_t { slip_backward = -1, stick = 0, slip_forward = 1 };
-
-/// The modes of both dry contacts.
-struct Contacts {
-  Contact cart = Contact::slip_forward;   ///< between cart and track
-  Contact pivot = Contact::slip_forward;  ///< in the pivot
-};
-
-/// A number that many others are divided by. A scalar may have a faster way than the division.
-template <class S>
-class Divisor {
- public:
-  /// Divides by this number.
-  explicit Divisor(const S& value) : value_(value) {}
-  /// The quotient.
-  friend S operator/(const S& dividend, const Divisor& by) { return dividend / by.value_; }
-
- private:
-  S value_;
-};
 
 /// The physics of one plant. `Present` is the set of its effects: EffectSet, or a StaticEffectSet for
 /// engines that are compiled for it. Constants of a run are computed once, in the constructor.
@@ -77,6 +44,7 @@ class Dynamics {
       if (!present_.template has<I>()) return;
       if constexpr (has_bristles<E, S>) bristles_ = true;
       if constexpr (has_cart_level<E, S>) cart_dry_ = cart_dry_ || acts_as_cart_level<E>(p<I>());
+      if constexpr (has_level_of_time<E>) cart_dry_ = changes_with_time_ = true;
       if constexpr (has_pivot_level<E, S>) pivot_dry_ = model.has_pendulum;
       if constexpr (requires { E::kink_at_cart_rest; }) cart_kink_ = true;
       if constexpr (requires { E::kink_at_pivot_rest; }) pivot_kink_ = model.has_pendulum;
@@ -101,6 +69,20 @@ class Dynamics {
   bool has_bristle_state() const { return bristles_; }       ///< whether `bristle_m` is a state
   bool has_pendulum() const { return model_.has_pendulum; }  ///< false: the cart is alone
   bool cart_locked() const { return model_.cart_locked; }    ///< true: only the pendulum moves
+
+  bool changes_with_time() const { return changes_with_time_; }  ///< whether `set_time` has an effect
+
+  /// Sets the time, for friction that changes during a run. Until then it has its usual level.
+  void set_time(double time_s) {
+    if (!changes_with_time_) return;
+    level_of_time_ = S(0.0);
+    const double since_start_s = std::max(time_s - model_.start_s, 0.0);
+    for_each_effect([&]<std::size_t I>() {
+      if constexpr (has_level_of_time<EffectAt<I>>)
+        if (present_.template has<I>())
+          level_of_time_ = level_of_time_ + EffectAt<I>::cart_dry_level_after(p<I>(), since_start_s);
+    });
+  }
 
   /// Voltage after dead zone, gain, offset and saturation; engines treat delay and lag.
   S actuate(S volts) const {
@@ -456,6 +438,8 @@ class Dynamics {
       using E = EffectAt<I>;
       if constexpr (may_have<I>() && has_cart_level<E, S>)
         if (present_.template has<I>()) level = level + E::cart_dry_level(p<I>(), x, speed, direction);
+      if constexpr (may_have<I>() && has_level_of_time<E>)
+        if (present_.template has<I>()) level = level + T(level_of_time_);
     });
     return positive_part(level);
   }
@@ -496,6 +480,10 @@ class Dynamics {
   template <class E, class T>
   static constexpr bool has_cart_level = requires(const T* q, const T& x) {
     E::cart_dry_level(q, x, x, x);
+  };
+  template <class E>
+  static constexpr bool has_level_of_time = requires(const S* q) {
+    E::cart_dry_level_after(q, 0.0);
   };
   template <class E>
   static bool acts_as_cart_level(const S* own) {
@@ -593,8 +581,9 @@ class Dynamics {
   Present present_;
   S total_mass_, coupling_, gravity_torque_;
   Divisor<S> inertia_{S(1.0)}, mass_{S(1.0)};  ///< about the pivot, and of both bodies
+  S level_of_time_{0.0};                       ///< of the cart's dry friction at the time that was set
   bool bristles_ = false, cart_dry_ = false, pivot_dry_ = false, cart_kink_ = false, pivot_kink_ = false,
-       lag_ = false;
+       lag_ = false, changes_with_time_ = false;
 };
 
 }  // namespace upright

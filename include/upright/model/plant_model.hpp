@@ -19,6 +19,7 @@ struct PlantModel {
   /// 0: dry friction is a contact with events. Above 0: sgn(v) becomes tanh(smoothing v), without
   /// sticking (for linear design).
   double smoothing = 0.0;
+  double start_s = 0.0;  ///< the time at which the run began, for what changes during it [s]
 
   /// The parameters of effect I.
   template <std::size_t I>
@@ -75,6 +76,7 @@ PlantModel<double> values_of(const PlantModel<S>& model) {
   plain.cart_locked = model.cart_locked;
   plain.present = model.present;
   plain.smoothing = model.smoothing;
+  plain.start_s = model.start_s;
   for (std::size_t i = 0; i < all_parameter_count; ++i) plain.parameters[i] = value_of(model.parameters[i]);
   return plain;
 }

@@ -59,4 +59,17 @@ S sign_of(const S& x) {
   return select(x > S(0.0), S(1.0), select(x < S(0.0), S(-1.0), S(0.0)));
 }
 
+/// A number that many others are divided by. A scalar may have a faster way than the division.
+template <class S>
+class Divisor {
+ public:
+  /// Divides by this number.
+  explicit Divisor(const S& value) : value_(value) {}
+  /// The quotient.
+  friend S operator/(const S& dividend, const Divisor& by) { return dividend / by.value_; }
+
+ private:
+  S value_;
+};
+
 }  // namespace upright

@@ -19,13 +19,6 @@
 
 namespace upright {
 
-/// A voltage that is held for a time.
-template <class S>
-struct HeldVoltage {
-  S duration_s{};          ///< how long [s]
-  double voltage_v = 0.0;  ///< after the input delay [V]
-};
-
 /// Integrates a plant over intervals of constant voltage, or under a varying voltage. Allocates nothing
 /// after construction.
 template <class S>
@@ -47,6 +40,7 @@ class EventEngine {
     step_count_ = 0;
     budget_.restart(time_s);
     if (dynamics_.cart_locked()) state_.cart_mps = S(0.0);
+    set_time(time_s);
     hold(voltage_v);
     contacts_ = contacts_of(plain_state(state_));
     settle();
@@ -64,6 +58,7 @@ class EventEngine {
       const bool held = budget_.spent(time_s_);
       BeginRate<double> plain_begin = update_bristle_step_limit(value_of(state_.motor_v));
       const S step = next_step(remaining);
+      set_time(time_s_ + 0.5 * value_of(step));
       const bool quick = linearises_in_middle();
       BeginRate<S> begin;
       if constexpr (std::is_same_v<S, double>) begin = plain_begin;
@@ -107,6 +102,7 @@ class EventEngine {
     if (spanned < 2) return 0;
     const PlantState<S> begin = state_;
     const S drive_before = drive_;
+    set_time(time_s_ + 0.5 * value_of(duration_s));
     S impulse_vs(0.0), moment_vs2(0.0), left_s(value_of(duration_s));  // of a step of this length
     for (std::size_t i = 0; i < spanned; ++i) {
       const S& h = held[i].duration_s;
@@ -161,6 +157,7 @@ class EventEngine {
       double rate = motion_rate();
       if (lag) rate += 1.0 / dynamics_.motor_time_constant_s();
       const double step = even_step(end_s - time_s_, std::min(rate_step(rate), max_step_s));
+      set_time(time_s_ + 0.5 * step);
       const auto along = [&](double t) { return driven_rk4(command, lag, t).end; };
       const DrivenStep driven = driven_rk4(command, lag, step);
       auto found = first_event(driven.end, driven.first, step, held, along);
@@ -251,6 +248,12 @@ class EventEngine {
   template <class T>
   using BeginRate = std::optional<PlantState<T>>;
 
+  /// What changes during a run stays the same within a step: it has the value of the middle.
+  void set_time(double time_s) {
+    dynamics_.set_time(time_s);
+    plain_.set_time(time_s);
+  }
+
   void hold(const S& voltage_v) {
     drive_ = dynamics_.actuate(voltage_v);
     if (!dynamics_.has_motor_lag()) state_.motor_v = drive_;
@@ -307,11 +310,6 @@ class EventEngine {
 
   double rate_step(double rate) const {
     return std::clamp(options_.step_fraction / rate, options_.min_step_s, options_.max_step_s);
-  }
-
-  static S even_step(const S& remaining, double limit) {
-    const double pieces = std::ceil(value_of(remaining) / limit - 1e-9);
-    return pieces <= 1.0 ? remaining : S(remaining / S(pieces));
   }
 
   S next_step(const S& remaining) const { return even_step(remaining, rate_step(with_lag(motion_rate()))); }

@@ -18,6 +18,13 @@ PlantState<double> plain_state(const PlantState<S>& s) {
           value_of(s.theta_radps), value_of(s.motor_v),   value_of(s.bristle_m)};
 }
 
+/// A voltage that is held for a time.
+template <class S>
+struct HeldVoltage {
+  S duration_s{};          ///< how long [s]
+  double voltage_v = 0.0;  ///< after the input delay [V]
+};
+
 /// The motor's voltage over a step, with the derivatives at this length.
 template <class S>
 struct StepVoltage {

@@ -184,4 +184,12 @@ PlantState<S> runge_kutta_4(const Rate& rate, const PlantState<S>& s, const Plan
   return end;
 }
 
+/// The length of the first of the fewest equal steps over this time that are no longer than `limit_s`.
+template <class S>
+S even_step(const S& remaining_s, double limit_s) {
+  constexpr double slack = 1e-9;  // sums of times are rounded
+  const double pieces = std::ceil(value_of(remaining_s) / limit_s - slack);
+  return pieces <= 1.0 ? remaining_s : S(remaining_s / S(pieces));
+}
+
 }  // namespace upright

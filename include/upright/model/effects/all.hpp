@@ -32,6 +32,7 @@
 #include "upright/model/effects/voltage_gain.hpp"
 #include "upright/model/effects/voltage_offset.hpp"
 #include "upright/model/effects/voltage_saturation.hpp"
+#include "upright/model/effects/warming_friction.hpp"
 
 namespace upright {
 
@@ -44,6 +45,7 @@ using AllEffects =
                effects::ViscousAsymmetry,
                effects::StribeckFriction,
                effects::PositionDependentFriction,
+               effects::WarmingFriction,
                effects::BristleFriction,
                effects::QuadraticDrag,
                effects::ConstantForce,
