@@ -44,7 +44,7 @@ double breakaway_v(const Dynamics<double>& dynamics, double cart_m, double direc
   const auto moves = [&](double volts) {
     const double motor_v = dynamics.actuate(direction * volts);
     return direction * dynamics.cart_smooth_force(state, motor_v) >
-           dynamics.cart_dry_level(cart_m, 0.0, direction);
+           dynamics.cart_dry_level(cart_m, 0.0, direction) + dynamics.cart_dry_level_of_load(state, motor_v);
   };
   if (moves(0.0)) return 0.0;
   double low = 0.0, high = limit_v;
@@ -55,9 +55,10 @@ double breakaway_v(const Dynamics<double>& dynamics, double cart_m, double direc
   return high;
 }
 
-Bounds breakaway_over_track(const Dynamics<double>& dynamics, double track_limit_m, double limit_v) {
+/// Widens the bounds to what the plant needs anywhere on the track.
+void include_breakaway(const Dynamics<double>& dynamics, double track_limit_m, double limit_v,
+                       Bounds& bounds) {
   constexpr int places = 400;  // cogging repeats every few millimetres
-  Bounds bounds{limit_v, 0.0};
   for (int i = 0; i <= places; ++i)
     for (const double direction : {-1.0, 1.0}) {
       const double volts =
@@ -65,7 +66,6 @@ Bounds breakaway_over_track(const Dynamics<double>& dynamics, double track_limit
       bounds.low = std::min(bounds.low, volts);
       bounds.high = std::max(bounds.high, volts);
     }
-  return bounds;
 }
 
 }  // namespace
@@ -73,17 +73,26 @@ Bounds breakaway_over_track(const Dynamics<double>& dynamics, double track_limit
 EncoderAssumptions encoder_assumptions(const Plant& plant, double track_limit_m, double amplifier_limit_v,
                                        double uncertainty) {
   const double more = 1.0 + uncertainty, less = 1.0 / more;
-  const Dynamics<double> dynamics(make_model<double>(plant));
+  Dynamics<double> dynamics(make_model<double>(plant));
   const BaseParameters<double> base = make_model<double>(plant).corrected();
   EncoderAssumptions a;
   a.unseen_travel_m = track_limit_m / track_limits_of_unseen_travel;
-  const Bounds breakaway = breakaway_over_track(dynamics, track_limit_m, amplifier_limit_v);
+  Bounds breakaway{amplifier_limit_v, 0.0};
+  include_breakaway(dynamics, track_limit_m, amplifier_limit_v, breakaway);
+  if (dynamics.changes_with_time()) {
+    dynamics.set_time(0.0);  // the cold rig
+    include_breakaway(dynamics, track_limit_m, amplifier_limit_v, breakaway);
+  }
   a.breakaway_v = {breakaway.low * less, breakaway.high * more};
   const double lag_s = dynamics.input_delay_s() + dynamics.motor_time_constant_s();
   a.largest_lag_s = lag_s * more + unnamed_lag_s;
 
   const PlantState<double> rest{};
-  const auto force = [&](double volts) { return dynamics.cart_smooth_force(rest, dynamics.actuate(volts)); };
+  const auto force = [&](double volts) {
+    const double motor_v = dynamics.actuate(volts);
+    return dynamics.cart_smooth_force(rest, motor_v) -
+           std::copysign(dynamics.cart_dry_level_of_load(rest, motor_v), volts);
+  };
   const double force_per_volt_n =
       (force(amplifier_limit_v) - force(-amplifier_limit_v)) / (2.0 * amplifier_limit_v);
   double mass_kg = base.cart_mass_kg;

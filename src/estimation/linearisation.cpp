@@ -54,9 +54,10 @@ void correct_state(EventEngine<S>& engine, const double (&correction)[state_coun
 
 /// At which a cart at rest begins to slide, in the direction in which it does so sooner.
 template <class S>
-double min_dry_level(const Dynamics<S>& dynamics, const S& cart_m) {
-  return std::min(value_of(dynamics.cart_dry_level(cart_m, S(0.0), S(1.0))),
-                  value_of(dynamics.cart_dry_level(cart_m, S(0.0), S(-1.0))));
+double min_dry_level(const Dynamics<S>& dynamics, const PlantState<S>& at_rest) {
+  return std::min(value_of(dynamics.cart_dry_level(at_rest.cart_m, S(0.0), S(1.0))),
+                  value_of(dynamics.cart_dry_level(at_rest.cart_m, S(0.0), S(-1.0)))) +
+         value_of(dynamics.cart_dry_level_of_load(at_rest, at_rest.motor_v));
 }
 
 /// What the cart's sensor shows of a unit of its speed: through back-EMF a drive that gives way is set back.
@@ -263,7 +264,7 @@ class SegmentLineariser {
     const EventEngine<Jet>& engine = simulator_.engine();
     step.holds[0] = step.holds[1] = 0.0;
     if (!run_.cart_locked && !dynamics().has_bristle_state() && engine.cart_at_rest())
-      step.holds[0] = min_dry_level(dynamics(), engine.state().cart_m);
+      step.holds[0] = min_dry_level(dynamics(), engine.state());
     if (dynamics().has_pendulum() && engine.pivot_at_rest())
       step.holds[1] = value_of(dynamics().pivot_dry_level());
   }

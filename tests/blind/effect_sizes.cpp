@@ -41,6 +41,7 @@ const std::vector<std::string>& hidden_kinds() {
                                                  "stribeck_friction",
                                                  "position_dependent_friction",
                                                  "warming_friction",
+                                                 "load_dependent_friction",
                                                  "bristle_friction",
                                                  "quadratic_drag",
                                                  "constant_force",
@@ -116,6 +117,7 @@ std::vector<double> values_for(const std::string& kind, Size size, const Plant& 
     return {stiffness, std::sqrt(stiffness * plant.cart_mass_kg)};
   }
   if (kind == "warming_friction") return {1.5 * force, between(random, 2.0, 6.0)};
+  if (kind == "load_dependent_friction") return {share};
   if (kind == "quadratic_drag") return {force / (s.speed_mps * s.speed_mps)};
   if (kind == "cable_spring")
     return {force / (0.3 * s.travel_m), s.center_m + between(random, -0.3, 0.3) * s.travel_m};

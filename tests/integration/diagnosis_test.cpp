@@ -285,6 +285,8 @@ INSTANTIATE_TEST_SUITE_P(Cases, BlindEffect,
                                          BlindCase{{"viscous_asymmetry"}, Size::typical, false, 207},
                                          BlindCase{{"pendulum_length"}, Size::strong, false, 208},
                                          BlindCase{{"quadratic_drag"}, Size::strong, true, 209},
+                                         BlindCase{{"warming_friction"}, Size::strong, true, 232},
+                                         BlindCase{{"load_dependent_friction"}, Size::typical, true, 233},
                                          // Few moments of the training run show it, the held-out ones do.
                                          BlindCase{
                                              {"position_dependent_friction"}, Size::weak, true, 262000854},
@@ -305,7 +307,7 @@ INSTANTIATE_TEST_SUITE_P(Cases, BlindNothing,
                          name_of_case);
 INSTANTIATE_TEST_SUITE_P(Cases, BlindUnknown,
                          testing::Values(BlindCase{{"gusts"}, Size::strong, false, 231},
-                                         BlindCase{{"warming_friction"}, Size::strong, true, 232}),
+                                         BlindCase{{"backlash"}, Size::strong, true, 234}),
                          name_of_case);
 
 TEST(Diagnosis, RefusesRunsThatTheModelCannotShow) {

@@ -19,6 +19,7 @@ struct Subject {
   const char* name;
   bool whole;  ///< regular for the whole run
   Plant plant;
+  double tolerance = 1e-6;  ///< relative to the extent of the motion
 };
 
 std::vector<Subject> subjects() {
@@ -42,6 +43,9 @@ std::vector<Subject> subjects() {
       E{"constant_force", {0.1}});
   add("track", exponential, E{"cogging_force", {0.3, 0.01, 0.2}}, E{"cable_spring", {2.0, 0.01}});
   add("warming", exponential, E{"warming_friction", {0.3, 1.5}}, E{"viscous_asymmetry", {0.5}});
+  add("loaded", exponential, E{"load_dependent_friction", {0.1}}, E{"motor_lag", {0.004}});
+  // Steps of fixed length cross the kink where the motor's force changes direction: up to 3.7e-6.
+  all.back().tolerance = 1e-5;
   add("pivot", exponential, E{"pivot_coulomb_friction", {0.003}}, E{"pivot_viscous_friction", {0.001}});
   add("sensors", exponential, E{"angle_scale", {1.02}}, E{"cart_scale", {0.98}}, E{"angle_offset", {0.002}});
   add("drive", exponential, E{"drive_compliance", {2e-4}}, E{"motor_lag", {0.004}});
@@ -79,7 +83,7 @@ TEST_P(Agreement, OnTrajectoryAndEvents) {
   double worst = 0.0;
   for (std::size_t i = 0; i < regular; ++i)
     worst = std::max(worst, extent.distance(fast.states[i], reference.states[i]));
-  EXPECT_LT(worst, 1e-6);
+  EXPECT_LT(worst, subject.tolerance);
   RecordProperty("worst_relative_difference", std::to_string(worst * 1e9) + "e-9");
   for (std::size_t i = 0; i < std::min(fast.events.size(), reference.events.size()); ++i) {
     if (fast.events[i].time_s > static_cast<double>(regular) * record_period_s) return;

@@ -96,6 +96,22 @@ const std::map<std::string, std::function<void()>>& answers() {
          p.set_time(12.0);
          EXPECT_NEAR(p.cart_dry_level(0.0, 0.0, 1.0), 0.4 + 0.3 * std::exp(-1.0), 1e-15);
        }},
+      {"load_dependent_friction",
+       [] {
+         Plant plant = paper_plant();
+         plant.set("coulomb_friction", {0.4});
+         plant.set("load_dependent_friction", {0.1});
+         plant.pendulum.reset();
+         const Physics p(make_model<double>(plant));
+         PlantState<double> s;
+         s.cart_mps = 0.2;
+         const double motor_n = 1.7189 * 3.0 - 7.682 * 0.2;
+         EXPECT_NEAR(p.cart_dry_level_of_load(s, 3.0), 0.1 * motor_n, 1e-15);
+         EXPECT_NEAR(p.derivative(s, 3.0, {}).cart_mps, (motor_n - 0.4 - 0.1 * motor_n) / 0.815, 1e-12);
+         // While the motor brakes, friction adds to its force.
+         const double braking_n = -1.7189 - 7.682 * 0.2;
+         EXPECT_NEAR(p.derivative(s, -1.0, {}).cart_mps, (1.1 * braking_n - 0.4) / 0.815, 1e-12);
+       }},
       {"bristle_friction",
        [] {
          Plant plant = paper_plant();
@@ -234,7 +250,7 @@ INSTANTIATE_TEST_SUITE_P(All, Effect, testing::Range(std::size_t{0}, effect_coun
 });
 
 TEST(Registry, IsWhole) {
-  EXPECT_EQ(effect_count, 30u);
+  EXPECT_EQ(effect_count, 31u);
   std::set<std::string_view> kinds;
   std::size_t offset = 0;
   for (std::size_t i = 0; i < effect_count; ++i) {

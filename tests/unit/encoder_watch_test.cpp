@@ -105,6 +105,19 @@ TEST(EncoderWatch, AssumesOfAPlantWhatItsEffectsImply) {
   EXPECT_GE(a.largest_lag_s, 1.5 * 0.010);
 }
 
+TEST(EncoderWatch, AssumesFrictionThatIsLargerWhenColdOrUnderLoad) {
+  Plant plant;
+  plant.cart_mass_kg = 0.8;
+  plant.motor = {2.0, 8.0};
+  plant.set("coulomb_friction", {1.0});
+  plant.set("warming_friction", {0.6, 20.0});
+  plant.set("load_dependent_friction", {0.2});
+  const EncoderAssumptions a = encoder_assumptions(plant, 0.4, 15.0, 0.5);
+  EXPECT_NEAR(a.breakaway_v.low, 1.0 / (2.0 * 0.8) / 1.5, 1e-9);
+  EXPECT_NEAR(a.breakaway_v.high, 1.6 / (2.0 * 0.8) * 1.5, 1e-9);
+  EXPECT_NEAR(a.acceleration_mps2_per_v, 2.0 * 0.8 / 0.8 / 1.5, 1e-9);
+}
+
 StatedAssumptions stated_in(const std::string& section) {
   const YamlMap document = YamlMap::from_text("encoder_watch: " + section, "rig.yaml");
   YamlKeyReader reader(document.map("encoder_watch"));

@@ -208,11 +208,32 @@ TYPED_TEST(KnownAnswers, FrictionThatWarmsUpLetsGoAtItsTime) {
       if (moved_s == 0.0 && e.state().cart_mps > 0.0) moved_s = e.time_s();
     }
     EXPECT_GT(e.state().cart_m, 0.1);
-    if (piece_s < 0.01) EXPECT_NEAR(moved_s, lets_go_s, 2.0 * piece_s);
+    if (piece_s < 0.01) {
+      EXPECT_NEAR(moved_s, lets_go_s, 2.0 * piece_s);
+    }
     // The cart creeps away: the force grows from nothing.
     ASSERT_GT(e.event_count(), 0u);
     EXPECT_NEAR(e.event(0).time_s, lets_go_s, 2e-3);
   }
+}
+
+// kV = Fc + mu kV, either way.
+TYPED_TEST(KnownAnswers, FrictionUnderLoadLetsGoLater) {
+  Plant plant = paper_plant();
+  plant.pendulum.reset();
+  plant.set("coulomb_friction", {0.4});
+  plant.set("load_dependent_friction", {0.2});
+  EXPECT_NEAR(this->breakaway_v(plant, 0.5), 0.5 / 1.7189, 6e-4);
+  EXPECT_NEAR(this->breakaway_v(plant, -0.5), -0.5 / 1.7189, 6e-4);
+  auto e = this->engine(plant);
+  e.start({});
+  e.advance(10.0, 3.0);
+  EXPECT_NEAR(e.state().cart_mps, (3.0 * 1.7189 - 0.4 / 0.8) / 7.682, 1e-7) << "it drives";
+  plant.set("bristle_friction", {1e4, 70.0});
+  auto bristles = this->engine(plant);
+  bristles.start({});
+  bristles.advance(10.0, 3.0);
+  EXPECT_NEAR(bristles.state().cart_mps, (3.0 * 1.7189 - 0.4 / 0.8) / 7.682, 1e-6) << "on bristles";
 }
 
 // The stick that must hold: motor and pendulum's reaction are balanced together, so that the voltage that

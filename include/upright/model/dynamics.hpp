@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "upright/model/effect_hooks.hpp"
 #include "upright/model/elementary.hpp"
 #include "upright/model/plant_model.hpp"
 #include "upright/model/plant_state.hpp"
@@ -44,7 +45,8 @@ class Dynamics {
       if (!present_.template has<I>()) return;
       if constexpr (has_bristles<E, S>) bristles_ = true;
       if constexpr (has_cart_level<E, S>) cart_dry_ = cart_dry_ || acts_as_cart_level<E>(p<I>());
-      if constexpr (has_level_of_time<E>) cart_dry_ = changes_with_time_ = true;
+      if constexpr (has_level_of_time<E, S>) cart_dry_ = changes_with_time_ = true;
+      if constexpr (has_level_of_load<E, S>) cart_dry_ = depends_on_load_ = true;
       if constexpr (has_pivot_level<E, S>) pivot_dry_ = model.has_pendulum;
       if constexpr (requires { E::kink_at_cart_rest; }) cart_kink_ = true;
       if constexpr (requires { E::kink_at_pivot_rest; }) pivot_kink_ = model.has_pendulum;
@@ -78,7 +80,7 @@ class Dynamics {
     level_of_time_ = S(0.0);
     const double since_start_s = std::max(time_s - model_.start_s, 0.0);
     for_each_effect([&]<std::size_t I>() {
-      if constexpr (has_level_of_time<EffectAt<I>>)
+      if constexpr (has_level_of_time<EffectAt<I>, S>)
         if (present_.template has<I>())
           level_of_time_ = level_of_time_ + EffectAt<I>::cart_dry_level_after(p<I>(), since_start_s);
     });
@@ -135,6 +137,20 @@ class Dynamics {
     return dry_level(x, speed, direction);
   }
 
+  /// Whether a part of that grows with the motor's force.
+  bool depends_on_load() const { return depends_on_load_; }
+  /// That part, which `cart_dry_level` does not have [N].
+  S cart_dry_level_of_load(const PlantState<S>& state, const S& motor_v) const {
+    S level(0.0);
+    if (!depends_on_load_) return level;
+    const S motor_n = absolute(motor_force(state, motor_v));
+    for_each_effect([&]<std::size_t I>() {
+      if constexpr (has_level_of_load<EffectAt<I>, S>)
+        if (present_.template has<I>()) level = level + EffectAt<I>::cart_dry_level_under(p<I>(), motor_n);
+    });
+    return level;
+  }
+
   /// Largest torque of dry friction in the pivot [N m].
   S pivot_dry_level() const {
     S level(0.0);
@@ -165,10 +181,10 @@ class Dynamics {
     PlantState<S> rate{};
     S force = cart_smooth_force(state, motor_v);
     if (bristles_) {
-      rate.bristle_m = bristle_rate(state);
+      rate.bristle_m = bristle_rate(state, motor_v);
       force = force - bristle_stiffness() * state.bristle_m - bristle_damping() * rate.bristle_m;
     } else if (cart_dry_) {
-      force = force + cart_sliding_force(state, contacts.cart);
+      force = force + cart_sliding_force(state, motor_v, contacts.cart);
     }
     S torque(0.0);
     if (model_.has_pendulum) {
@@ -198,7 +214,8 @@ class Dynamics {
   double bristle_relaxation_radps(const PlantState<S>& state) const {
     const double v = value_of(state.cart_mps);
     const double level =
-        value_of(cart_dry_level(state.cart_m, absolute(state.cart_mps), S(v < 0.0 ? -1.0 : 1.0)));
+        value_of(cart_dry_level(state.cart_m, absolute(state.cart_mps), S(v < 0.0 ? -1.0 : 1.0)) +
+                 cart_dry_level_of_load(state, state.motor_v));
     return value_of(bristle_stiffness()) * std::abs(v) / std::max(level, smallest_level_n);
   }
 
@@ -438,7 +455,7 @@ class Dynamics {
       using E = EffectAt<I>;
       if constexpr (may_have<I>() && has_cart_level<E, S>)
         if (present_.template has<I>()) level = level + E::cart_dry_level(p<I>(), x, speed, direction);
-      if constexpr (may_have<I>() && has_level_of_time<E>)
+      if constexpr (may_have<I>() && has_level_of_time<E, S>)
         if (present_.template has<I>()) level = level + T(level_of_time_);
     });
     return positive_part(level);
@@ -477,54 +494,36 @@ class Dynamics {
     return deflection;
   }
 
-  template <class E, class T>
-  static constexpr bool has_cart_level = requires(const T* q, const T& x) {
-    E::cart_dry_level(q, x, x, x);
-  };
-  template <class E>
-  static constexpr bool has_level_of_time = requires(const S* q) {
-    E::cart_dry_level_after(q, 0.0);
-  };
-  template <class E>
-  static bool acts_as_cart_level(const S* own) {
-    if constexpr (requires { E::has_cart_dry_level(own); }) {
-      return E::has_cart_dry_level(own);
-    } else {
-      return true;
-    }
-  }
-  template <class E, class T>
-  static constexpr bool has_pivot_level = requires(const T* q) {
-    E::pivot_dry_level(q);
-  };
-  template <class E, class T>
-  static constexpr bool has_bristles = requires(const T* q) {
-    E::bristle_stiffness(q);
-  };
-
   template <std::size_t I>
   const S* p() const {
     return &model_.parameters[parameter_offset<I>];
   }
 
-  S bristle_rate(const PlantState<S>& state) const {
-    const S direction = select(state.cart_mps < S(0.0), S(-1.0), S(1.0));
-    return bristle_rate(state, absolute(state.cart_mps), direction);
+  /// All dry friction of the cart.
+  S level_under_load(const PlantState<S>& state, const S& motor_v, const S& speed, const S& direction) const {
+    const S level = cart_dry_level(state.cart_m, speed, direction);
+    return depends_on_load_ ? S(level + cart_dry_level_of_load(state, motor_v)) : level;
+  }
+
+  S bristle_rate(const PlantState<S>& state, const S& motor_v) const {
+    const S direction = select(state.cart_mps < S(0.0), S(-1.0), S(1.0)), speed = absolute(state.cart_mps);
+    return bristle_rate_at(state, speed, level_under_load(state, motor_v, speed, direction));
   }
   S bristle_rate(const PlantState<S>& state, const S& speed, const S& direction) const {
-    const S level = cart_dry_level(state.cart_m, positive_part(speed), direction);
+    return bristle_rate_at(state, speed, cart_dry_level(state.cart_m, positive_part(speed), direction));
+  }
+  S bristle_rate_at(const PlantState<S>& state, const S& speed, const S& level) const {
     const S safe = select(level > S(smallest_level_n), level, S(smallest_level_n));
     return state.cart_mps - bristle_stiffness() * speed * state.bristle_m / safe;
   }
 
-  S cart_sliding_force(const PlantState<S>& state, Contact contact) const {
-    if (model_.smoothing > 0.0) {
-      const S direction = elementary::tanh(S(model_.smoothing) * state.cart_mps);
-      return -cart_dry_level(state.cart_m, absolute(state.cart_mps), direction) * direction;
-    }
-    if (contact == Contact::stick) return S(0.0);
-    const S direction(static_cast<double>(contact));
-    return -cart_dry_level(state.cart_m, positive_part(S(direction * state.cart_mps)), direction) * direction;
+  S cart_sliding_force(const PlantState<S>& state, const S& motor_v, Contact contact) const {
+    const bool smooth = model_.smoothing > 0.0;
+    if (!smooth && contact == Contact::stick) return S(0.0);
+    const S direction =
+        smooth ? elementary::tanh(S(model_.smoothing) * state.cart_mps) : S(static_cast<double>(contact));
+    const S speed = smooth ? absolute(state.cart_mps) : positive_part(S(direction * state.cart_mps));
+    return -level_under_load(state, motor_v, speed, direction) * direction;
   }
 
   S pivot_sliding_torque(const S& omega, Contact contact) const {
@@ -583,7 +582,7 @@ class Dynamics {
   Divisor<S> inertia_{S(1.0)}, mass_{S(1.0)};  ///< about the pivot, and of both bodies
   S level_of_time_{0.0};                       ///< of the cart's dry friction at the time that was set
   bool bristles_ = false, cart_dry_ = false, pivot_dry_ = false, cart_kink_ = false, pivot_kink_ = false,
-       lag_ = false, changes_with_time_ = false;
+       lag_ = false, changes_with_time_ = false, depends_on_load_ = false;
 };
 
 }  // namespace upright

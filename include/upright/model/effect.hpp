@@ -8,6 +8,7 @@
 //   S cart_dry_level(p, x, speed, direction)        its share of the dry level [N] in direction +1 or -1,
 //                                                   speed = |v|
 //   S cart_dry_level_after(p, since_start_s)        its share a time after the start of the run
+//   S cart_dry_level_under(p, motor_n)              its share under a force of the motor of this size [N]
 //   bool has_cart_dry_level(p)                      whether it has one with these parameters (without
 //                                                   this hook: always)
 //   S pivot_torque(p, omega)                        torque on the pendulum about the pivot [N m]

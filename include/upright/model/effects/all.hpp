@@ -17,6 +17,7 @@
 #include "upright/model/effects/force_table.hpp"
 #include "upright/model/effects/friction_asymmetry.hpp"
 #include "upright/model/effects/input_delay.hpp"
+#include "upright/model/effects/load_dependent_friction.hpp"
 #include "upright/model/effects/motor_lag.hpp"
 #include "upright/model/effects/pendulum_length.hpp"
 #include "upright/model/effects/pendulum_mass.hpp"
@@ -46,6 +47,7 @@ using AllEffects =
                effects::StribeckFriction,
                effects::PositionDependentFriction,
                effects::WarmingFriction,
+               effects::LoadDependentFriction,
                effects::BristleFriction,
                effects::QuadraticDrag,
                effects::ConstantForce,
