@@ -37,6 +37,8 @@ constexpr double max_constant = 0.5;
 /// Viscous friction stops no cart faster than in 10 ms, and dry friction is no more than five times its
 /// weight: where the motor drives through a gear, of the mass that it moves.
 constexpr double fastest_decay_per_s = 100.0, largest_friction_of_weight = 5.0;
+/// Friction under load takes at most a third of the motor's force: half of what is left of it.
+constexpr double largest_friction_of_force = 0.5;
 /// Slower than this share of the usual speed a cart may be held by friction, whatever the voltage.
 constexpr double slow = 0.2;
 
@@ -192,7 +194,10 @@ std::optional<ReadingJudge::Share> ReadingJudge::cart_share(const DataReading& r
                          std::sin(theta) * motion.theta.rate[j] * motion.theta.rate[j]);
     }
     const double rate = x * motion.cart.rate[j], v = reading.factor[voltage_channel] * volts[j];
-    fit.add({volts_per_n * force, volts_per_n * rate, sign(rate), 1.0, 0.0}, v);
+    // The last is friction that grows with the force. The force of the acceleration stands for it, since the
+    // motor's own would explain any voltage.
+    const double force_v = volts_per_n * force;
+    fit.add({force_v, volts_per_n * rate, sign(rate), 1.0, sign(rate) * std::abs(force_v)}, v);
     inertia += volts_per_n * force * volts_per_n * force;
     largest = std::max(largest, std::abs(v));
     ++rows;
@@ -202,7 +207,8 @@ std::optional<ReadingJudge::Share> ReadingJudge::cart_share(const DataReading& r
   const double constant = max_constant * largest, damping = fastest_decay_per_s * mass;
   const double dry = largest_friction_of_weight * mass * plant_.gravity_mps2 * volts_per_n;
   const auto bounded = [&](double by) {
-    return fit.accounted({1.0 / by, 0.0, 0.0, -constant, 0.0}, {by, damping, dry, constant, 0.0});
+    return fit.accounted({1.0 / by, 0.0, 0.0, -constant, 0.0},
+                         {by, damping, dry, constant, largest_friction_of_force});
   };
   return Share{bounded(generous), bounded(close), std::sqrt(inertia / fit.squares()) / generous,
                fit.squares()};
