@@ -44,7 +44,7 @@ double breakaway_v(const Dynamics<double>& dynamics, double cart_m, double direc
   const auto moves = [&](double volts) {
     const double motor_v = dynamics.actuate(direction * volts);
     return direction * dynamics.cart_smooth_force(state, motor_v) >
-           dynamics.cart_dry_level(cart_m, 0.0, direction) + dynamics.cart_dry_level_of_load(state, motor_v);
+           dynamics.cart_dry_level(state, motor_v, 0.0, direction);
   };
   if (moves(0.0)) return 0.0;
   double low = 0.0, high = limit_v;

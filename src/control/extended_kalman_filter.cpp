@@ -96,8 +96,7 @@ double ExtendedKalmanFilter::friction_n() const noexcept {
   if (!dynamics.cart_can_stick()) return 0.0;
   if (engine_.cart_at_rest()) return -dynamics.cart_load(s, s.motor_v, engine_.contacts().pivot);
   const double direction = sign_of_contact(engine_.contacts().cart);
-  return -direction * (dynamics.cart_dry_level(s.cart_m, std::abs(s.cart_mps), direction) +
-                       dynamics.cart_dry_level_of_load(s, s.motor_v));
+  return -direction * dynamics.cart_dry_level(s, s.motor_v, std::abs(s.cart_mps), direction);
 }
 
 double ExtendedKalmanFilter::rejected_force_n() const noexcept {

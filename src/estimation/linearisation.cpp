@@ -55,9 +55,8 @@ void correct_state(EventEngine<S>& engine, const double (&correction)[state_coun
 /// At which a cart at rest begins to slide, in the direction in which it does so sooner.
 template <class S>
 double min_dry_level(const Dynamics<S>& dynamics, const PlantState<S>& at_rest) {
-  return std::min(value_of(dynamics.cart_dry_level(at_rest.cart_m, S(0.0), S(1.0))),
-                  value_of(dynamics.cart_dry_level(at_rest.cart_m, S(0.0), S(-1.0)))) +
-         value_of(dynamics.cart_dry_level_of_load(at_rest, at_rest.motor_v));
+  return std::min(value_of(dynamics.cart_dry_level(at_rest, at_rest.motor_v, S(0.0), S(1.0))),
+                  value_of(dynamics.cart_dry_level(at_rest, at_rest.motor_v, S(0.0), S(-1.0))));
 }
 
 /// What the cart's sensor shows of a unit of its speed: through back-EMF a drive that gives way is set back.

@@ -11,7 +11,8 @@ namespace {
 
 constexpr double two_pi = 2.0 * std::numbers::pi;
 
-void add_force(Plant& plant, std::string_view kind, double force_n) {
+void add_constant_force(Plant& plant, double force_n) {
+  constexpr std::string_view kind = "constant_force";
   const PlantEffect* have = plant.find(kind);
   plant.set(kind, {force_n + (have != nullptr ? have->values[0] : 0.0)});
 }
@@ -92,7 +93,7 @@ double ExtraForces::pivot_torque_nm(double time_s) const {
 Plant ExtraForces::plant_at(double time_s, const PlantState<double>& state, double motor_n) const {
   Plant plant = rig_.plant;
   const double force = cart_force_n(time_s, state, motor_n);
-  if (force != 0.0) add_force(plant, "constant_force", force);
+  if (force != 0.0) add_constant_force(plant, force);
   return plant;
 }
 

@@ -139,7 +139,7 @@ class Dynamics {
 
   /// Whether a part of that grows with the motor's force.
   bool depends_on_load() const { return depends_on_load_; }
-  /// That part, which `cart_dry_level` does not have [N].
+  /// That part, which the level above does not have [N].
   S cart_dry_level_of_load(const PlantState<S>& state, const S& motor_v) const {
     S level(0.0);
     if (!depends_on_load_) return level;
@@ -149,6 +149,11 @@ class Dynamics {
         if (present_.template has<I>()) level = level + EffectAt<I>::cart_dry_level_under(p<I>(), motor_n);
     });
     return level;
+  }
+  /// The whole level, under this voltage at the motor [N].
+  S cart_dry_level(const PlantState<S>& state, const S& motor_v, const S& speed, const S& direction) const {
+    const S level = cart_dry_level(state.cart_m, speed, direction);
+    return depends_on_load_ ? S(level + cart_dry_level_of_load(state, motor_v)) : level;
   }
 
   /// Largest torque of dry friction in the pivot [N m].
@@ -213,9 +218,8 @@ class Dynamics {
   /// Rate at which bristles approach their steady deflection while the cart slides [1/s].
   double bristle_relaxation_radps(const PlantState<S>& state) const {
     const double v = value_of(state.cart_mps);
-    const double level =
-        value_of(cart_dry_level(state.cart_m, absolute(state.cart_mps), S(v < 0.0 ? -1.0 : 1.0)) +
-                 cart_dry_level_of_load(state, state.motor_v));
+    const S direction(v < 0.0 ? -1.0 : 1.0);
+    const double level = value_of(cart_dry_level(state, state.motor_v, absolute(state.cart_mps), direction));
     return value_of(bristle_stiffness()) * std::abs(v) / std::max(level, smallest_level_n);
   }
 
@@ -499,15 +503,9 @@ class Dynamics {
     return &model_.parameters[parameter_offset<I>];
   }
 
-  /// All dry friction of the cart.
-  S level_under_load(const PlantState<S>& state, const S& motor_v, const S& speed, const S& direction) const {
-    const S level = cart_dry_level(state.cart_m, speed, direction);
-    return depends_on_load_ ? S(level + cart_dry_level_of_load(state, motor_v)) : level;
-  }
-
   S bristle_rate(const PlantState<S>& state, const S& motor_v) const {
     const S direction = select(state.cart_mps < S(0.0), S(-1.0), S(1.0)), speed = absolute(state.cart_mps);
-    return bristle_rate_at(state, speed, level_under_load(state, motor_v, speed, direction));
+    return bristle_rate_at(state, speed, cart_dry_level(state, motor_v, speed, direction));
   }
   S bristle_rate(const PlantState<S>& state, const S& speed, const S& direction) const {
     return bristle_rate_at(state, speed, cart_dry_level(state.cart_m, positive_part(speed), direction));
@@ -523,7 +521,7 @@ class Dynamics {
     const S direction =
         smooth ? elementary::tanh(S(model_.smoothing) * state.cart_mps) : S(static_cast<double>(contact));
     const S speed = smooth ? absolute(state.cart_mps) : positive_part(S(direction * state.cart_mps));
-    return -level_under_load(state, motor_v, speed, direction) * direction;
+    return -cart_dry_level(state, motor_v, speed, direction) * direction;
   }
 
   S pivot_sliding_torque(const S& omega, Contact contact) const {

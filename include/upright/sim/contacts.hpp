@@ -120,16 +120,14 @@ Contacts settled_contacts(const Dynamics<double, Present>& dynamics, const Plant
   const bool cart_rests = dynamics.cart_can_stick() && !dynamics.cart_locked() && s.cart_mps == 0.0;
   const bool pivot_rests = dynamics.pivot_can_stick() && s.theta_radps == 0.0;
   if (!cart_rests && !pivot_rests) return contacts;
-  const double level_of_load = dynamics.cart_dry_level_of_load(s, s.motor_v);
   constexpr std::array modes = {Contact::stick, Contact::slip_forward, Contact::slip_backward};
   for (const Contact cart : modes) {
     if (!cart_rests && cart != contacts.cart) continue;
     for (const Contact pivot : modes) {
       if (!pivot_rests && pivot != contacts.pivot) continue;
-      const bool cart_holds =
-          !cart_rests || detail::holds(cart, dynamics.cart_load(s, s.motor_v, pivot),
-                                       dynamics.cart_dry_level(s.cart_m, 0.0, 1.0) + level_of_load,
-                                       dynamics.cart_dry_level(s.cart_m, 0.0, -1.0) + level_of_load);
+      const bool cart_holds = !cart_rests || detail::holds(cart, dynamics.cart_load(s, s.motor_v, pivot),
+                                                           dynamics.cart_dry_level(s, s.motor_v, 0.0, 1.0),
+                                                           dynamics.cart_dry_level(s, s.motor_v, 0.0, -1.0));
       const bool pivot_holds =
           !pivot_rests || detail::holds(pivot, dynamics.pivot_load(s, s.motor_v, cart),
                                         dynamics.pivot_dry_level(), dynamics.pivot_dry_level());
@@ -184,9 +182,9 @@ S event_indicator(const Dynamics<S, Present>& dynamics, const PlantState<S>& s, 
       return watch.sign > 0.0 ? S(-s.theta_radps) : s.theta_radps;
     case EventKind::cart_breakaway: {
       const S load = dynamics.cart_load(s, s.motor_v, contacts.pivot);
-      const S forward = load - dynamics.cart_dry_level(s.cart_m, S(0.0), S(1.0));
-      const S backward = -load - dynamics.cart_dry_level(s.cart_m, S(0.0), S(-1.0));
-      return (forward > backward ? forward : backward) - dynamics.cart_dry_level_of_load(s, s.motor_v);
+      const S forward = load - dynamics.cart_dry_level(s, s.motor_v, S(0.0), S(1.0));
+      const S backward = -load - dynamics.cart_dry_level(s, s.motor_v, S(0.0), S(-1.0));
+      return forward > backward ? forward : backward;
     }
     case EventKind::pivot_breakaway:
       return absolute(dynamics.pivot_load(s, s.motor_v, contacts.cart)) - dynamics.pivot_dry_level();
