@@ -55,17 +55,46 @@ double breakaway_v(const Dynamics<double>& dynamics, double cart_m, double direc
   return high;
 }
 
+constexpr int places = 400;  // cogging repeats every few millimetres
+
+double place_m(int number, double track_limit_m) {
+  return track_limit_m * (2.0 * number / places - 1.0);
+}
+
 /// Widens the bounds to what the plant needs anywhere on the track.
 void include_breakaway(const Dynamics<double>& dynamics, double track_limit_m, double limit_v,
                        Bounds& bounds) {
-  constexpr int places = 400;  // cogging repeats every few millimetres
   for (int i = 0; i <= places; ++i)
     for (const double direction : {-1.0, 1.0}) {
-      const double volts =
-          breakaway_v(dynamics, track_limit_m * (2.0 * i / places - 1.0), direction, limit_v);
+      const double volts = breakaway_v(dynamics, place_m(i, track_limit_m), direction, limit_v);
       bounds.low = std::min(bounds.low, volts);
       bounds.high = std::max(bounds.high, volts);
     }
+}
+
+/// The force on a resting cart per volt [N/V].
+double force_per_volt_n(const Dynamics<double>& dynamics, const PlantState<double>& rest, double limit_v) {
+  const auto force = [&](double volts) {
+    const double motor_v = dynamics.actuate(volts);
+    return dynamics.cart_smooth_force(rest, motor_v) -
+           std::copysign(dynamics.cart_dry_level_of_load(rest, motor_v), volts);
+  };
+  return (force(limit_v) - force(-limit_v)) / (2.0 * limit_v);
+}
+
+/// Where on the track the motor is weakest [m]; 0 if it is equally strong everywhere.
+double weakest_place_m(const Dynamics<double>& dynamics, double track_limit_m, double limit_v) {
+  constexpr double rounding = 1e-9;
+  PlantState<double> rest{};
+  double weakest_m = 0.0, least_n = force_per_volt_n(dynamics, rest, limit_v) * (1.0 - rounding);
+  for (int i = 0; i <= places; ++i) {
+    rest.cart_m = place_m(i, track_limit_m);
+    const double here_n = force_per_volt_n(dynamics, rest, limit_v);
+    if (!(here_n < least_n)) continue;
+    least_n = here_n;
+    weakest_m = rest.cart_m;
+  }
+  return weakest_m;
 }
 
 }  // namespace
@@ -87,14 +116,9 @@ EncoderAssumptions encoder_assumptions(const Plant& plant, double track_limit_m,
   const double lag_s = dynamics.input_delay_s() + dynamics.motor_time_constant_s();
   a.largest_lag_s = lag_s * more + unnamed_lag_s;
 
-  const PlantState<double> rest{};
-  const auto force = [&](double volts) {
-    const double motor_v = dynamics.actuate(volts);
-    return dynamics.cart_smooth_force(rest, motor_v) -
-           std::copysign(dynamics.cart_dry_level_of_load(rest, motor_v), volts);
-  };
-  const double force_per_volt_n =
-      (force(amplifier_limit_v) - force(-amplifier_limit_v)) / (2.0 * amplifier_limit_v);
+  PlantState<double> rest{};
+  rest.cart_m = weakest_place_m(dynamics, track_limit_m, amplifier_limit_v);
+  const double volt_n = force_per_volt_n(dynamics, rest, amplifier_limit_v);
   double mass_kg = base.cart_mass_kg;
   if (plant.pendulum) {
     const double moment_kgm = base.pendulum_mass_kg * base.length_to_com_m;
@@ -103,12 +127,12 @@ EncoderAssumptions encoder_assumptions(const Plant& plant, double track_limit_m,
     a.pivot_friction_mps2 =
         std::max(usual_pivot_friction_mps2, more * dynamics.pivot_dry_level() / moment_kgm);
   }
-  a.acceleration_mps2_per_v = less * force_per_volt_n / mass_kg;
+  a.acceleration_mps2_per_v = less * volt_n / mass_kg;
   constexpr double usual_mps = 0.5;
-  PlantState<double> moving{};
+  PlantState<double> moving = rest;
   moving.cart_mps = usual_mps;
   const double drag_n = dynamics.cart_smooth_force(rest, 0.0) - dynamics.cart_smooth_force(moving, 0.0);
-  a.damping_v_per_mps = std::max(0.0, more * drag_n / (usual_mps * force_per_volt_n));
+  a.damping_v_per_mps = std::max(0.0, more * drag_n / (usual_mps * volt_n));
   return a;
 }
 

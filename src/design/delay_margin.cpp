@@ -289,6 +289,7 @@ bool stable_without_delay(Plant plant, ControlConfig config, double smoothing) {
 Plant large_motion_plant(const Plant& plant) {
   Plant large = sliding_plant(plant);
   large.remove(effect_number("cogging_force"));
+  large.remove(effect_number("torque_ripple"));
   return large;
 }
 

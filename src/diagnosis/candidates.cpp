@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numbers>
 
 #include "motion_range.hpp"
 
@@ -44,12 +43,6 @@ FreeParameter free_parameter(std::size_t effect, std::size_t index, const DataRa
   if (p.scale == 0.0) p.scale = 0.1;
   if (info.range.low_open && info.range.low == 0.0) p.low = 1e-3 * p.scale;
   return p;
-}
-
-/// A force along the track counts as one that repeats when a run passes some of its crests. Several runs at
-/// different places pass the same crests together, but each could as well have a force of its own.
-double longest_pitch_m(const DataRange& range, const PriorPolicy& prior) {
-  return std::max(prior.min_longest_pitch_m, range.longest_travel_m / prior.crests_of_pitch);
 }
 
 }  // namespace
@@ -234,7 +227,8 @@ std::vector<std::size_t> candidate_effects(const Plant& plant, const DataRange& 
     const bool angle = info.kind.starts_with("angle_");
     if ((info.enters == Enters::pendulum || angle) && !plant.pendulum) continue;
     if ((info.enters == Enters::pendulum || angle) && !range.theta_measured) continue;
-    const bool of_motor = info.enters == Enters::actuator || info.kind == "drive_compliance";
+    const bool of_motor =
+        info.enters == Enters::actuator || info.kind == "drive_compliance" || info.kind == "torque_ripple";
     if ((info.enters == Enters::cart || info.kind == "cart_scale") && !range.cart_moves) continue;
     if (of_motor && (!range.cart_moves || range.largest_voltage_v == 0.0)) continue;
     Plant with = plant;
@@ -246,86 +240,12 @@ std::vector<std::size_t> candidate_effects(const Plant& plant, const DataRange& 
   return effects;
 }
 
-namespace {
-
-/// Sine and cosine of 2 pi f x for a rising frequency: turned by the same angle each time, since the
-/// functions themselves took longer than all else.
-struct Wave {
-  Wave(double x, double frequency, double spacing)
-      : sine(std::sin(2.0 * std::numbers::pi * frequency * x)),
-        cosine(std::cos(2.0 * std::numbers::pi * frequency * x)),
-        turn_sine(std::sin(2.0 * std::numbers::pi * spacing * x)),
-        turn_cosine(std::cos(2.0 * std::numbers::pi * spacing * x)) {}
-
-  void advance() {
-    const double former = sine;
-    sine = sine * turn_cosine + cosine * turn_sine;
-    cosine = cosine * turn_cosine - former * turn_sine;
-  }
-
-  double sine, cosine, turn_sine, turn_cosine;
-};
-
-/// Pitches at which a sine over the track explains most of the residual force: a periodogram over x.
-std::vector<std::vector<double>> cogging_starts(const std::vector<std::pair<double, double>>& force_residual,
-                                                const DataRange& range, const PriorPolicy& prior,
-                                                const SearchBudget& budget) {
-  std::vector<std::pair<double, std::vector<double>>> found;
-  const double travel = range.cart_high_m - range.cart_low_m;
-  if (force_residual.size() < budget.min_residual_samples || travel <= 0.0) return {{0.3, 0.02, 0.0}};
-  const double largest = longest_pitch_m(range, prior);
-  // Frequencies over the track one half-cycle apart, so that no crest is missed.
-  const double spacing = 0.25 / travel;
-  const double smallest = std::max(0.001, 1.0 / (1.0 / largest + budget.max_frequencies * spacing));
-  std::vector<Wave> waves;
-  waves.reserve(force_residual.size());
-  for (const auto& [x, y] : force_residual) waves.emplace_back(x, 1.0 / largest, spacing);
-  for (double f = 1.0 / largest; f <= 1.0 / smallest; f += spacing) {
-    double ss = 0.0, sc = 0.0, cc = 0.0, sy = 0.0, cy = 0.0, s1 = 0.0, c1 = 0.0, y1 = 0.0;
-    for (std::size_t i = 0; i < waves.size(); ++i) {
-      const double s = waves[i].sine, c = waves[i].cosine, y = force_residual[i].second;
-      waves[i].advance();
-      ss += s * s;
-      sc += s * c;
-      cc += c * c;
-      sy += s * y;
-      cy += c * y;
-      s1 += s;
-      c1 += c;
-      y1 += y;
-    }
-    const double n = static_cast<double>(force_residual.size());
-    ss -= s1 * s1 / n;
-    sc -= s1 * c1 / n;
-    cc -= c1 * c1 / n;
-    sy -= s1 * y1 / n;
-    cy -= c1 * y1 / n;
-    const double det = ss * cc - sc * sc;
-    if (det < 1e-6 * n * n * 0.01) continue;
-    const double a = (cc * sy - sc * cy) / det, b = (ss * cy - sc * sy) / det;
-    found.push_back({a * sy + b * cy, {std::hypot(a, b), 1.0 / f, std::atan2(b, a)}});
-  }
-  std::sort(found.begin(), found.end(), [](const auto& l, const auto& r) { return l.first > r.first; });
-  std::vector<std::vector<double>> starts;
-  for (const auto& candidate : found) {
-    const std::vector<double>& start = candidate.second;
-    const bool near = std::any_of(starts.begin(), starts.end(), [&](const auto& s) {
-      return std::abs(1.0 / s[1] - 1.0 / start[1]) < 4.0 * spacing;
-    });
-    if (!near) starts.push_back(start);
-    if (starts.size() == budget.max_pitches) break;
-  }
-  return starts.empty() ? std::vector<std::vector<double>>{{0.3, 0.02, 0.0}} : starts;
-}
-
-}  // namespace
-
 std::vector<std::vector<double>> search_starts(std::size_t effect, const DataRange& range,
-                                               const std::vector<std::pair<double, double>>& force_residual,
+                                               const std::vector<PlaceForce>& force_residual,
                                                const PriorPolicy& prior, const SearchBudget& budget) {
   const EffectInfo& info = effect_registry()[effect];
   const double speed = range.largest_speed_mps, volts = range.largest_voltage_v;
-  if (is_named(effect, "cogging_force")) return cogging_starts(force_residual, range, prior, budget);
+  if (is_periodic(effect)) return periodic_starts(effect, force_residual, range, prior, budget);
   if (is_named(effect, "voltage_saturation"))
     return {{0.9 * volts}, {0.7 * volts}, {0.5 * volts}, {0.3 * volts}};
   if (is_named(effect, "voltage_dead_zone")) return {{0.1}, {0.4}};

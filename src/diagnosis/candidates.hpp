@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "estimation/fit.hpp"
+#include "periodic_starts.hpp"
 #include "search_budget.hpp"
 #include "selection_policy.hpp"
 #include "upright/diagnosis/diagnosis.hpp"
@@ -56,9 +57,9 @@ bool is_plainer(std::size_t a, std::size_t b);
 std::vector<std::size_t> same_force_as(std::size_t effect);
 
 /// Parameter values from which to search for an effect; several where the misfit has several valleys.
-/// `force_residual` pairs of (x, residual force) point at the pitch of periodic forces.
+/// `force_residual` shows the pitch of effects that are periodic along the track.
 std::vector<std::vector<double>> search_starts(std::size_t effect, const DataRange& range,
-                                               const std::vector<std::pair<double, double>>& force_residual,
+                                               const std::vector<PlaceForce>& force_residual,
                                                const PriorPolicy& prior, const SearchBudget& budget);
 
 }  // namespace upright

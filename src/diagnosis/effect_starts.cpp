@@ -5,25 +5,34 @@
 #include <cmath>
 
 #include "estimation/smoother.hpp"
+#include "upright/model/dynamics.hpp"
 
 namespace upright {
 
 namespace {
 
-/// Positions of the moving cart and the force that the model lacks there, m and N.
-std::vector<std::pair<double, double>> force_residual(const FitData& data, const FitPoint& point,
-                                                      const SelectionPolicy& policy, std::size_t max_pairs) {
-  std::vector<std::pair<double, double>> pairs;
+/// The force that the model lacks where the cart moves. A delay or a lag of the motor's force is left out.
+std::vector<PlaceForce> force_residual(const FitData& data, const FitPoint& point,
+                                       const SelectionPolicy& policy, std::size_t max_samples) {
+  const Dynamics<double> dynamics(make_model<double>(point.plant));
+  std::vector<PlaceForce> residual;
   for (const ResidualTrace& trace : smooth_residuals(data, point, policy.location.walk))
-    for (std::size_t k = 0; k < trace.time_s.size(); ++k)
-      if (std::abs(trace.cart_mps[k]) > policy.location.moving_cart_mps)
-        pairs.emplace_back(trace.cart_m[k], trace.force_n[k]);
-  if (pairs.size() > max_pairs) {
-    std::vector<std::pair<double, double>> thinned;
-    for (std::size_t i = 0; i < max_pairs; ++i) thinned.push_back(pairs[i * pairs.size() / max_pairs]);
-    pairs = thinned;
+    for (std::size_t k = 0; k < trace.time_s.size(); ++k) {
+      if (!(std::abs(trace.cart_mps[k]) > policy.location.moving_cart_mps)) continue;
+      PlantState<double> state{};
+      state.cart_m = trace.cart_m[k];
+      state.cart_mps = trace.cart_mps[k];
+      const double ripple_n = dynamics.motor_force(state, dynamics.actuate(trace.voltage_v[k])) -
+                              dynamics.base().back_emf_n_per_mps * state.cart_mps;
+      residual.push_back({trace.cart_m[k], trace.force_n[k], ripple_n});
+    }
+  if (residual.size() > max_samples) {
+    std::vector<PlaceForce> thinned;
+    for (std::size_t i = 0; i < max_samples; ++i)
+      thinned.push_back(residual[i * residual.size() / max_samples]);
+    residual = thinned;
   }
-  return pairs;
+  return residual;
 }
 
 bool is_same_noise(const Noise& a, const Noise& b) {
@@ -53,15 +62,15 @@ bool is_same(const FitPoint& a, const FitPoint& b) {
 
 std::vector<std::vector<double>> EffectStarts::of(std::size_t effect, const DataRange& range,
                                                   const FitData& data, const FitPoint& point) {
-  if (effect_registry()[effect].kind != "cogging_force")
-    return search_starts(effect, range, {}, policy_.prior, budget_);
+  if (!is_periodic(effect)) return search_starts(effect, range, {}, policy_.prior, budget_);
   if (!point_ || !is_same(*point_, point)) {
-    periodic_ =
-        search_starts(effect, range, force_residual(data, point, policy_, budget_.max_residual_samples),
-                      policy_.prior, budget_);
+    residual_ = force_residual(data, point, policy_, budget_.max_residual_samples);
+    periodic_.clear();
     point_ = point;
   }
-  return periodic_;
+  const auto [at, is_new] = periodic_.try_emplace(effect);
+  if (is_new) at->second = search_starts(effect, range, residual_, policy_.prior, budget_);
+  return at->second;
 }
 
 }  // namespace upright

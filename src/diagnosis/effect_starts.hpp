@@ -1,6 +1,7 @@
 // The starts of the fit of an effect, from the residual of an earlier fit of the same data.
 #pragma once
 
+#include <map>
 #include <optional>
 #include <vector>
 
@@ -8,7 +9,7 @@
 
 namespace upright {
 
-/// Remembers the latest starts of a periodic force, which take as long as a fit: each round asks for them
+/// Remembers the latest starts of periodic effects, which take as long as a fit: each round asks for them
 /// twice.
 class EffectStarts {
  public:
@@ -16,7 +17,7 @@ class EffectStarts {
   EffectStarts(const SelectionPolicy& policy, const SearchBudget& budget)
       : policy_(policy), budget_(budget) {}
 
-  /// Of an effect beside the model at `point`. A periodic force starts from the pitches that the residual has
+  /// Of an effect beside the model at `point`. A periodic one starts from the pitches that the residual has
   /// most of.
   std::vector<std::vector<double>> of(std::size_t effect, const DataRange& range, const FitData& data,
                                       const FitPoint& point);
@@ -25,7 +26,8 @@ class EffectStarts {
   const SelectionPolicy& policy_;
   const SearchBudget& budget_;
   std::optional<FitPoint> point_;  ///< of the latest
-  std::vector<std::vector<double>> periodic_;
+  std::vector<PlaceForce> residual_;
+  std::map<std::size_t, std::vector<std::vector<double>>> periodic_;  ///< by the number of the effect
 };
 
 }  // namespace upright

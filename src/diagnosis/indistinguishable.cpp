@@ -53,11 +53,6 @@ bool grows_from_nothing(std::size_t effect) {
   return std::isfinite(effect_registry()[effect].parameters[0].neutral);
 }
 
-/// A force that repeats is another one with every pitch, which would have to be known.
-bool is_proportional(std::size_t effect) {
-  return effect_registry()[effect].kind != "cogging_force";
-}
-
 }  // namespace
 
 bool reduces_certainty(double distance_with_other, double distance_alone, const DistinctionPolicy& policy) {
@@ -88,7 +83,7 @@ std::vector<Alternative> linear_alternatives(const Search& search, const Hypothe
                                              const std::vector<FreedEffect>& freed) {
   std::vector<Alternative> alternatives;
   for (const auto& [other, fit] : freed) {
-    if (!is_proportional(other)) continue;
+    if (is_periodic(other)) continue;  // another effect with every pitch, which would have to be known
     for (const std::size_t effect : listed) {
       const Eigen::Index before = size_place(h, effect), after = size_place(fit, effect);
       if (before < 0 || after < 0 || !std::isfinite(absent_value(h, before))) continue;

@@ -97,10 +97,6 @@ void hide_unknown(const std::string& kind, Size size, const Scales& scales, Rig&
   } else if (kind == "gusts") {
     rig.unknown = Unknown::gusts;
     rig.gust_force_n = 2.0 * force_n;
-  } else if (kind == "torque_ripple") {
-    rig.unknown = Unknown::torque_ripple;
-    rig.unknown_size = 1.5 * share;
-    rig.unknown_period = scales.travel_m / between(random, 4.0, 15.0);
   } else if (kind == "rough_track") {
     rig.unknown = Unknown::rough_track;
     rig.unknown_size = force_n;
@@ -136,8 +132,8 @@ std::string_view name_of(Condition condition) {
 std::vector<std::string> unknown_kinds(Condition condition) {
   if (condition != Condition::laboratory) return {"backlash", "gusts"};
   std::vector<std::string> kinds;
-  for (const Unknown unknown : {Unknown::backlash, Unknown::gusts, Unknown::torque_ripple,
-                                Unknown::rough_track, Unknown::velocity_ripple, Unknown::force_drift}) {
+  for (const Unknown unknown : {Unknown::backlash, Unknown::gusts, Unknown::rough_track,
+                                Unknown::velocity_ripple, Unknown::force_drift}) {
     const std::string kind(name_of(unknown));
     if (effect_number(kind) == effect_count) kinds.push_back(kind);
   }

@@ -140,8 +140,6 @@ std::string_view name_of(Unknown unknown) {
       return "backlash";
     case Unknown::gusts:
       return "gusts";
-    case Unknown::torque_ripple:
-      return "torque_ripple";
     case Unknown::rough_track:
       return "rough_track";
     case Unknown::velocity_ripple:

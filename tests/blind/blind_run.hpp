@@ -19,7 +19,6 @@ enum class Unknown {
   none,
   backlash,
   gusts,
-  torque_ripple,    ///< the motor's force per volt ripples along the track
   rough_track,      ///< a random force that belongs to the place
   velocity_ripple,  ///< a force that ripples with the velocity
   force_drift,      ///< a force that grows along the run, from -size to +size
@@ -41,11 +40,9 @@ struct Rig {
   Unknown unknown = Unknown::none;
   double backlash_m = 0.0;    ///< play between cart and encoder
   double gust_force_n = 0.0;  ///< typical peak
-  /// torque_ripple: share of the motor's force; rough_track: standard deviation [N]; velocity_ripple and
-  /// force_drift: amplitude [N].
+  /// rough_track: standard deviation [N]; velocity_ripple and force_drift: amplitude [N].
   double unknown_size = 0.0;
-  /// torque_ripple: pitch [m]; rough_track: correlation length [m]; velocity_ripple: velocity of a period
-  /// [m/s].
+  /// rough_track: correlation length [m]; velocity_ripple: velocity of a period [m/s].
   double unknown_period = 1.0;
   double disturbance_n = 0.0;  ///< rms of a force of 10 Hz bandwidth (Ornstein-Uhlenbeck)
   double jitter_s = 0.0;       ///< standard deviation of the time at which encoders are read

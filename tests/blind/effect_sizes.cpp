@@ -47,6 +47,7 @@ const std::vector<std::string>& hidden_kinds() {
                                                  "constant_force",
                                                  "cable_spring",
                                                  "cogging_force",
+                                                 "torque_ripple",
                                                  "voltage_saturation",
                                                  "voltage_dead_zone",
                                                  "voltage_gain",
@@ -123,6 +124,8 @@ std::vector<double> values_for(const std::string& kind, Size size, const Plant& 
     return {force / (0.3 * s.travel_m), s.center_m + between(random, -0.3, 0.3) * s.travel_m};
   if (kind == "cogging_force")
     return {force, s.travel_m / between(random, 4.0, 15.0), between(random, -3.0, 3.0)};
+  if (kind == "torque_ripple")
+    return {1.5 * share, s.travel_m / between(random, 4.0, 15.0), between(random, -3.0, 3.0)};
   if (kind == "drive_compliance") return {pick(size, 0.0002, 0.0006, 0.002) * s.travel_m / s.force_n};
   if (kind == "voltage_saturation") return {s.high_volts * pick(size, 0.85, 0.65, 0.45)};
   if (kind == "voltage_dead_zone") return {share * s.volts};

@@ -59,7 +59,7 @@ std::size_t ExtraForces::index_at(double time_s) const {
   return std::min(static_cast<std::size_t>(std::max(time_s, 0.0) / force_step_s + 0.5), force_.size() - 1);
 }
 
-double ExtraForces::cart_force_n(double time_s, const PlantState<double>& state, double motor_n) const {
+double ExtraForces::cart_force_n(double time_s, const PlantState<double>& state) const {
   const std::size_t k = index_at(time_s);
   double force = force_[k];
   if (coloured_[k] != 0.0) {
@@ -70,8 +70,6 @@ double ExtraForces::cart_force_n(double time_s, const PlantState<double>& state,
   if (rig_.rough_n > 0.0) force += rig_.rough_n * rough_.at(state.cart_m);
   const double size = rig_.unknown_size, period = rig_.unknown_period;
   switch (rig_.unknown) {
-    case Unknown::torque_ripple:
-      return force + size * motor_n * std::sin(two_pi * state.cart_m / period);
     case Unknown::rough_track:
       return force + size * unknown_rough_.at(state.cart_m);
     case Unknown::velocity_ripple:
@@ -90,9 +88,9 @@ double ExtraForces::pivot_torque_nm(double time_s) const {
   return torque_[index_at(time_s)];
 }
 
-Plant ExtraForces::plant_at(double time_s, const PlantState<double>& state, double motor_n) const {
+Plant ExtraForces::plant_at(double time_s, const PlantState<double>& state) const {
   Plant plant = rig_.plant;
-  const double force = cart_force_n(time_s, state, motor_n);
+  const double force = cart_force_n(time_s, state);
   if (force != 0.0) add_constant_force(plant, force);
   return plant;
 }
@@ -148,8 +146,7 @@ void VaryingEngine::advance(double duration_s, double volts) {
       PlantState<double> state = engine_.state();
       const double torque_nm = extra_->pivot_torque_nm(now_s);
       if (torque_nm != 0.0) push_pendulum(engine_, torque_nm, state);
-      const double motor_n = engine_.dynamics().base().force_per_volt_n * engine_.dynamics().actuate(volts);
-      const Plant plant = extra_->plant_at(now_s, state, motor_n);
+      const Plant plant = extra_->plant_at(now_s, state);
       engine_ = CvodeEngine(make_model<double>(plant, locked_), options_);
       engine_.start(state, now_s, volts);
     }

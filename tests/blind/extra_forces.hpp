@@ -21,12 +21,12 @@ class ExtraForces {
   /// Whether anything acts that the rig's plant does not have.
   bool varies() const { return varies_; }
 
-  /// The force on the cart beside the plant's, in a state that the motor pushes with `motor_n`.
-  double cart_force_n(double time_s, const PlantState<double>& state, double motor_n) const;
+  /// The force on the cart beside the plant's.
+  double cart_force_n(double time_s, const PlantState<double>& state) const;
   double pivot_torque_nm(double time_s) const;
 
   /// The plant with that force in it.
-  Plant plant_at(double time_s, const PlantState<double>& state, double motor_n) const;
+  Plant plant_at(double time_s, const PlantState<double>& state) const;
 
  private:
   void add_white_bandwidth(std::mt19937_64& random);

@@ -46,6 +46,7 @@ std::vector<Subject> subjects() {
   add("loaded", exponential, E{"load_dependent_friction", {0.1}}, E{"motor_lag", {0.004}});
   // Steps of fixed length cross the kink where the motor's force changes direction: up to 3.7e-6.
   all.back().tolerance = 1e-5;
+  add("ripple", exponential, E{"torque_ripple", {0.1, 0.01, 0.2}}, E{"motor_lag", {0.004}});
   add("pivot", exponential, E{"pivot_coulomb_friction", {0.003}}, E{"pivot_viscous_friction", {0.001}});
   add("sensors", exponential, E{"angle_scale", {1.02}}, E{"cart_scale", {0.98}}, E{"angle_offset", {0.002}});
   add("drive", exponential, E{"drive_compliance", {2e-4}}, E{"motor_lag", {0.004}});

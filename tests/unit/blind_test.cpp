@@ -97,8 +97,8 @@ TEST(ExtraForces, GrowWithSpeedAsStated) {
   fast.cart_mps = 1.0;
   std::vector<double> at_rest, at_speed;
   for (double t = 0.0; t < plan.duration_s; t += blind::force_step_s) {
-    at_rest.push_back(extra.cart_force_n(t, rest, 0.0));
-    at_speed.push_back(extra.cart_force_n(t, fast, 0.0));
+    at_rest.push_back(extra.cart_force_n(t, rest));
+    at_speed.push_back(extra.cart_force_n(t, fast));
   }
   EXPECT_NEAR(std::sqrt(correlation(at_rest, 0)), 0.2, 0.01);
   EXPECT_NEAR(correlation(at_rest, 20), 0.04 * std::exp(-1.0), 0.003);
@@ -116,12 +116,12 @@ TEST(ExtraForces, TorqueHasItsOwnSizeAndMemory) {
     torque.push_back(extra.pivot_torque_nm(t));
   EXPECT_NEAR(std::sqrt(correlation(torque, 0)), 0.01, 5e-4);
   EXPECT_NEAR(correlation(torque, 30), 1e-4 * std::exp(-1.0), 1e-5);
-  EXPECT_EQ(extra.cart_force_n(1.0, {}, 0.0), 0.0);
+  EXPECT_EQ(extra.cart_force_n(1.0, {}), 0.0);
 }
 
 TEST(ExtraForces, UnknownOnesFollowTheState) {
   const blind::Plan plan = long_plan();
-  const auto force = [&](Unknown unknown, double time_s, double x, double v, double motor_n) {
+  const auto force = [&](Unknown unknown, double time_s, double x, double v) {
     blind::Rig rig = quiet_rig();
     rig.unknown = unknown;
     rig.unknown_size = 0.5;
@@ -129,15 +129,12 @@ TEST(ExtraForces, UnknownOnesFollowTheState) {
     PlantState<double> state;
     state.cart_m = x;
     state.cart_mps = v;
-    return blind::ExtraForces(rig, plan).cart_force_n(time_s, state, motor_n);
+    return blind::ExtraForces(rig, plan).cart_force_n(time_s, state);
   };
-  EXPECT_NEAR(force(Unknown::torque_ripple, 1.0, 0.05, 0.0, 3.0), 1.5, 1e-12);
-  EXPECT_NEAR(force(Unknown::torque_ripple, 1.0, 0.05, 0.0, 0.0), 0.0, 1e-12);
-  EXPECT_NEAR(force(Unknown::velocity_ripple, 1.0, 0.3, 0.05, 3.0), 0.5, 1e-12);
-  EXPECT_NEAR(force(Unknown::force_drift, 0.0, 0.3, 0.0, 3.0), -0.5, 1e-12);
-  EXPECT_NEAR(force(Unknown::force_drift, 450.0, 0.3, 0.0, 3.0), 0.25, 1e-12);
-  EXPECT_EQ(force(Unknown::rough_track, 1.0, 0.03, 0.0, 0.0),
-            force(Unknown::rough_track, 99.0, 0.03, 2.0, 1.0));
+  EXPECT_NEAR(force(Unknown::velocity_ripple, 1.0, 0.3, 0.05), 0.5, 1e-12);
+  EXPECT_NEAR(force(Unknown::force_drift, 0.0, 0.3, 0.0), -0.5, 1e-12);
+  EXPECT_NEAR(force(Unknown::force_drift, 450.0, 0.3, 0.0), 0.25, 1e-12);
+  EXPECT_EQ(force(Unknown::rough_track, 1.0, 0.03, 0.0), force(Unknown::rough_track, 99.0, 0.03, 2.0));
 }
 
 /// A torque turns a pendulum on a locked cart by its law: J theta'' = T, at first.

@@ -143,6 +143,17 @@ const std::map<std::string, std::function<void()>>& answers() {
          EXPECT_NEAR(cart_force(p, 0.0025, 0.0), 0.3, 1e-12);
          EXPECT_NEAR(cart_force(p, 0.0075, 0.0), -0.3, 1e-12);
        }},
+      {"torque_ripple",
+       [] {
+         const Physics p = with("torque_ripple", {0.2, 0.01, 0.0});
+         PlantState<double> s;
+         s.cart_m = 0.0025;
+         s.cart_mps = 0.5;
+         EXPECT_NEAR(p.motor_force(s, 4.0), 1.2 * 4.0 * 1.7189 - 1.44 * 0.5 * 7.682, 1e-12);
+         EXPECT_EQ(p.cart_smooth_force(s, 4.0), p.motor_force(s, 4.0));
+         s.cart_m = 0.0075;
+         EXPECT_NEAR(p.motor_force(s, 4.0), 0.8 * 4.0 * 1.7189 - 0.64 * 0.5 * 7.682, 1e-12);
+       }},
       {"voltage_saturation",
        [] {
          const Physics p = with("voltage_saturation", {10.0});
@@ -250,7 +261,7 @@ INSTANTIATE_TEST_SUITE_P(All, Effect, testing::Range(std::size_t{0}, effect_coun
 });
 
 TEST(Registry, IsWhole) {
-  EXPECT_EQ(effect_count, 31u);
+  EXPECT_EQ(effect_count, 32u);
   std::set<std::string_view> kinds;
   std::size_t offset = 0;
   for (std::size_t i = 0; i < effect_count; ++i) {

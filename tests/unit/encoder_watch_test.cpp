@@ -118,6 +118,18 @@ TEST(EncoderWatch, AssumesFrictionThatIsLargerWhenColdOrUnderLoad) {
   EXPECT_NEAR(a.acceleration_mps2_per_v, 2.0 * 0.8 / 0.8 / 1.5, 1e-9);
 }
 
+TEST(EncoderWatch, AssumesTheMotorWhereItIsWeakest) {
+  Plant plant;
+  plant.cart_mass_kg = 0.8;
+  plant.motor = {2.0, 8.0};
+  plant.set("coulomb_friction", {1.0});
+  plant.set("torque_ripple", {0.2, 0.1, 0.7});
+  const EncoderAssumptions a = encoder_assumptions(plant, 0.4, 15.0, 0.5);
+  EXPECT_NEAR(a.acceleration_mps2_per_v, 2.0 * 0.8 / 0.8 / 1.5, 1e-3);
+  EXPECT_NEAR(a.breakaway_v.low, 1.0 / (2.0 * 1.2) / 1.5, 1e-3);
+  EXPECT_NEAR(a.breakaway_v.high, 1.0 / (2.0 * 0.8) * 1.5, 1e-3);
+}
+
 StatedAssumptions stated_in(const std::string& section) {
   const YamlMap document = YamlMap::from_text("encoder_watch: " + section, "rig.yaml");
   YamlKeyReader reader(document.map("encoder_watch"));

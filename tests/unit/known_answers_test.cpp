@@ -355,6 +355,36 @@ TYPED_TEST(KnownAnswers, CoggingKeepsItsEnergy) {
   EXPECT_NEAR(total(), before, 1e-6 * before);
 }
 
+TYPED_TEST(KnownAnswers, TorqueRippleDoesTheWorkOfItsForce) {
+  constexpr double share = 0.3, pitch_m = 0.01, phase_rad = 0.4, volts = 1.5;
+  Plant plant = free_cart();
+  plant.set("torque_ripple", {share, pitch_m, phase_rad});
+  auto e = this->engine(plant);
+  e.start({});
+  e.advance(0.7, volts);
+  const double x = e.state().cart_m, v = e.state().cart_mps, turn_m = pitch_m / (2.0 * pi);
+  const double ripple_m = share * turn_m * (std::cos(phase_rad) - std::cos(x / turn_m + phase_rad));
+  EXPECT_GT(x, 30.0 * pitch_m);
+  EXPECT_NEAR(0.5 * 0.815 * v * v, 1.7189 * volts * (x + ripple_m), 1e-7);
+}
+
+// m dv/dx = -k (1 + r sin(u))^2, which has an integral.
+TYPED_TEST(KnownAnswers, TorqueRippleIsSquaredInTheBackEmf) {
+  constexpr double share = 0.3, pitch_m = 0.01, phase_rad = 0.4, start_mps = 0.8;
+  Plant plant = paper_plant();
+  plant.pendulum.reset();
+  plant.set("torque_ripple", {share, pitch_m, phase_rad});
+  auto e = this->engine(plant);
+  e.start({0.0, 0.0, start_mps, 0.0});
+  e.advance(0.2, 0.0);
+  const double x = e.state().cart_m, turn_m = pitch_m / (2.0 * pi), u = x / turn_m + phase_rad;
+  const double braking_m = x * (1.0 + 0.5 * share * share) +
+                           2.0 * share * turn_m * (std::cos(phase_rad) - std::cos(u)) -
+                           0.25 * share * share * turn_m * (std::sin(2.0 * u) - std::sin(2.0 * phase_rad));
+  EXPECT_GT(x, 4.0 * pitch_m);
+  EXPECT_NEAR(e.state().cart_mps, start_mps - 7.682 / 0.815 * braking_m, 1e-8);
+}
+
 TYPED_TEST(KnownAnswers, ViscousAsymmetryGivesTwoTerminalVelocities) {
   Plant plant = free_cart();
   plant.set("viscous_friction", {3.0});

@@ -168,9 +168,7 @@ class Dynamics {
   }
 
   /// Force of the motor including back-EMF [N].
-  S motor_force(const PlantState<S>& state, const S& motor_v) const {
-    return base_.force_per_volt_n * motor_v - base_.back_emf_n_per_mps * state.cart_mps;
-  }
+  S motor_force(const PlantState<S>& state, const S& motor_v) const { return motor_force_of(state, motor_v); }
 
   /// The motor force and all smooth forces on the cart, without dry friction and bristles.
   S cart_smooth_force(const PlantState<S>& state, const S& motor_v) const {
@@ -466,8 +464,24 @@ class Dynamics {
   }
 
   template <class T>
+  T motor_force_of(const PlantState<T>& state, const S& motor_v) const {
+    const S push = base_.force_per_volt_n * motor_v;
+    const T drag = base_.back_emf_n_per_mps * state.cart_mps;
+    T force = push - drag;
+    for_each_effect([&]<std::size_t I>() {
+      using E = EffectAt<I>;
+      if constexpr (may_have<I>() && requires { E::motor_ripple(p<I>(), S()); })
+        if (present_.template has<I>()) {
+          const T r = E::motor_ripple(p<I>(), state.cart_m);
+          force = force + r * (push - (r + S(2.0)) * drag);  // 1 + r in the push, squared in the drag
+        }
+    });
+    return force;
+  }
+
+  template <class T>
   T smooth_force(const PlantState<T>& state, const S& motor_v) const {
-    T force = base_.force_per_volt_n * motor_v - base_.back_emf_n_per_mps * state.cart_mps;
+    T force = motor_force_of(state, motor_v);
     for_each_effect([&]<std::size_t I>() {
       using E = EffectAt<I>;
       if constexpr (may_have<I>() && requires { E::cart_force(p<I>(), S(), S()); })

@@ -11,6 +11,7 @@
 //   S cart_dry_level_under(p, motor_n)              its share under a force of the motor of this size [N]
 //   bool has_cart_dry_level(p)                      whether it has one with these parameters (without
 //                                                   this hook: always)
+//   S motor_ripple(p, x)                            change of the motor's constant at x, as a share of it
 //   S pivot_torque(p, omega)                        torque on the pendulum about the pivot [N m]
 //   S pivot_dry_level(p)                            dry level of the pivot [N m]
 //   S actuate(p, volts)                             one stage of the static actuator chain [V], by

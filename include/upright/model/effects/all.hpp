@@ -27,6 +27,7 @@
 #include "upright/model/effects/position_dependent_friction.hpp"
 #include "upright/model/effects/quadratic_drag.hpp"
 #include "upright/model/effects/stribeck_friction.hpp"
+#include "upright/model/effects/torque_ripple.hpp"
 #include "upright/model/effects/viscous_asymmetry.hpp"
 #include "upright/model/effects/viscous_friction.hpp"
 #include "upright/model/effects/voltage_dead_zone.hpp"
@@ -53,6 +54,7 @@ using AllEffects =
                effects::ConstantForce,
                effects::CableSpring,
                effects::CoggingForce,
+               effects::TorqueRipple,
                effects::VoltageSaturation,
                effects::VoltageDeadZone,
                effects::VoltageGain,

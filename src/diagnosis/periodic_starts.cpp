@@ -1,0 +1,121 @@
+#include "periodic_starts.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "candidates.hpp"
+
+namespace upright {
+
+namespace {
+
+/// Sine and cosine of 2 pi f x for a rising frequency: turned by the same angle each time, since the
+/// functions themselves took longer than all else.
+struct Wave {
+  Wave(double x, double frequency, double spacing)
+      : sine(std::sin(2.0 * std::numbers::pi * frequency * x)),
+        cosine(std::cos(2.0 * std::numbers::pi * frequency * x)),
+        turn_sine(std::sin(2.0 * std::numbers::pi * spacing * x)),
+        turn_cosine(std::cos(2.0 * std::numbers::pi * spacing * x)) {}
+
+  void advance() {
+    const double former = sine;
+    sine = sine * turn_cosine + cosine * turn_sine;
+    cosine = cosine * turn_cosine - former * turn_sine;
+  }
+
+  double sine, cosine, turn_sine, turn_cosine;
+};
+
+/// The force of an effect of size one at its crest, to first order.
+double force_of_unit_size(std::size_t effect, const PlaceForce& at) {
+  return effect == effect_index<effects::TorqueRipple>() ? at.ripple_n : 1.0;
+}
+
+/// A sine over the track, fitted to the residual force.
+struct FittedSine {
+  double explained;  ///< of the sum of squares of the residual force [N^2]
+  double size, frequency_per_m, phase_rad;
+};
+
+/// Sines of all frequencies beside a force that has no period: a periodogram over x.
+std::vector<FittedSine> periodogram(const std::vector<PlaceForce>& residual,
+                                    const std::vector<double>& unit_n, double lowest_per_m,
+                                    double highest_per_m, double spacing_per_m) {
+  std::vector<FittedSine> found;
+  std::vector<Wave> waves;
+  waves.reserve(residual.size());
+  for (const PlaceForce& at : residual) waves.emplace_back(at.cart_m, lowest_per_m, spacing_per_m);
+  for (double f = lowest_per_m; f <= highest_per_m; f += spacing_per_m) {
+    double ss = 0.0, sc = 0.0, cc = 0.0, sy = 0.0, cy = 0.0, s1 = 0.0, c1 = 0.0, y1 = 0.0, power = 0.0;
+    for (std::size_t i = 0; i < waves.size(); ++i) {
+      const double unit = unit_n[i], y = residual[i].force_n;
+      const double s = unit * waves[i].sine, c = unit * waves[i].cosine;
+      waves[i].advance();
+      ss += s * s;
+      sc += s * c;
+      cc += c * c;
+      sy += s * y;
+      cy += c * y;
+      s1 += unit * s;
+      c1 += unit * c;
+      y1 += unit * y;
+      power += unit * unit;
+    }
+    ss -= s1 * s1 / power;
+    sc -= s1 * c1 / power;
+    cc -= c1 * c1 / power;
+    sy -= s1 * y1 / power;
+    cy -= c1 * y1 / power;
+    const double determinant = ss * cc - sc * sc;
+    if (!(determinant > 1e-8 * power * power)) continue;
+    const double a = (cc * sy - sc * cy) / determinant, b = (ss * cy - sc * sy) / determinant;
+    found.push_back({a * sy + b * cy, std::hypot(a, b), f, std::atan2(b, a)});
+  }
+  return found;
+}
+
+}  // namespace
+
+bool is_periodic(std::size_t effect) {
+  return std::ranges::any_of(effect_registry()[effect].parameters,
+                             [](const ParameterInfo& parameter) { return parameter.name == "pitch_m"; });
+}
+
+/// An effect counts as one that repeats when a run passes some of its crests. Several runs at different
+/// places pass the same crests together, but each could as well have a force of its own.
+double longest_pitch_m(const DataRange& range, const PriorPolicy& prior) {
+  return std::max(prior.min_longest_pitch_m, range.longest_travel_m / prior.crests_of_pitch);
+}
+
+std::vector<std::vector<double>> periodic_starts(std::size_t effect, const std::vector<PlaceForce>& residual,
+                                                 const DataRange& range, const PriorPolicy& prior,
+                                                 const SearchBudget& budget) {
+  const ParameterInfo& size = effect_registry()[effect].parameters[0];
+  const std::vector<std::vector<double>> any = {{size.typical, 0.02, 0.0}};
+  const double travel = range.cart_high_m - range.cart_low_m;
+  if (residual.size() < budget.min_residual_samples || travel <= 0.0) return any;
+  std::vector<double> unit_n;
+  unit_n.reserve(residual.size());
+  for (const PlaceForce& at : residual) unit_n.push_back(force_of_unit_size(effect, at));
+  const double longest = longest_pitch_m(range, prior);
+  // Frequencies over the track one half-cycle apart, so that no crest is missed.
+  const double spacing = 0.25 / travel;
+  const double shortest = std::max(0.001, 1.0 / (1.0 / longest + budget.max_frequencies * spacing));
+  std::vector<FittedSine> found = periodogram(residual, unit_n, 1.0 / longest, 1.0 / shortest, spacing);
+  std::sort(found.begin(), found.end(),
+            [](const FittedSine& a, const FittedSine& b) { return a.explained > b.explained; });
+  std::vector<std::vector<double>> starts;
+  for (const FittedSine& sine : found) {
+    const bool near = std::any_of(starts.begin(), starts.end(), [&](const std::vector<double>& start) {
+      return std::abs(1.0 / start[1] - sine.frequency_per_m) < 4.0 * spacing;
+    });
+    if (!near)
+      starts.push_back({std::min(sine.size, size.range.high), 1.0 / sine.frequency_per_m, sine.phase_rad});
+    if (starts.size() == budget.max_pitches) break;
+  }
+  return starts.empty() ? any : starts;
+}
+
+}  // namespace upright
