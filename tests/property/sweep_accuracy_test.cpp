@@ -8,6 +8,7 @@
 #include <cstdio>
 #include <random>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "sim/loop/closed_loop.hpp"
@@ -88,9 +89,13 @@ class SweepAccuracy : public testing::TestWithParam<Friction> {
     }
   }
 
+  /// With steps of 100 us the event engine errs by at most 2e-9 in these loops, but by up to 7e-7 with
+  /// smoothed friction of the pivot.
   static EngineOptions tight() {
+    const bool smoothed_pivot = GetParam().smoothing > 0.0 && GetParam().effect != nullptr &&
+                                std::string_view(GetParam().effect) == "pivot_coulomb_friction";
     EngineOptions options;
-    options.max_step_s = 2e-5;
+    options.max_step_s = smoothed_pivot ? 2e-5 : 1e-4;
     return options;
   }
 
