@@ -61,17 +61,21 @@ std::optional<std::size_t> raising(const std::vector<std::size_t>& suspects,
   return raises;
 }
 
-/// The corrections, and the other numbers of the plant file that moved by more than a standard deviation of
-/// what is believed of them.
+/// The numbers of the plant file that moved by more than a standard deviation of what is believed of them.
+/// One that moved less stands for nothing else.
 std::vector<std::size_t> moved_far(const Search& search, const Hypothesis& judged, const ListedModel& model) {
-  std::vector<std::size_t> numbers = model.corrections;
+  std::vector<std::size_t> numbers;
   for (const FreeParameter& p : judged.free) {
     const auto listed = [&](const std::vector<std::size_t>& in) {
       return std::find(in.begin(), in.end(), p.effect) != in.end();
     };
-    if (!search.can_hold(p.effect) || listed(model.effects) || listed(numbers)) continue;
+    if (!search.can_hold(p.effect) || listed(numbers)) continue;
+    const bool corrected = listed(model.corrections);
+    if (listed(model.effects) && !corrected) continue;
+    // Of a correction, the fit believed less.
+    const double believed = p.prior_sigma / (corrected ? search.policy().correction.prior_widening : 1.0);
     const double moved = judged.train.point.plant.find(p.effect)->values[p.index] - p.prior_mean;
-    if (p.prior_sigma > 0.0 && std::abs(moved) > p.prior_sigma) numbers.push_back(p.effect);
+    if (believed > 0.0 && std::abs(moved) > believed) numbers.push_back(p.effect);
   }
   return numbers;
 }

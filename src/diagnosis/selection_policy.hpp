@@ -66,8 +66,9 @@ struct AcceptancePolicy {
   /// fit has not converged and is continued. A smaller ratio can come from noise that is not white. Chosen.
   double unconverged_evidence_ratio = 4.0;
   /// [ln of a ratio] The mean error of simulated held-out segments may grow by this. A tenth is not visible.
-  /// An effect goes if the error with it is larger by this and a standard error. So does a fitted number of
-  /// the plant file. A curve that lowers the error by more shows that something is missing. Chosen.
+  /// An effect goes if the error with it is larger by this and a standard error. So does the fitted value of
+  /// a number that moved further than believed. A curve that lowers the error by more shows that something is
+  /// missing. Chosen.
   double worse_simulation_by_chance = 0.1;
   /// [ln of a ratio] It may also grow by one standard error of its scatter over the segments, which is taken
   /// to be at least this: while another effect is missing, errors change by half in either direction.

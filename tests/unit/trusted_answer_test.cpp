@@ -42,29 +42,35 @@ Measurement run_with(double force_n, unsigned seed, double amplitude_v = 2.0, do
   return measure(rig, plan, "run" + std::to_string(seed));
 }
 
-/// Two runs, the first fitted and the second held out, and a constant force in the model of both.
+/// Two runs, the first fitted and the second held out, with a constant force in the model of both, and
+/// perhaps corrections of numbers of the plant file.
 class Fitted {
  public:
-  explicit Fitted(std::vector<Measurement> runs)
-      : runs_(std::move(runs)), train_{&runs_, {}}, held_{&runs_, {}} {
+  explicit Fitted(std::vector<Measurement> runs, std::vector<std::size_t> corrections = {})
+      : runs_(std::move(runs)), corrections_(std::move(corrections)), train_{&runs_, {}}, held_{&runs_, {}} {
     for (const Segment& segment : cut_segments(runs_))
       (segment.run == 0 ? train_ : held_).segments.push_back(segment);
     search_.emplace(file_plant(), runs_, train_, held_, policy_, budget_);
     Hypothesis base = search_->baseline();
     base.train.point.plant.set(force, std::vector<double>{0.1});
-    final_ = search_->fitted_separately({force}, base, nullptr, true);
+    std::vector<std::size_t> in_model = {force};
+    in_model.insert(in_model.end(), corrections_.begin(), corrections_.end());
+    final_ = search_->fitted_separately(in_model, base, nullptr, true);
     search_->filter_held_out(final_, final_.train.point.noise);
     known_ = search_->fitted_to_all_runs(final_);
   }
   Reproduction reproduction() const { return reproduce(*search_, known_, {force}).front(); }
   bool is_contradicted() const { return upright::is_contradicted(reproduction(), policy_.reproducibility); }
-  Listing listing() { return list_effects(*search_, final_, {.effects = {force}, .corrections = {}}); }
+  Listing listing() {
+    return list_effects(*search_, final_, {.effects = {force}, .corrections = corrections_});
+  }
   double fitted_mass_scale() const { return final_.train.point.plant.find(cart_mass)->values[0]; }
 
  private:
   const SelectionPolicy policy_;
   const SearchBudget budget_;
   std::vector<Measurement> runs_;
+  std::vector<std::size_t> corrections_;
   FitData train_, held_;
   std::optional<Search> search_;
   Hypothesis final_, known_;
@@ -116,6 +122,15 @@ TEST(Listing, NamesANumberOfThePlantFileThatIsBetterAsGiven) {
   EXPECT_FALSE(listing.raises) << "the number goes back first";
   EXPECT_FALSE(
       Fitted({run_with(0.3, 1, 2.0, load_kg), run_with(0.3, 2, 2.0, load_kg)}).listing().number_raises);
+}
+
+/// A mass 2.5 percent off is within what is believed of it, one 25 percent off is not.
+TEST(Listing, KeepsACorrectionWithinWhatIsBelievedOfTheNumber) {
+  for (const double load_kg : {0.02, 0.2}) {
+    Fitted fitted({run_with(0.3, 1, 2.0, load_kg), run_with(0.3, 2)}, {cart_mass});
+    EXPECT_NEAR(fitted.fitted_mass_scale(), 1.0 + load_kg / 0.8, 0.005);
+    EXPECT_EQ(fitted.listing().number_raises.has_value(), load_kg > 0.1);
+  }
 }
 
 TEST(Halves, TakeEverySecondSegmentOfOneRun) {
