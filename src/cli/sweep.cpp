@@ -4,9 +4,11 @@
 #include <atomic>
 #include <csignal>
 #include <cstdio>
+#include <exception>
 #include <iostream>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <thread>
 
@@ -139,8 +141,7 @@ ExitCode estimate_only(const SweepConfig& config, const SweepArguments& argument
   return ExitCode::done;
 }
 
-ExitCode run_here(const SweepArguments& arguments, const MpiExecutor& ranks) {
-  const SweepConfig config = read_sweep_file(arguments.file);
+ExitCode run_here(const SweepConfig& config, const SweepArguments& arguments, const MpiExecutor& ranks) {
   const std::string folder = !arguments.out.empty()
                                  ? arguments.out
                                  : "runs/sweep-" + std::filesystem::path(arguments.file).stem().string();
@@ -175,20 +176,36 @@ ExitCode run_here(const SweepArguments& arguments, const MpiExecutor& ranks) {
                                      ": start the same command again to continue");
 }
 
-/// On the ranks other than the first: it is the first that speaks, of errors too.
-ExitCode run_elsewhere(const SweepArguments& arguments, const MpiExecutor& ranks) {
+/// On the ranks other than the first.
+ExitCode run_elsewhere(const SweepConfig& config, const SweepArguments& arguments, const MpiExecutor& ranks) {
   const StopOnSignal until_the_first_lets_go;
   try {
-    ranks.serve(read_sweep_file(arguments.file), arguments.threads);
+    ranks.serve(config, arguments.threads);
   } catch (const Error& error) {
     return error.code();
   }
   return ExitCode::done;
 }
 
+/// The first rank speaks, of errors too. The others end without one then: mpirun ends the first as soon as
+/// another ends with an error.
 ExitCode run(const SweepArguments& arguments) {
   const MpiExecutor ranks;
-  return ranks.first() ? run_here(arguments, ranks) : run_elsewhere(arguments, ranks);
+  std::optional<SweepConfig> config;
+  std::exception_ptr problem;
+  try {
+    config = read_sweep_file(arguments.file);
+  } catch (const Error&) {
+    problem = std::current_exception();
+  }
+  const int failed = ranks.first_failed(problem != nullptr);
+  if (!ranks.first())
+    return failed == ranks.count() ? run_elsewhere(*config, arguments, ranks) : ExitCode::done;
+  if (problem) std::rethrow_exception(problem);
+  if (failed < ranks.count())
+    throw ConfigError("rank " + std::to_string(failed) + " of mpirun cannot read " + arguments.file +
+                      ": each machine needs the sweep file and its plant at the same path");
+  return run_here(*config, arguments, ranks);
 }
 
 }  // namespace

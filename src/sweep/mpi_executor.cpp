@@ -164,6 +164,14 @@ MpiExecutor::~MpiExecutor() {
   if (initialized != 0) MPI_Finalize();
 }
 
+int MpiExecutor::first_failed(bool failed) const {
+  const int mine = failed ? rank_ : count_;
+  if (count_ == 1) return mine;
+  int lowest = count_;
+  MPI_Allreduce(&mine, &lowest, 1, MPI_INT, MPI_MIN, MPI_COMM_WORLD);
+  return lowest;
+}
+
 std::unique_ptr<SweepExecutor> MpiExecutor::make_executor(const SweepConfig& config, unsigned threads) const {
   if (count_ == 1) return make_thread_executor(config, threads);
   return std::make_unique<RankExecutor>(config, count_, std::max(1u, threads));
@@ -202,6 +210,10 @@ MpiExecutor::MpiExecutor() {
         "mpirun");
 }
 MpiExecutor::~MpiExecutor() = default;
+
+int MpiExecutor::first_failed(bool failed) const {
+  return failed ? rank_ : count_;
+}
 
 std::unique_ptr<SweepExecutor> MpiExecutor::make_executor(const SweepConfig& config, unsigned threads) const {
   return make_thread_executor(config, threads);

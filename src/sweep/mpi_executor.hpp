@@ -20,6 +20,9 @@ class MpiExecutor {
   bool first() const { return rank_ == 0; }
   int count() const { return count_; }
 
+  /// The lowest rank that failed; count() if none did. Waits until each rank has called it.
+  int first_failed(bool failed) const;
+
   /// For the first rank: an executor for all ranks with `threads` threads each (0: one each, or every
   /// processor with a single rank). It must be destroyed before this object: this ends the other ranks.
   std::unique_ptr<SweepExecutor> make_executor(const SweepConfig& config, unsigned threads) const;

@@ -333,10 +333,15 @@ TEST_F(SweepCommand, KeepsTheCountsOfPlantsOverKillAndInterrupt) {
 
 class SweepOverMpi : public SweepCommand {
  protected:
-  CommandResult with_ranks(int ranks, const std::string& arguments) const {
+  static std::string ranks_of(int ranks, const std::string& arguments) {
+    return "-n " + std::to_string(ranks) + " " + shell_quoted(UPRIGHT_BINARY) + " sweep " + arguments;
+  }
+  CommandResult mpirun(const std::string& programs) const {
     return run_shell("ASAN_OPTIONS=detect_leaks=0 " + shell_quoted(UPRIGHT_MPIRUN) +
-                     " --allow-run-as-root --oversubscribe -n " + std::to_string(ranks) + " " +
-                     shell_quoted(UPRIGHT_BINARY) + " sweep " + arguments);
+                     " --allow-run-as-root --oversubscribe " + programs);
+  }
+  CommandResult with_ranks(int ranks, const std::string& arguments) const {
+    return mpirun(ranks_of(ranks, arguments));
   }
 };
 
@@ -368,6 +373,15 @@ TEST_F(SweepOverMpi, SpeaksOnceAndWithTheSameExitCode) {
   const std::size_t first = result.err.find("sweep.yaml:10");
   EXPECT_NE(first, std::string::npos) << result.err;
   EXPECT_EQ(result.err.find("sweep.yaml:10", first + 1), std::string::npos) << result.err;
+}
+
+/// As on a machine that does not have the file.
+TEST_F(SweepOverMpi, SaysWhichOtherRankCannotReadTheFile) {
+  write("4", "fast");
+  const CommandResult result =
+      mpirun(ranks_of(2, file() + " --out " + out("a")) + " : " + ranks_of(1, "no-such-file.yaml"));
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_NE(result.err.find("rank 2 of mpirun cannot read"), std::string::npos) << result.err;
 }
 
 #else
