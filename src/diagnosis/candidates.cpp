@@ -241,11 +241,10 @@ std::vector<std::size_t> candidate_effects(const Plant& plant, const DataRange& 
 }
 
 std::vector<std::vector<double>> search_starts(std::size_t effect, const DataRange& range,
-                                               const std::vector<PlaceForce>& force_residual,
                                                const PriorPolicy& prior, const SearchBudget& budget) {
   const EffectInfo& info = effect_registry()[effect];
   const double speed = range.largest_speed_mps, volts = range.largest_voltage_v;
-  if (is_periodic(effect)) return periodic_starts(effect, force_residual, range, prior, budget);
+  if (is_periodic(effect)) return periodic_starts(effect, {}, range, prior, budget);
   if (is_named(effect, "voltage_saturation"))
     return {{0.9 * volts}, {0.7 * volts}, {0.5 * volts}, {0.3 * volts}};
   if (is_named(effect, "voltage_dead_zone")) return {{0.1}, {0.4}};

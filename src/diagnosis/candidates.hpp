@@ -57,9 +57,8 @@ bool is_plainer(std::size_t a, std::size_t b);
 std::vector<std::size_t> same_force_as(std::size_t effect);
 
 /// Parameter values from which to search for an effect; several where the misfit has several valleys.
-/// `force_residual` shows the pitch of effects that are periodic along the track.
+/// Of an effect that is periodic along the track, any: periodic_starts() knows better.
 std::vector<std::vector<double>> search_starts(std::size_t effect, const DataRange& range,
-                                               const std::vector<PlaceForce>& force_residual,
                                                const PriorPolicy& prior, const SearchBudget& budget);
 
 }  // namespace upright

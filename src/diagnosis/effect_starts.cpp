@@ -62,14 +62,14 @@ bool is_same(const FitPoint& a, const FitPoint& b) {
 
 std::vector<std::vector<double>> EffectStarts::of(std::size_t effect, const DataRange& range,
                                                   const FitData& data, const FitPoint& point) {
-  if (!is_periodic(effect)) return search_starts(effect, range, {}, policy_.prior, budget_);
+  if (!is_periodic(effect)) return search_starts(effect, range, policy_.prior, budget_);
   if (!point_ || !is_same(*point_, point)) {
     residual_ = force_residual(data, point, policy_, budget_.max_residual_samples);
     periodic_.clear();
     point_ = point;
   }
   const auto [at, is_new] = periodic_.try_emplace(effect);
-  if (is_new) at->second = search_starts(effect, range, residual_, policy_.prior, budget_);
+  if (is_new) at->second = periodic_starts(effect, residual_, range, policy_.prior, budget_);
   return at->second;
 }
 

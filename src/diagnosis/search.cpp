@@ -500,7 +500,7 @@ Hypothesis Search::with_effect_free(const Hypothesis& h, std::size_t effect, dou
   }
   if (!there) {
     if (point.plant.find(effect) == nullptr) {
-      std::vector<double> values = search_starts(effect, range_, {}, policy_.prior, budget_).front();
+      std::vector<double> values = search_starts(effect, range_, policy_.prior, budget_).front();
       for (std::size_t i = 0; i < values.size(); ++i)
         if (!std::isnan(info.parameters[i].neutral))
           values[i] =
