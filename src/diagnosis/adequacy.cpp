@@ -4,17 +4,21 @@
 #include <sstream>
 
 #include "plausibility.hpp"
-#include "residual_test_table.hpp"
 
 namespace upright {
 
 ResidualTests examine_fit(const FitData& data, const FitPoint& fitted, const SelectionPolicy& policy,
                           const SearchBudget& budget) {
-  ResidualTests tests = examine_residuals(data, fitted, policy);
+  const Innovations innovations(data, fitted, policy);
+  ResidualTests tests;
+  tests.statistics = innovations.measured();
   FitPoint point = fitted;
   point.noise = sensors_only(fitted.noise);
   const FitResult plain = fit_initial_states(data, point);
   tests.noise_ratio = whitened_rms(plain);
+  tests.beyond_sensors = tests.noise_ratio > policy.residual.sensors_noise_ratio;
+  if (tests.beyond_sensors)
+    tests.p_values = residual_p_values(innovations, tests.statistics, policy.residual);
   point = plain.point;
   point.noise = low_frequency_equivalent(fitted.noise, tests);
   tests.excess = tests.noise_ratio / simulation_floor(data, point, budget.floor_draws).highest;

@@ -144,7 +144,9 @@ class Diagnostician {
     diagnosis.model = model_with(plant_, force.known.train.point.plant, search_.nuisances(), listed);
     diagnosis.numbers = moved_numbers(plant_, diagnosis.model, search_.range(), policy_.prior);
     diagnosis.noise = force.known.train.point.noise;
-    diagnosis.residual = examine_fit(search_.all_data(), force.known.train.point, policy_, budget_).sentence;
+    const ResidualTests left = examine_fit(search_.all_data(), force.known.train.point, policy_, budget_);
+    diagnosis.residual = left.sentence;
+    diagnosis.residual_tests = reported_tests(left, policy_.residual);
     diagnosis.residual_after = smooth_residuals(data_.held, force.judged.held.point, policy_.location.walk);
   }
 
@@ -385,6 +387,7 @@ class Diagnostician {
     }
     result_.gap_after = listing_.after / floor_;
     result_.residual = tests.sentence;
+    result_.residual_tests = reported_tests(tests, policy_.residual);
     const Plant& fitted = fits_.reported().train.point.plant;
     result_.model =
         all.empty() && !numbers_only ? plant_ : model_with(plant_, fitted, search_.nuisances(), all);

@@ -32,6 +32,15 @@ json noise_json(const Noise& noise) {
           {"sensors", number(noise.sensors)}};
 }
 
+json statistic_json(const ResidualStatistic& statistic) {
+  return {{"name", statistic.name},
+          {"value", number(statistic.value)},
+          {"limit", number(statistic.limit)},
+          {"counts", statistic.counts_above ? "above" : "below"},
+          {"p_value", statistic.p_value ? number(*statistic.p_value) : json(nullptr)},
+          {"fails", statistic.fails}};
+}
+
 json trial_json(const Trial& trial) {
   return {{"round", trial.round + 1},
           {"kind", kind_of(trial.effect)},
@@ -220,6 +229,7 @@ json diagnosis_json(const Diagnosis& diagnosis) {
       {"candidates", candidates},
       {"next_experiment", next},
       {"residual", diagnosis.residual},
+      {"residual_tests", list_json(diagnosis.residual_tests, statistic_json)},
       {"noise", noise_json(diagnosis.noise)},
       {"steps", steps},
       {"trials", trials},

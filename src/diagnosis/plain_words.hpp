@@ -33,7 +33,6 @@ inline constexpr FixedPhrase fixed_phrases[] = {
     {"is a disturbance that is the same all along and goes with nothing that was measured",
      "is a disturbance of constant strength that does not depend on any measured quantity"},
     {"as far off as most", "as large as most"},
-    {"may go with", "may depend on"},
     {"goes with", "depends on"},
     {"what is left", "the residual"},
 };

@@ -193,54 +193,39 @@ struct ResidualPolicy {
   /// [sensor noise] A block with less scatter belongs to a cart at rest: within one encoder step it shows no
   /// noise. Chosen.
   double at_rest = 0.1;
-  /// [blocks] Fewer blocks do not show how they scatter. Chosen.
-  std::size_t min_blocks = 20;
   /// [percent] The percentile of block sizes whose ratio to the median is the dispersion. Chosen.
   std::size_t large_block_percentile = 95;
   /// [sensor noise] A white force that moves its sensor by less within a block is indistinguishable from
   /// encoder steps. Its pulses are not tested. Chosen.
   double visible_push = 0.1;
-  /// [pulses] Fewer pulses do not show how large they can be. Chosen.
-  std::size_t min_pulses = 30;
-  /// [1] The RMS of few pulses may exceed the size of most of them by this factor by chance. Chosen.
-  double pulses_by_chance = 1.5;
 
   /// [sensor noise] If a plain simulation has a smaller error, only sensor noise remains and nothing is
   /// tested. Chosen.
   double sensors_noise_ratio = 1.15;
-  /// [standard errors] A dependence of the residual counts from here on. A dozen dependences are tried, and
-  /// chance gives one in two hundred diagnoses. Computed from that number. Also the certainty of heavy tails.
-  double min_dependence = 3.5;
-  /// [1] Above this dispersion (95th percentile of block RMS over the median) the residual comes in bursts.
-  /// Chosen.
-  double bursts = 1.6;
-  /// [1] Dispersion that counts together with a suspected dependence; chance produces either one alone. Of
-  /// 317 cases of the matrix in which nothing was missing, 7 had this dispersion, 12 such a dependence, and
-  /// none had both. Backlash has both.
-  double uneven = 1.3;
-  /// [standard errors] A suspected dependence. It counts only together with another sign.
-  double suspected_dependence = 2.5;
+  /// [1] The probability that chance makes any of the tests significant (Holm). The usual level. A test fails
+  /// only if its statistic is beyond its limit below as well.
+  double level = 0.05;
+  /// [draws] From the fitted model, for the p-values of the tests. The smallest p-value is 1/500 then, a
+  /// third of the level divided by the eight tests.
+  std::size_t draws = 499;
+  /// [standard errors] A smaller dependence of the residual is not looked at: by chance, the largest of a
+  /// dozen exceeds three in one diagnosis of thirty. Chosen.
+  double min_dependence = 3.0;
   /// [1] No sensor is perfect, so a shift of a sensor counts only if it accounts for this share of the
   /// residual. A flexible drive accounted for 27 to 31 percent (aau data).
   double min_sensor_share = 0.05;
-  /// [kurtosis] Above this kurtosis of its pulses a disturbance comes in bursts. A Gaussian has 3. Chosen.
-  double heaviest_tails = 5.5;
-  /// [kurtosis] Kurtosis that counts together with a slow residual, where the data are too few for one sign
-  /// alone. Sensors with rare large errors have heavy tails only; a steady disturbance is slow only. Of 1151
-  /// right answers on the matrix one had both signs, of 15 that missed an unknown effect five.
-  double heavy_tails = 5.0;
-  /// [1] How slow a residual must be to count together with heavy tails.
-  double rather_slow = 1.4;
+  /// [1] A smaller dispersion (95th percentile of block RMS over the median) is too little to count, however
+  /// certain. Chosen.
+  double min_dispersion = 1.3;
+  /// [kurtosis] The same for the kurtosis of short pulses, which is 3 for a Gaussian. Chosen.
+  double min_kurtosis = 4.0;
   /// [1] Over a tenth of a second and more, the residual may be this many times as large as white noise that
-  /// accounts for single samples. A disturbance of 10 Hz reaches at most 1.8 (measured on the matrix); forces
-  /// that depend on the motion reach more.
+  /// accounts for single samples. A disturbance of 10 Hz, which is not white, reaches at most 1.8 (measured
+  /// on the matrix); forces that depend on the motion reach more.
   double slowest = 2.5;
   /// [1] If the residual is less than this many times as large, it comes from the sensor and not from a
-  /// force, because a force is the second derivative of the sensor's value. Backlash gives 0.15 to 0.55,
-  /// right answers 1 and more.
-  double quickest = 0.6;
-  /// [1] The same limit together with a suspected dependence. Between the two values above. Chosen.
-  double rather_quick = 0.75;
+  /// force, because a force is the second derivative of the sensor's value. Backlash gives 0.15 to 0.6.
+  double quickest = 0.75;
   /// [1] A plain simulation may be this many times as far off as the largest of the noise draws, and held-out
   /// runs this many times further. Chosen.
   double max_excess = 2.0;

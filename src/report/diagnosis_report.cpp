@@ -257,6 +257,26 @@ void add_validation(HtmlPage& page, const json& d) {
   page.table(table);
 }
 
+void add_residual_tests(HtmlPage& page, const json& d) {
+  const json tests = d.value("residual_tests", json::array());
+  if (tests.empty()) return;
+  page.section("Residual tests");
+  HtmlTable table{
+      {"statistic", "value", "counts", "p-value", "result"},
+      {},
+      "The p-value is the share of residuals, drawn from the fitted model, that are at least as extreme. "
+      "Something is missing if a value is beyond its limit and chance does not explain it (p-values of all "
+      "tests together: Holm, 5 %)."};
+  for (const json& test : tests) {
+    const json &value = test.at("value"), &p_value = test.at("p_value");
+    table.rows.push_back({test.at("name"), value.is_null() ? "not shown" : number_text(number(value)),
+                          test.at("counts").get<std::string>() + " " + number_text(number(test.at("limit"))),
+                          p_value.is_null() ? "-" : number_text(number(p_value)),
+                          test.at("fails").get<bool>() ? "something is missing" : "as expected"});
+  }
+  page.table(table);
+}
+
 void add_power(HtmlPage& page, const json& d) {
   const json detectable = d.value("detectable", json::array());
   if (detectable.empty()) return;
@@ -528,6 +548,7 @@ std::filesystem::path write_diagnosis_report(const std::filesystem::path& folder
     add_validation(page, d);
     add_traces(page, folder / "traces.csv");
     add_residuals(page, folder / "residuals.csv");
+    add_residual_tests(page, d);
     add_power(page, d);
     add_candidates(page, d);
     add_trials(page, d.value("trials", json::array()));

@@ -1,121 +1,108 @@
 // Both sides of every test of what a fit leaves.
-#include "diagnosis/residual_test_table.hpp"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <limits>
+#include <random>
 #include <set>
 
 #include "diagnosis/plain_words.hpp"
+#include "diagnosis/residual_tests.hpp"
 
 namespace upright {
 namespace {
 
 constexpr ResidualPolicy policy;
+const double smallest_p_value = 1.0 / (static_cast<double>(policy.draws) + 1.0);
 
 /// Beyond the sensors' noise, and like white noise in every other way.
 ResidualTests disturbed() {
   ResidualTests left;
   left.noise_ratio = 10.0;
+  left.statistics.kurtosis = {3.0, 3.0};
+  left.statistics.pulse_size = {1.0, 1.0};
+  left.p_values.assign(residual_test_table().size(), smallest_p_value);
   return left;
 }
 
-std::string failed_id(const ResidualTests& left) {
+std::string failed_name(const ResidualTests& left) {
   const ResidualTest* failed = failed_test(left, policy);
-  return failed != nullptr ? std::string(failed->id) : "";
+  return failed != nullptr ? std::string(failed->name) : "";
 }
 
-/// One statistic at a threshold, with the others as the test needs them.
-struct Threshold {
-  const char* id;
-  const char* statistic;
-  void (*set)(ResidualTests&, double);
+struct Limit {
+  const char* name;
+  void (*set)(InnovationStatistics&, double);
   double value;
   int direction;  ///< 1: fails above, -1: fails below
 };
 
-const Threshold thresholds[] = {
-    {"dependence", "certainty", [](ResidualTests& s, double v) { s.certainty = v; }, policy.min_dependence,
-     1},
-    {"bursts", "dispersion", [](ResidualTests& s, double v) { s.dispersion = v; }, policy.bursts, 1},
-    {"heavy_tails", "kurtosis",
-     [](ResidualTests& s, double v) {
-       s.tails = {v, 4.0};
-     },
-     policy.heaviest_tails, 1},
-    {"heavy_tails", "certainty",
-     [](ResidualTests& s, double v) {
-       s.tails = {6.0, v};
-     },
+const Limit limits[] = {
+    {"dependence on motion, voltage or time", [](InnovationStatistics& s, double v) { s.dependence[3] = v; },
      policy.min_dependence, 1},
-    {"lasting_bursts", "kurtosis",
-     [](ResidualTests& s, double v) {
-       s.tails.kurtosis = v;
-       s.slow_force = 2.0;
-     },
-     policy.heavy_tails, 1},
-    {"lasting_bursts", "slow torque",
-     [](ResidualTests& s, double v) {
-       s.tails.kurtosis = 5.2;
-       s.slow_torque = v;
-     },
-     policy.rather_slow, 1},
-    {"too_slow", "slow force", [](ResidualTests& s, double v) { s.slow_force = v; }, policy.slowest, 1},
-    {"too_slow", "slow torque", [](ResidualTests& s, double v) { s.slow_torque = v; }, policy.slowest, 1},
-    {"too_quick", "quick", [](ResidualTests& s, double v) { s.quick = v; }, policy.quickest, -1},
-    {"rather_quick_with_dependence", "quick",
-     [](ResidualTests& s, double v) {
-       s.quick = v;
-       s.certainty = 3.0;
-     },
-     policy.rather_quick, -1},
-    {"rather_quick_with_dependence", "certainty",
-     [](ResidualTests& s, double v) {
-       s.quick = 0.7;
-       s.certainty = v;
-     },
-     policy.suspected_dependence, 1},
-    {"excess", "excess", [](ResidualTests& s, double v) { s.excess = v; }, policy.max_excess, 1},
-    {"uneven_with_dependence", "dispersion",
-     [](ResidualTests& s, double v) {
-       s.dispersion = v;
-       s.certainty = 3.0;
-     },
-     policy.uneven, 1},
-    {"uneven_with_dependence", "certainty",
-     [](ResidualTests& s, double v) {
-       s.dispersion = 1.5;
-       s.certainty = v;
-     },
-     policy.suspected_dependence, 1},
+    {"dispersion of blocks", [](InnovationStatistics& s, double v) { s.dispersion = v; },
+     policy.min_dispersion, 1},
+    {"kurtosis of pulses of force", [](InnovationStatistics& s, double v) { s.kurtosis[0] = v; },
+     policy.min_kurtosis, 1},
+    {"kurtosis of pulses of torque", [](InnovationStatistics& s, double v) { s.kurtosis[1] = v; },
+     policy.min_kurtosis, 1},
+    {"size of slow force", [](InnovationStatistics& s, double v) { s.pulse_size[0] = v; }, policy.slowest, 1},
+    {"size of slow torque", [](InnovationStatistics& s, double v) { s.pulse_size[1] = v; }, policy.slowest,
+     1},
+    {"least size of slow force", [](InnovationStatistics& s, double v) { s.pulse_size[0] = v; },
+     policy.quickest, -1},
+    {"least size of slow torque", [](InnovationStatistics& s, double v) { s.pulse_size[1] = v; },
+     policy.quickest, -1},
 };
 
-TEST(ResidualTestTable, EachTestFailsJustBeyondItsThresholdOnly) {
-  for (const Threshold& t : thresholds) {
+TEST(ResidualTestTable, EachTestFailsJustBeyondItsLimitOnly) {
+  for (const Limit& limit : limits) {
     ResidualTests at = disturbed(), beyond = disturbed();
-    t.set(at, t.value);
-    t.set(beyond, std::nextafter(t.value, t.direction * std::numeric_limits<double>::infinity()));
-    EXPECT_EQ(failed_id(at), "") << t.id << ", " << t.statistic;
-    EXPECT_EQ(failed_id(beyond), t.id) << t.statistic;
+    limit.set(at.statistics, limit.value);
+    limit.set(beyond.statistics,
+              std::nextafter(limit.value, limit.direction * std::numeric_limits<double>::infinity()));
+    EXPECT_EQ(failed_name(at), "") << limit.name;
+    EXPECT_EQ(failed_name(beyond), limit.name);
     conclude_tests(at, policy);
     conclude_tests(beyond, policy);
-    EXPECT_FALSE(at.structured) << t.id;
-    EXPECT_TRUE(beyond.structured) << t.id;
-    EXPECT_NE(at.sentence, beyond.sentence) << t.id;
+    EXPECT_FALSE(at.structured) << limit.name;
+    EXPECT_TRUE(beyond.structured) << limit.name;
+    EXPECT_NE(at.sentence, beyond.sentence) << limit.name;
+  }
+}
+
+TEST(ResidualTestTable, WhatChanceMakesDoesNotFail) {
+  for (std::size_t i = 0; i < residual_test_table().size(); ++i) {
+    ResidualTests beyond = disturbed();
+    limits[i].set(beyond.statistics, limits[i].direction > 0 ? 100.0 : 0.0);
+    beyond.p_values.assign(residual_test_table().size(), 0.5);
+    EXPECT_EQ(failed_name(beyond), "") << limits[i].name;
+    beyond.p_values[i] = policy.level / static_cast<double>(residual_test_table().size());
+    EXPECT_EQ(failed_name(beyond), limits[i].name);
   }
 }
 
 TEST(ResidualTestTable, EveryTestOfItIsHeldOnBothSides) {
   std::set<std::string> held;
-  for (const Threshold& t : thresholds) held.insert(t.id);
+  for (const Limit& limit : limits) held.insert(limit.name);
   for (const ResidualTest& test : residual_test_table())
-    EXPECT_TRUE(held.contains(std::string(test.id))) << test.id;
+    EXPECT_TRUE(held.contains(std::string(test.name))) << test.name;
+}
+
+TEST(ResidualTestTable, ExcessFailsWithoutDraws) {
+  ResidualTests left = disturbed();
+  left.p_values.clear();
+  left.excess = policy.max_excess;
+  conclude_tests(left, policy);
+  EXPECT_FALSE(left.structured);
+  left.excess = std::nextafter(policy.max_excess, 10.0);
+  conclude_tests(left, policy);
+  EXPECT_TRUE(left.structured);
 }
 
 TEST(ResidualTestTable, NothingIsTestedWithinTheSensorsNoise) {
   ResidualTests left = disturbed();
-  left.certainty = 100.0;
+  left.statistics.dispersion = 100.0;
   left.noise_ratio = policy.sensors_noise_ratio;
   conclude_tests(left, policy);
   EXPECT_FALSE(left.beyond_sensors);
@@ -126,14 +113,38 @@ TEST(ResidualTestTable, NothingIsTestedWithinTheSensorsNoise) {
   EXPECT_TRUE(left.structured);
 }
 
+TEST(Holm, RejectsInTheOrderOfThePValues) {
+  // The example of level 0.05 with 0.01, 0.04, 0.03, 0.005: rejected up to the first above its share.
+  EXPECT_EQ(rejected_by_holm({0.01, 0.04, 0.03, 0.005}, 0.05), (std::vector<bool>{true, false, false, true}));
+  EXPECT_EQ(rejected_by_holm({0.01, 0.02, 0.02, 0.005}, 0.05), (std::vector<bool>{true, true, true, true}));
+  EXPECT_TRUE(rejected_by_holm({}, 0.05).empty());
+  const double none = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_EQ(rejected_by_holm({none, 0.05, none}, 0.05), (std::vector<bool>{false, true, false}));
+}
+
+TEST(Holm, RejectsAnythingOfChanceAsOftenAsItsLevelSays) {
+  std::mt19937_64 random(11);
+  std::uniform_real_distribution<double> uniform;
+  constexpr int repetitions = 20000;
+  constexpr double level = 0.05;
+  int rejections = 0;
+  for (int i = 0; i < repetitions; ++i) {
+    std::vector<double> p_values(8);
+    for (double& p : p_values) p = uniform(random);
+    const std::vector<bool> rejected = rejected_by_holm(p_values, level);
+    if (std::find(rejected.begin(), rejected.end(), true) != rejected.end()) ++rejections;
+  }
+  const double expected = 1.0 - std::pow(1.0 - level / 8.0, 8.0), share = rejections / double{repetitions};
+  EXPECT_NEAR(share, expected, 4.0 * std::sqrt(expected / repetitions));
+}
+
 TEST(PlainWords, ReplaceTheFixedPhrasesOfEveryTest) {
-  ResidualTests left = disturbed();
-  left.depends_on = "speed of the cart";
-  left.certainty = 4.5;
+  InnovationStatistics statistics = disturbed().statistics;
+  statistics.dependence[0] = 4.5;
   for (const ResidualTest& test : residual_test_table()) {
-    const std::string read = in_plain_words(test.sentence(left));
+    const std::string read = in_plain_words(test.sentence(statistics));
     for (const FixedPhrase& phrase : fixed_phrases)
-      EXPECT_EQ(read.find(phrase.fixed), std::string::npos) << test.id << ": " << read;
+      EXPECT_EQ(read.find(phrase.fixed), std::string::npos) << test.name << ": " << read;
   }
   EXPECT_EQ(in_plain_words("what is left goes with speed of the cart (4.5 standard errors)"),
             "the residual depends on speed of the cart (4.5 standard errors)");

@@ -1,9 +1,10 @@
 // What is left of runs of a rig that the model is not, in words.
+#include "diagnosis/residual_tests.hpp"
+
 #include <gtest/gtest.h>
 
 #include "blind_case.hpp"
 #include "diagnosis/plant_scale.hpp"
-#include "diagnosis/residual_test_table.hpp"
 
 namespace upright {
 namespace {
@@ -32,7 +33,8 @@ std::string what_is_left_of(const blind::Rig& rig) {
   const std::vector<Measurement> runs = runs_of(rig);
   const FitData data{&runs, cut_segments(runs)};
   const FitPoint start{cart(), estimate_initial_states(runs, data.segments, cart()), {.force = 0.1}};
-  return examine_residuals(data, fit(data, start, {}).point, {}).depends_on;
+  const InnovationStatistics s = Innovations(data, fit(data, start, {}).point, {}).measured();
+  return name_of_residual_probe(s.named_probe, s.is_positive[s.named_probe]);
 }
 
 std::string with_compliance(double compliance_m_per_n) {
@@ -69,11 +71,11 @@ std::vector<Measurement> enlarged(std::vector<Measurement> runs) {
 }
 
 /// What is left at the plant as given, with a white force of this intensity.
-ResidualTests left_of(const std::vector<Measurement>& runs, const Plant& plant, double force,
-                      const SelectionPolicy& policy) {
+InnovationStatistics left_of(const std::vector<Measurement>& runs, const Plant& plant, double force,
+                             const SelectionPolicy& policy) {
   const FitData data{&runs, cut_segments(runs)};
   const FitPoint given{plant, estimate_initial_states(runs, data.segments, plant), {.force = force}};
-  return examine_residuals(data, given, policy);
+  return Innovations(data, given, policy).measured();
 }
 
 TEST(Structure, SeesTheSameInARigThatIsTenTimesAsLarge) {
@@ -81,10 +83,10 @@ TEST(Structure, SeesTheSameInARigThatIsTenTimesAsLarge) {
   rig.unknown = blind::Unknown::backlash;
   rig.backlash_m = 3e-4;
   const std::vector<Measurement> runs = runs_of(rig);
-  const ResidualTests small = left_of(runs, cart(), 0.1, policy_for(cart()));
-  const ResidualTests large = left_of(enlarged(runs), large_cart(), 100.0, policy_for(large_cart()));
-  EXPECT_EQ(large.depends_on, small.depends_on);
-  EXPECT_NEAR(large.certainty, small.certainty, 1e-3 * small.certainty);
+  const InnovationStatistics small = left_of(runs, cart(), 0.1, policy_for(cart()));
+  const InnovationStatistics large = left_of(enlarged(runs), large_cart(), 100.0, policy_for(large_cart()));
+  EXPECT_EQ(large.named_probe, small.named_probe);
+  EXPECT_NEAR(large.largest_dependence(), small.largest_dependence(), 1e-3 * small.largest_dependence());
   EXPECT_NEAR(large.dispersion, small.dispersion, 1e-3 * small.dispersion);
 }
 
@@ -108,20 +110,68 @@ TEST(PlantScale, IsOneWhereAPlantHasNoneOfItsOwn) {
   for (const double one : {scale.length, scale.speed, scale.voltage, scale.force}) EXPECT_EQ(one, 1.0);
 }
 
-/// Beyond the sensors' noise, by so much that a verdict is due.
-bool is_more_than_noise(double kurtosis, double slow_force) {
-  ResidualTests left;
-  left.noise_ratio = 10.0;
-  left.tails = {kurtosis, 2.0};
-  left.slow_force = slow_force;
-  conclude_tests(left, {});
-  return left.structured;
+/// A cart that a white force pushes, examined at the plant and the noise that made it.
+Innovations of_white_force(const std::vector<Measurement>& runs, const blind::Rig& rig) {
+  const FitData data{&runs, cut_segments(runs)};
+  const FitPoint start{rig.plant, estimate_initial_states(runs, data.segments, rig.plant), {.force = 0.1}};
+  return {data, fit(data, start, {}).point, {}};
 }
 
-TEST(Structure, TakesForcesThatLastAndComeInBurstsForMoreThanNoise) {
-  EXPECT_FALSE(is_more_than_noise(3.0, 1.8)) << "a steady disturbance";
-  EXPECT_FALSE(is_more_than_noise(7.0, 1.0)) << "a sensor that errs now and then";
-  EXPECT_TRUE(is_more_than_noise(6.0, 1.8));
+/// How many draws are at least as large as another draw of the same model.
+double share_as_large(const std::vector<double>& draws, double value) {
+  return static_cast<double>(
+             std::count_if(draws.begin(), draws.end(), [&](double d) { return d >= value; })) /
+         static_cast<double>(draws.size());
+}
+
+TEST(Bootstrap, DrawsWhatTheModelWouldShow) {
+  const blind::Rig rig{.plant = cart(), .disturbance_n = 0.05};
+  const std::vector<Measurement> runs = runs_of(rig);
+  const Innovations innovations = of_white_force(runs, rig);
+  double power = 0.0, dispersion = 0.0;
+  constexpr int count = 200;
+  for (int i = 1; i <= count; ++i) {
+    const InnovationStatistics s = innovations.drawn(static_cast<std::uint64_t>(i));
+    power += s.pulse_size[0] / count;
+    dispersion += s.dispersion / count;
+    EXPECT_EQ(s.dispersion, innovations.drawn(static_cast<std::uint64_t>(i)).dispersion);
+  }
+  EXPECT_NEAR(power, 1.0, 0.05) << "a pulse of white noise has its standard error";
+  EXPECT_GT(dispersion, 1.0);
+  EXPECT_LT(dispersion, 1.3);
+}
+
+TEST(Bootstrap, FindsBacklashAndNotWhiteForce) {
+  blind::Rig rig{.plant = cart(), .disturbance_n = 0.05};
+  const auto fails = [&] {
+    const std::vector<Measurement> runs = runs_of(rig);
+    const Innovations innovations = of_white_force(runs, rig);
+    ResidualTests tests;
+    tests.noise_ratio = 10.0;
+    tests.statistics = innovations.measured();
+    tests.p_values = residual_p_values(innovations, tests.statistics, {});
+    return failed_test(tests, {}) != nullptr;
+  };
+  EXPECT_FALSE(fails());
+  rig.unknown = blind::Unknown::backlash;
+  rig.backlash_m = 5e-4;
+  EXPECT_TRUE(fails());
+}
+
+TEST(Bootstrap, EndsEarlyWhereChanceIsPlain) {
+  const blind::Rig rig{.plant = cart(), .disturbance_n = 0.05};
+  const std::vector<Measurement> runs = runs_of(rig);
+  const Innovations innovations = of_white_force(runs, rig);
+  const InnovationStatistics usual = innovations.drawn(12345);
+  EXPECT_TRUE(residual_p_values(innovations, usual, {}).empty()) << "nothing is beyond a limit";
+  ResidualPolicy strict;
+  strict.min_kurtosis = 0.0;
+  const std::vector<double> p_values = residual_p_values(innovations, usual, strict);
+  ASSERT_EQ(p_values.size(), residual_test_table().size());
+  std::vector<double> kurtosis;
+  for (std::uint64_t seed = 1; seed <= strict.draws; ++seed)
+    kurtosis.push_back(innovations.drawn(seed).kurtosis[0]);
+  EXPECT_NEAR(p_values[2], share_as_large(kurtosis, usual.kurtosis[0]), 0.15) << "of fewer draws";
 }
 
 }  // namespace

@@ -157,6 +157,17 @@ struct Step {
   std::vector<Effect> effects;  ///< every effect of the model then
 };
 
+/// A statistic of what the model leaves, compared with draws from the model. Something is missing where it is
+/// beyond its limit and the p-value is too small for chance.
+struct ResidualStatistic {
+  std::string name;               ///< what is tested
+  double value = 0.0;             ///< of the innovations; NaN: the data do not show it
+  double limit = 0.0;             ///< what counts is beyond it
+  bool counts_above = true;       ///< whether that is above the limit, or below
+  std::optional<double> p_value;  ///< absent: no statistic was beyond its limit, so none was computed
+  bool fails = false;             ///< something is missing
+};
+
 /// A safe run that would distinguish them.
 struct NextExperiment {
   std::string name;         ///< of the experiment
@@ -190,6 +201,7 @@ struct Diagnosis {
   Noise noise;                                    ///< as estimated with the model
   std::vector<std::string> notes;                 ///< how the data were read and split
   std::string residual;                           ///< description of the remaining residual
+  std::vector<ResidualStatistic> residual_tests;  ///< empty: the residual is the sensors' own noise
   std::vector<std::size_t> held_out_runs;         ///< runs that no fit saw
   std::vector<std::string> run_names;             ///< of all runs, in their order
   std::vector<QuantityRange> measured_range;      ///< of all runs: beyond it the model is not tested
