@@ -93,10 +93,10 @@ constexpr std::array table = {
     ResidualTest{"dispersion of blocks", dispersion, above, &P::min_dispersion, comes_in_bursts},
     ResidualTest{"kurtosis of pulses of force", kurtosis<0>, above, &P::min_kurtosis, has_heavy_tails<0>},
     ResidualTest{"kurtosis of pulses of torque", kurtosis<1>, above, &P::min_kurtosis, has_heavy_tails<1>},
-    ResidualTest{"size of slow force", pulse_size<0>, above, &P::slowest, is_too_slow<0>},
-    ResidualTest{"size of slow torque", pulse_size<1>, above, &P::slowest, is_too_slow<1>},
-    ResidualTest{"least size of slow force", pulse_size<0>, below, &P::quickest, is_too_quick<0>},
-    ResidualTest{"least size of slow torque", pulse_size<1>, below, &P::quickest, is_too_quick<1>}};
+    ResidualTest{"size of slow force, too large", pulse_size<0>, above, &P::slowest, is_too_slow<0>},
+    ResidualTest{"size of slow torque, too large", pulse_size<1>, above, &P::slowest, is_too_slow<1>},
+    ResidualTest{"size of slow force, too small", pulse_size<0>, below, &P::quickest, is_too_quick<0>},
+    ResidualTest{"size of slow torque, too small", pulse_size<1>, below, &P::quickest, is_too_quick<1>}};
 
 /// For each test that the data allow, how many draws are as extreme as what was measured.
 class Exceedances {

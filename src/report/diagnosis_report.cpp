@@ -266,7 +266,7 @@ void add_residual_tests(HtmlPage& page, const json& d) {
       {},
       "The p-value is the share of residuals, drawn from the fitted model, that are at least as extreme. "
       "Something is missing if a value is beyond its limit and chance does not explain it (p-values of all "
-      "tests together: Holm, 5 %)."};
+      "tests together: Holm, 5 %). A dash: no value is beyond its limit, so none was computed."};
   for (const json& test : tests) {
     const json &value = test.at("value"), &p_value = test.at("p_value");
     table.rows.push_back({test.at("name"), value.is_null() ? "not shown" : number_text(number(value)),

@@ -46,12 +46,13 @@ const Limit limits[] = {
      policy.min_kurtosis, 1},
     {"kurtosis of pulses of torque", [](InnovationStatistics& s, double v) { s.kurtosis[1] = v; },
      policy.min_kurtosis, 1},
-    {"size of slow force", [](InnovationStatistics& s, double v) { s.pulse_size[0] = v; }, policy.slowest, 1},
-    {"size of slow torque", [](InnovationStatistics& s, double v) { s.pulse_size[1] = v; }, policy.slowest,
-     1},
-    {"least size of slow force", [](InnovationStatistics& s, double v) { s.pulse_size[0] = v; },
+    {"size of slow force, too large", [](InnovationStatistics& s, double v) { s.pulse_size[0] = v; },
+     policy.slowest, 1},
+    {"size of slow torque, too large", [](InnovationStatistics& s, double v) { s.pulse_size[1] = v; },
+     policy.slowest, 1},
+    {"size of slow force, too small", [](InnovationStatistics& s, double v) { s.pulse_size[0] = v; },
      policy.quickest, -1},
-    {"least size of slow torque", [](InnovationStatistics& s, double v) { s.pulse_size[1] = v; },
+    {"size of slow torque, too small", [](InnovationStatistics& s, double v) { s.pulse_size[1] = v; },
      policy.quickest, -1},
 };
 
