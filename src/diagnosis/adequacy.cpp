@@ -16,8 +16,7 @@ ResidualTests examine_fit(const FitData& data, const FitPoint& fitted, const Sel
   point.noise = sensors_only(fitted.noise);
   const FitResult plain = fit_initial_states(data, point);
   tests.noise_ratio = whitened_rms(plain);
-  tests.beyond_sensors = tests.noise_ratio > policy.residual.sensors_noise_ratio;
-  if (tests.beyond_sensors)
+  if (is_beyond_sensors(tests, policy.residual))
     tests.p_values = residual_p_values(innovations, tests.statistics, policy.residual);
   point = plain.point;
   point.noise = low_frequency_equivalent(fitted.noise, tests);

@@ -4,7 +4,9 @@
 #include <cmath>
 #include <random>
 #include <string_view>
+#include <utility>
 
+#include "base/median.hpp"
 #include "reversal.hpp"
 #include "tails.hpp"
 
@@ -135,14 +137,10 @@ bool is_visible(const Measurement& run, const LinearStep& step, const Noise& noi
   return push * std::sqrt(block_s * block_s * block_s / 3.0) > policy.visible_push * sensor;
 }
 
-/// Standard deviation of numbers that are Gaussian but for a few.
+/// Standard deviation of at least one number, all of which are Gaussian but for a few.
 double robust_deviation(std::vector<double> values) {
-  if (values.empty()) return 0.0;
   for (double& v : values) v = std::abs(v);
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  constexpr double median_of_gaussian = 0.6745;
-  return *middle / median_of_gaussian;
+  return median_of(std::move(values)) / median_of_gaussian_magnitudes;
 }
 
 Score sum_of(const std::vector<Score>& scores) {

@@ -23,14 +23,14 @@ inline constexpr std::size_t residual_probe_count = 14;
 /// Arrays of two are of short pulses: a force on the cart and a torque on the pendulum. NaN where none of
 /// them would move its sensor.
 struct InnovationStatistics {
+  static constexpr double not_shown = std::numeric_limits<double>::quiet_NaN();
   /// [1] 95th percentile of the blocks' rms over its median. 1 if there are no blocks.
   double dispersion = 1.0;
   /// [1] Of the pulses, fitted block by block; 3 for a Gaussian.
-  std::array<double, 2> kurtosis{std::numeric_limits<double>::quiet_NaN(),
-                                 std::numeric_limits<double>::quiet_NaN()};
+  std::array<double, 2> kurtosis{not_shown, not_shown};
   /// [1] Over a tenth of a second and more: the size of most pulses over that which white noise that accounts
   /// for single samples makes of them.
-  std::array<double, 2> pulse_size = kurtosis;
+  std::array<double, 2> pulse_size{not_shown, not_shown};
   /// [standard errors] How certainly the innovations go with each probe; 0 of a shift of a sensor that
   /// accounts for too little.
   std::array<double, residual_probe_count> dependence{};

@@ -65,6 +65,9 @@ std::string is_too_quick(const Statistics& s) {
               " times as large as noise that accounts for single samples makes it, so it is in what the "
               "sensors show");
 }
+bool is_excessive(const ResidualTests& tests, const ResidualPolicy& policy) {
+  return tests.excess > policy.max_excess;
+}
 std::string simulates_too_far_off(const ResidualTests& tests) {
   return text("a plain simulation is ", tests.excess,
               " times as far off as noise like what is left makes it at most");
@@ -129,13 +132,6 @@ class Exceedances {
 };
 
 }  // namespace
-
-double ResidualTests::slow_force() const {
-  return std::max(1.0, statistics.pulse_size[0]);
-}
-double ResidualTests::slow_torque() const {
-  return std::max(1.0, statistics.pulse_size[1]);
-}
 
 bool ResidualTest::is_as_extreme(double value, double as) const {
   return beyond == Beyond::above ? value >= as : value <= as;
@@ -216,12 +212,16 @@ std::vector<ResidualStatistic> reported_tests(const ResidualTests& tests, const 
                       policy.max_excess,
                       true,
                       {},
-                      tests.excess > policy.max_excess});
+                      is_excessive(tests, policy)});
   return reported;
 }
 
+bool is_beyond_sensors(const ResidualTests& tests, const ResidualPolicy& policy) {
+  return tests.noise_ratio > policy.sensors_noise_ratio;
+}
+
 void conclude_tests(ResidualTests& tests, const ResidualPolicy& policy) {
-  tests.beyond_sensors = tests.noise_ratio > policy.sensors_noise_ratio;
+  tests.beyond_sensors = is_beyond_sensors(tests, policy);
   if (!tests.beyond_sensors) {
     tests.sentence = "what is left is the sensors' own noise";
     return;
@@ -229,7 +229,7 @@ void conclude_tests(ResidualTests& tests, const ResidualPolicy& policy) {
   if (const ResidualTest* failed = failed_test(tests, policy)) {
     tests.structured = true;
     tests.sentence = failed->sentence(tests.statistics);
-  } else if (tests.excess > policy.max_excess) {
+  } else if (is_excessive(tests, policy)) {
     tests.structured = true;
     tests.sentence = simulates_too_far_off(tests);
   } else {
@@ -238,10 +238,14 @@ void conclude_tests(ResidualTests& tests, const ResidualPolicy& policy) {
 }
 
 Noise low_frequency_equivalent(Noise noise, const ResidualTests& tests) {
-  noise.force *= tests.slow_force();
-  noise.coloured_force_n *= tests.slow_force();
-  noise.torque *= tests.slow_torque();
-  noise.coloured_torque_nm *= tests.slow_torque();
+  // A disturbance whose colour the filter does not know is estimated where the samples show it best, and a
+  // plain simulation is moved by what is slow. Where no pulses show it, the noise stays.
+  const double slow_force = std::fmax(1.0, tests.statistics.pulse_size[0]);
+  const double slow_torque = std::fmax(1.0, tests.statistics.pulse_size[1]);
+  noise.force *= slow_force;
+  noise.coloured_force_n *= slow_force;
+  noise.torque *= slow_torque;
+  noise.coloured_torque_nm *= slow_torque;
   return noise;
 }
 

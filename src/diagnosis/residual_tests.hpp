@@ -29,10 +29,6 @@ struct ResidualTests {
   bool beyond_sensors = false;  ///< it is more than the sensors' own noise
   bool structured = false;      ///< and more than a disturbance: something is missing
   std::string sentence;
-
-  /// How much larger slow force and torque are than white noise that accounts for the samples. At least 1.
-  double slow_force() const;
-  double slow_torque() const;
 };
 
 /// One statistic of the innovations. Something is missing where it is beyond its limit and chance does not
@@ -68,6 +64,9 @@ std::vector<bool> failed_tests(const ResidualTests& tests, const ResidualPolicy&
 
 /// The first test that fails; null where none does.
 const ResidualTest* failed_test(const ResidualTests& tests, const ResidualPolicy& policy);
+
+/// Whether what is left is more than the sensors' own noise; within that, nothing is tested.
+bool is_beyond_sensors(const ResidualTests& tests, const ResidualPolicy& policy);
 
 /// Whether what is left is more than noise, in a sentence, once p-values and excess are known.
 void conclude_tests(ResidualTests& tests, const ResidualPolicy& policy);

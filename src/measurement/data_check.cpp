@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "base/angle_units.hpp"
+#include "base/median.hpp"
 #include "column_timing.hpp"
 #include "data_hypotheses.hpp"
 #include "dataset_file.hpp"
@@ -374,9 +375,7 @@ double usual_rate(const Measurement& run, const std::vector<double>& values) {
   for (std::size_t k = 1; k < values.size(); ++k)
     rates.push_back(std::abs(values[k] - values[k - 1]) / (run.time_s[k] - run.time_s[k - 1]));
   if (rates.empty()) return 0.0;
-  const auto middle = rates.begin() + static_cast<std::ptrdiff_t>(rates.size() / 2);
-  std::nth_element(rates.begin(), middle, rates.end());
-  return *middle;
+  return median_of(std::move(rates));
 }
 
 /// What no such rig does, in words; empty where it may be a rig.

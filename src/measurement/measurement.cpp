@@ -4,7 +4,9 @@
 #include <array>
 #include <cmath>
 #include <optional>
+#include <utility>
 
+#include "base/median.hpp"
 #include "column_delay.hpp"
 #include "dataset_file.hpp"
 #include "experiment/experiment_file.hpp"
@@ -373,18 +375,15 @@ double find_noise(const std::vector<double>& values) {
   for (std::size_t k = 4; k < values.size(); ++k)
     fourth.push_back(std::abs(values[k] - 4.0 * values[k - 1] + 6.0 * values[k - 2] - 4.0 * values[k - 3] +
                               values[k - 4]));
-  const auto middle = fourth.begin() + static_cast<std::ptrdiff_t>(fourth.size() / 2);
-  std::nth_element(fourth.begin(), middle, fourth.end());
-  constexpr double median_to_sigma = 1.0 / 0.6745;
-  return *middle * median_to_sigma / std::sqrt(70.0);  // the squares of 1 4 6 4 1 add up to 70
+  constexpr double median_to_sigma = 1.0 / median_of_gaussian_magnitudes;
+  return median_of(std::move(fourth)) * median_to_sigma /
+         std::sqrt(70.0);  // the squares of 1 4 6 4 1 add up to 70
 }
 
 double Measurement::median_period_s() const {
   std::vector<double> steps;
   for (std::size_t k = 1; k < time_s.size(); ++k) steps.push_back(time_s[k] - time_s[k - 1]);
-  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
-  std::nth_element(steps.begin(), middle, steps.end());
-  return *middle;
+  return median_of(std::move(steps));
 }
 
 double Measurement::cart_noise_m() const {

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/median.hpp"
+
 namespace upright {
 
 namespace {
@@ -45,12 +47,6 @@ std::vector<std::size_t> windows_of(const Measurement& run) {
   return firsts;
 }
 
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 }  // namespace
 
 std::optional<ScatteredStamps> find_scatter(const Measurement& run) {
@@ -68,7 +64,7 @@ std::optional<ScatteredStamps> find_scatter(const Measurement& run) {
     // A step is the difference of two stamps.
     scatters.push_back(std::sqrt(0.5 * squares / static_cast<double>(rows - 1)));
   }
-  ScatteredStamps found{median(periods), median(scatters)};
+  ScatteredStamps found{median_of(periods), median_of(scatters)};
   // Over the whole record the stamps scatter least, where no rows are missing.
   const double mean_s = (run.time_s.back() - run.time_s.front()) / static_cast<double>(run.size() - 1);
   if (std::abs(mean_s - found.period_s) < same_period * found.period_s) found.period_s = mean_s;

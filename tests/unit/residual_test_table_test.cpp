@@ -1,6 +1,7 @@
 // Both sides of every test of what a fit leaves.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <random>

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "blind_case.hpp"
 #include "diagnosis/plant_scale.hpp"
 
