@@ -39,6 +39,9 @@ std::vector<Case> link_cases() {
     return c;
   };
   const Expectation lost = stops({"link_lost", "stale_encoder"}, watchdog_s + period_s);
+  // Where no reply comes in time, each cycle waits for the whole timeout. The rest of its period must be
+  // longer than what the tests excuse as a stall of the machine.
+  const Changes no_reply = {{"response_timeout_s: 0.003", "response_timeout_s: 0.001"}};
   return {
       one_in_20("late", "--inject-late-every", {"--inject-late-ms", "7"}),
       one_in_20("drop", "--inject-drop-every"),
@@ -46,9 +49,11 @@ std::vector<Case> link_cases() {
       one_in_20("stale", "--inject-stale-every"),
       one_in_20("reorder", "--inject-reorder-every"),
       {{.fault = "silent", .expectation = lost, .begins = Begins::at_the_start},
-       {"--inject-drop-every", "1"}},
+       {"--inject-drop-every", "1"},
+       no_reply},
       {{.fault = "always_late", .expectation = lost, .begins = Begins::at_the_start},
-       {"--inject-late-every", "1", "--inject-late-ms", "300"}},
+       {"--inject-late-every", "1", "--inject-late-ms", "300"},
+       no_reply},
       {{.fault = "cut", .expectation = lost}, {"--inject-cut-after", after}},
       {{.fault = "restart", .expectation = stops({"rig_fault"}, period_s)},
        {"--inject-restart-after", after}},

@@ -15,7 +15,7 @@ class Stage:
 
 
 FAST = (r"upright run (?=--rig my-rig)", "upright run --fast --theta0-deg 5 ")
-FAST_EXPERIMENT = (r"upright experiment \S+ (?=--rig my-rig)", r"\g<0>--fast ")
+FAST_EXPERIMENT = (r"upright experiment .*(?=--rig my-rig)", r"\g<0>--fast ")
 SHORT_DOCTOR = (r"upright doctor (?=--rig)", "upright doctor --seconds 0.2 --hand-wait 0.1 ")
 # The verdict is bad on a machine that cannot do real time.
 DOCTOR = r"upright doctor .*"
