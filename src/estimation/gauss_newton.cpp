@@ -106,10 +106,25 @@ double GaussNewton::evaluate() {
   return objective_of_normals() + prior_.objective(point_.plant);
 }
 
+/// By how much a segment's objective rises with a step.
+double GaussNewton::rise_of(std::size_t s) const {
+  return linearised_[s].normal.likelihood.objective() - former_[s].normal.likelihood.objective();
+}
+
+/// Replaces the start of a segment if its objective is lower from the other one.
+void GaussNewton::take_start_if_better(std::size_t s, const PlantState<double>& alternative) {
+  const PlantState<double> former_start = std::exchange(point_.starts[s], alternative);
+  LinearisedSegment former = std::exchange(linearised_[s], {});
+  linearise(s);
+  if (linearised_[s].normal.likelihood.objective() < former.normal.likelihood.objective()) return;
+  point_.starts[s] = former_start;
+  linearised_[s] = std::move(former);
+}
+
 /// The same after a step. Infinity where one segment, in which the cart sticks or slides for all the others
 /// say, is further off than the others can make up for: the rest are not looked at, and it is looked at first
 /// from then on.
-double GaussNewton::evaluate_step(double predicted_reduction) {
+double GaussNewton::evaluate_step(const Step& taken, double predicted_reduction) {
   constexpr double out_of_reach = 3.0;
   count_work();
   const std::size_t none = order_.size();
@@ -118,9 +133,8 @@ double GaussNewton::evaluate_step(double predicted_reduction) {
     if (rejecting_segment != none) return;
     const std::size_t s = order_[i];
     linearise(s);
-    const double rise =
-        linearised_[s].normal.likelihood.objective() - former_[s].normal.likelihood.objective();
-    if (!(rise < out_of_reach * predicted_reduction)) rejecting_segment = i;
+    if (!(rise_of(s) < predicted_reduction)) take_start_if_better(s, taken.starts_at_held_speed[s]);
+    if (!(rise_of(s) < out_of_reach * predicted_reduction)) rejecting_segment = i;
   });
   if (rejecting_segment == none) return objective_of_normals() + prior_.objective(point_.plant);
   const auto place = order_.begin() + static_cast<std::ptrdiff_t>(rejecting_segment.load());
@@ -174,9 +188,9 @@ double GaussNewton::try_steps(double objective, double min_fall, double& damping
     // not even promise to fall.
     constexpr double alike = 0.9;
     if (promises && next.predicted_reduction < alike * rejected) {
-      point_ = std::move(next.point);
+      point_ = next.point;
       linearised_.swap(former_);
-      next_objective = evaluate_step(std::max(next.predicted_reduction, min_fall));
+      next_objective = evaluate_step(next, std::max(next.predicted_reduction, min_fall));
       if (next_objective < objective) break;
       point_ = former;
       linearised_.swap(former_);
@@ -255,12 +269,14 @@ GaussNewton::Information GaussNewton::information() const {
 /// state.
 GaussNewton::Step GaussNewton::step(double damping) const {
   const ReducedEquations reduced = eliminate_initial_states(damping);
-  Step result{point_};
+  Step result{point_, {}};
   Eigen::VectorXd delta = bounded_step(reduced, damping, result.cut_short);
   move_parameters(delta, result);
   const Eigen::VectorXd to_belief = -prior_.information() * prior_.deviation(point_.plant);
   result.predicted_reduction = promise(prior_.information(), to_belief, delta);
   convert_initial_states(result.point.starts, point_.plant, result.point.plant);
+  result.starts_at_held_speed = result.point.starts;
+  move_start_positions(delta, result);
   move_initial_states(reduced, delta, result);
   return result;
 }
@@ -295,6 +311,24 @@ void GaussNewton::move_initial_states(const ReducedEquations& reduced, const Eig
     }
     result.predicted_reduction +=
         promise(linearised_[s].normal.information, linearised_[s].normal.score, way);
+  }
+}
+
+/// Moves the initial positions after the parameters, and no speed. A cart that soon comes to rest stops at a
+/// distance that grows with the square of its initial speed. Near zero this speed has next to no derivative,
+/// so that a step of it can be far too long.
+void GaussNewton::move_start_positions(const Eigen::VectorXd& delta, Step& result) const {
+  constexpr int positions = 2;
+  for (std::size_t s = 0; s < linearised_.size(); ++s) {
+    const NormalEquations& n = linearised_[s].normal;
+    Eigen::Matrix2d information = n.information.topLeftCorner<positions, positions>();
+    for (int i = 0; i < positions; ++i) information(i, i) += start_information[i];
+    const Eigen::Vector2d score =
+        n.score.head<positions>() -
+        n.information.topRightCorner(state_count, delta.size()).topRows<positions>() * delta;
+    const Eigen::Vector2d way = information.ldlt().solve(score);
+    const auto values = as_array(result.starts_at_held_speed[s]);
+    for (int i = 0; i < positions; ++i) *values[static_cast<std::size_t>(i)] += way[i];
   }
 }
 

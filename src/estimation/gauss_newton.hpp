@@ -35,6 +35,7 @@ class GaussNewton {
 
   struct Step {
     FitPoint point;
+    std::vector<PlantState<double>> starts_at_held_speed;  ///< an alternative for each segment
     double predicted_reduction = 0.0;  ///< of the objective, were the residuals linear
     bool cut_short = false;            ///< at a bound, or for its length
   };
@@ -76,7 +77,9 @@ class GaussNewton {
 
   void linearise(std::size_t s);
   void count_work();
-  double evaluate_step(double predicted_reduction);
+  double evaluate_step(const Step& taken, double predicted_reduction);
+  double rise_of(std::size_t s) const;
+  void take_start_if_better(std::size_t s, const PlantState<double>& alternative);
   double objective_of_normals() const;
   double sample_count() const;
   double try_steps(double objective, double min_fall, double& damping);
@@ -84,6 +87,7 @@ class GaussNewton {
   Step step(double damping) const;
   void move_parameters(Eigen::VectorXd& delta, Step& result) const;
   void move_initial_states(const ReducedEquations& reduced, const Eigen::VectorXd& delta, Step& result) const;
+  void move_start_positions(const Eigen::VectorXd& delta, Step& result) const;
   Eigen::VectorXd bounded_step(const ReducedEquations& reduced, double damping, bool& cut_short) const;
   Eigen::VectorXd solve_for(const std::vector<Eigen::Index>& moving, const ReducedEquations& reduced,
                             double damping) const;

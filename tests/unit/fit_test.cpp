@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "blind_case.hpp"
 
 namespace upright {
@@ -80,6 +82,39 @@ TEST(Fit, FindsTheMostLikelyNoise) {
         EXPECT_GT(fit(data, beside, {}, noise_held).objective, found.objective - 1.0) << seed;
       }
     EXPECT_NEAR(found.point.noise.jitter_s, rig.jitter_s, 0.25 * rig.jitter_s) << seed;
+  }
+}
+
+// The initial speed of a cart at rest is near zero, where it has next to no derivative.
+TEST(Fit, ConvergesFromFarAwayWhereTheCartRests) {
+  Plant plant = cart_alone();
+  plant.set("coulomb_friction", {1.0});
+  const std::size_t coulomb = effect_number("coulomb_friction");
+  const std::vector<FreeParameter> free = {{.effect = coulomb, .high = 10.0}};
+  for (const std::uint64_t seed : {1, 2, 3, 4}) {
+    const blind::Rig rig{.plant = plant, .disturbance_n = 0.03, .cart_step_m = 0.0, .cart_noise_m = 1e-4};
+    std::vector<Measurement> runs;
+    for (const blind::Experiment experiment : {blind::Experiment::coast, blind::Experiment::multisine}) {
+      blind::Plan plan;
+      plan.experiment = experiment;
+      plan.rate_hz = 125.0;
+      plan.duration_s = experiment == blind::Experiment::coast ? 24.0 : 6.0;
+      plan.seed = seed;
+      runs.push_back(measure(rig, plan, "run"));
+    }
+    const FitData data{&runs, cut_segments(runs)};
+    std::vector<PlantState<double>> starts = estimate_initial_states(runs, data.segments, plant);
+    for (std::size_t s = 0; s < starts.size(); ++s)
+      if (data.segments[s].run == 0 && s > 1) starts[s].cart_mps = s % 2 == 0 ? 2e-5 : -2e-5;
+    std::vector<double> found;
+    for (const double force_n : {1.0, 0.2, 2.0}) {
+      Plant wrong = plant;
+      wrong.set("coulomb_friction", {force_n});
+      const FitResult fitted = fit(data, {wrong, starts, {.force = 0.1}}, free);
+      found.push_back(fitted.objective);
+      EXPECT_NEAR(fitted.point.plant.find(coulomb)->values[0], 1.0, 0.05) << seed << " from " << force_n;
+    }
+    EXPECT_LT(*std::max_element(found.begin(), found.end()), found[0] + 2.0) << seed;
   }
 }
 
