@@ -106,7 +106,7 @@ Rows collect(const FitData& data, const std::vector<ResidualTrace>& traces, cons
 }
 
 /// Cross-validated share of the variance of y that the features predict, and the feature most correlated with
-/// y.
+/// y. The share is negative where they predict worse than nothing, and zero where y is.
 std::pair<double, std::size_t> explained_share(const Rows& rows, const std::vector<double>& y,
                                                const LocationPolicy& policy) {
   const std::size_t n = y.size();
@@ -160,8 +160,9 @@ ResidualLocation locate_residual(const FitData& data, const FitPoint& point, con
   const Rows rows = collect(data, smooth_residuals(data, point, policy.location.walk), policy);
   const auto [force_share, force_feature] = explained_share(rows, rows.force, policy.location);
   const auto [torque_share, torque_feature] = explained_share(rows, rows.torque, policy.location);
-  if (force_share >= torque_share) return {false, std::max(force_share, 0.0), feature_names[force_feature]};
-  return {true, std::max(torque_share, 0.0), feature_names[torque_feature]};
+  if (!(std::max(force_share, torque_share) > 0.0)) return {};
+  if (force_share >= torque_share) return {false, force_share, feature_names[force_feature]};
+  return {true, torque_share, feature_names[torque_feature]};
 }
 
 }  // namespace upright

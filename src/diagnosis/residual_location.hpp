@@ -12,8 +12,8 @@ namespace upright {
 /// force and torque on velocity, direction, position, voltage, time, ..., judged on segments it has not seen.
 struct ResidualLocation {
   bool in_pendulum = false;
-  double share = 0.0;  ///< of its variance that can be predicted
-  std::string depends_on;
+  double share = 0.0;      ///< of its variance that can be predicted
+  std::string depends_on;  ///< empty: on nothing that was measured
 };
 ResidualLocation locate_residual(const FitData& data, const FitPoint& point, const SelectionPolicy& policy);
 

@@ -248,10 +248,14 @@ std::string StepwiseSelection::locate(const Hypothesis& h) const {
   const Measurement& run = (*train.runs)[segment.run];
   std::ostringstream text;
   text.precision(3);
-  text << "in the " << (place.in_pendulum ? "pendulum" : "cart") << " equation: the residual "
-       << (place.in_pendulum ? "torque" : "force") << " goes with " << place.depends_on << " ("
-       << std::lround(100.0 * place.share) << " percent of it can be predicted); the worst stretch is "
-       << run.name << " from " << run.time_s[segment.first] << " to " << run.time_s[segment.last] << " s";
+  if (place.depends_on.empty())
+    text << "the residual does not depend on any measured quantity";
+  else
+    text << "in the " << (place.in_pendulum ? "pendulum" : "cart") << " equation: the residual "
+         << (place.in_pendulum ? "torque" : "force") << " goes with " << place.depends_on << " ("
+         << std::lround(100.0 * place.share) << " percent of it can be predicted)";
+  text << "; the worst stretch is " << run.name << " from " << run.time_s[segment.first] << " to "
+       << run.time_s[segment.last] << " s";
   return text.str();
 }
 
