@@ -410,13 +410,14 @@ void StepwiseSelection::take(int round, Finalist& best, const std::vector<Screen
                                    [&](const ScreenedCandidate& s) { return s.effect == effect; });
   for (const ScreenedCandidate& s : screened)
     if (s.effect != effect &&
-        (s.gain > policy_.acceptance.resembling_share * winner->gain || is_half_of(s.effect, effect)))
+        (s.gain > policy_.acceptance.resembling_share * winner->gain || is_contained_in(s.effect, effect)))
       similar_effects_[effect].push_back(s.effect);
   record_step();
 }
 
-bool StepwiseSelection::is_half_of(std::size_t half, std::size_t effect) {
-  return kind_of(effect) == "friction_asymmetry" && kind_of(half) == "coulomb_friction";
+bool StepwiseSelection::is_contained_in(std::size_t part, std::size_t effect) {
+  return kind_of(part) == "coulomb_friction" &&
+         (kind_of(effect) == "friction_asymmetry" || kind_of(effect) == "stribeck_friction");
 }
 
 bool StepwiseSelection::exchange() {
@@ -433,8 +434,8 @@ bool StepwiseSelection::exchange() {
     const double to_beat = search_.on_screening_subset(current_).train.objective - penalty_of(effect);
     const double worth = search_.on_screening_subset(without).train.objective - to_beat;
     for (const std::size_t other : others) {
-      // The other half of the force may be found later.
-      if (!is_half_of(other, effect)) exchanged_.insert({effect, other});
+      // The rest of the force may be found later, as another effect.
+      if (!is_contained_in(other, effect)) exchanged_.insert({effect, other});
       Hypothesis h = search_.screened(without, other);
       // What was found beside the one is of the wrong size for the other: the way is longer than a few steps.
       if (h.train.objective + penalty_of(other) < to_beat + budget_.exchange_share * worth)

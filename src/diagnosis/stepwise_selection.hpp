@@ -149,8 +149,9 @@ class StepwiseSelection {
   /// the last is exchanged for what had resembled it, where that does better now, or as well and is plainer.
   /// Whether one was.
   bool exchange();
-  /// Dry friction in one direction only is Coulomb friction with a constant force as large.
-  static bool is_half_of(std::size_t half, std::size_t effect);
+  /// Dry friction in one direction only is Coulomb friction with a constant force as large. A Stribeck curve
+  /// whose velocity is far above the motion is Coulomb friction.
+  static bool is_contained_in(std::size_t part, std::size_t effect);
   /// What an effect that the plant file lacks may be in plain words, with the values at which it is nearly
   /// the same force.
   struct Simpler {
