@@ -36,8 +36,8 @@ class GaussNewton {
   struct Step {
     FitPoint point;
     std::vector<PlantState<double>> starts_at_held_speed;  ///< an alternative for each segment
-    double predicted_reduction = 0.0;  ///< of the objective, were the residuals linear
-    bool cut_short = false;            ///< at a bound, or for its length
+    double predicted_reduction = 0.0;                      ///< of the objective, were the residuals linear
+    bool cut_short = false;                                ///< at a bound, or for its length
   };
 
   /// Linearises at the present point; its objective.
