@@ -288,8 +288,8 @@ bool stable_without_delay(Plant plant, ControlConfig config, double smoothing) {
 
 Plant large_motion_plant(const Plant& plant) {
   Plant large = sliding_plant(plant);
-  large.remove(effect_number("cogging_force"));
-  large.remove(effect_number("torque_ripple"));
+  for (std::size_t effect = 0; effect < effect_count; ++effect)
+    if (is_periodic(effect)) large.remove(effect);
   return large;
 }
 

@@ -54,7 +54,7 @@ LoopMargin sampled_margin(const Plant& plant, const ControlConfig& config, doubl
                           bool confirm = true, ExtraDelay extra = ExtraDelay::known);
 
 /// The plant in the limit of motions far larger than stick-slip and cogging: without dry friction, and
-/// without cogging and torque ripple, which average out over their pitch.
+/// without effects that repeat along the track, which average out over their pitch.
 Plant large_motion_plant(const Plant& plant);
 
 /// The additional delay of a run for which its gains still stabilise the pendulum. It is computed for the

@@ -78,11 +78,6 @@ std::vector<FittedSine> periodogram(const std::vector<PlaceForce>& residual,
 
 }  // namespace
 
-bool is_periodic(std::size_t effect) {
-  return std::ranges::any_of(effect_registry()[effect].parameters,
-                             [](const ParameterInfo& parameter) { return parameter.name == "pitch_m"; });
-}
-
 /// An effect counts as one that repeats when a run passes some of its crests. Several runs at different
 /// places pass the same crests together, but each could as well have a force of its own.
 double longest_pitch_m(const DataRange& range, const PriorPolicy& prior) {

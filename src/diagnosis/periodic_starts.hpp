@@ -18,9 +18,6 @@ struct PlaceForce {
   double ripple_n;  ///< that a torque ripple of the whole motor's constant would add there
 };
 
-/// Whether an effect repeats along the track with a pitch of its own.
-bool is_periodic(std::size_t effect);
-
 /// The longest pitch [m] of such an effect that these data can show.
 double longest_pitch_m(const DataRange& range, const PriorPolicy& prior);
 

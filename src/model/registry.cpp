@@ -1,5 +1,7 @@
 #include "upright/model/registry.hpp"
 
+#include <algorithm>
+
 namespace upright {
 
 namespace {
@@ -28,6 +30,11 @@ std::size_t effect_number(std::string_view kind) {
 
 std::size_t effect_parameter_offset(std::size_t effect) {
   return offsets.at(effect);
+}
+
+bool is_periodic(std::size_t effect) {
+  return std::ranges::any_of(infos.at(effect).parameters,
+                             [](const ParameterInfo& parameter) { return parameter.name == "pitch_m"; });
 }
 
 }  // namespace upright

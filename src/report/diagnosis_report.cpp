@@ -1,7 +1,6 @@
 #include "diagnosis_report.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstdlib>
 #include <limits>
@@ -468,21 +467,26 @@ void add_residuals(HtmlPage& page, const std::filesystem::path& file) {
   }
 }
 
-/// The rules that decide about adding an effect (diagnosis/decision.hpp), and their reasons.
-constexpr std::array<std::array<const char*, 2>, 15> rules = {
-    {{"shown_throughout", "accepted: evidence and t value are above their limits"},
-     {"overwhelming", "accepted: the evidence is above 1000"},
-     {"plant_numbers", "accepted: with it, numbers of the plant file move less"},
-     {"held_out_in_doubt", "accepted only if no other effect is: the held-out runs speak against it"},
-     {"simulation_in_doubt", "accepted only if no other effect is: held-out segments simulate worse with it"},
-     {"cannot_be", "rejected: its size is zero or physically impossible"},
-     {"bends_another", "rejected: another effect would become physically impossible"},
-     {"too_little_evidence", "rejected: the evidence is too small"},
-     {"held_out_against", "rejected: the held-out runs speak against it"},
-     {"chance", "rejected: the t value is too small, so the gain can be chance"},
-     {"uncertain_size", "rejected: its size is too uncertain"},
-     {"simulates_worse", "rejected: held-out segments simulate worse with it"},
-     {"undecided", "the search ended before the decision"}}};
+struct RuleReason {
+  const char* rule;
+  const char* reason;
+};
+
+/// The rules that decide about adding an effect (diagnosis/decision.hpp).
+constexpr RuleReason rules[] = {
+    {"shown_throughout", "accepted: evidence and t value are above their limits"},
+    {"overwhelming", "accepted: the evidence is above 1000"},
+    {"plant_numbers", "accepted: with it, numbers of the plant file move less"},
+    {"held_out_in_doubt", "accepted only if no other effect is: the held-out runs speak against it"},
+    {"simulation_in_doubt", "accepted only if no other effect is: held-out segments simulate worse with it"},
+    {"cannot_be", "rejected: its size is zero or physically impossible"},
+    {"bends_another", "rejected: another effect would become physically impossible"},
+    {"too_little_evidence", "rejected: the evidence is too small"},
+    {"held_out_against", "rejected: the held-out runs speak against it"},
+    {"chance", "rejected: the t value is too small, so the gain can be chance"},
+    {"uncertain_size", "rejected: its size is too uncertain"},
+    {"simulates_worse", "rejected: held-out segments simulate worse with it"},
+    {"undecided", "the search ended before the decision"}};
 
 void add_trials(HtmlPage& page, const json& trials) {
   HtmlTable fits{

@@ -65,6 +65,9 @@ std::size_t effect_number(std::string_view kind);
 /// Offset of the parameters of an effect in the array of all parameters.
 std::size_t effect_parameter_offset(std::size_t effect);
 
+/// Whether an effect repeats along the track with a pitch of its own: one of its parameters is `pitch_m`.
+bool is_periodic(std::size_t effect);
+
 /// A set of effects known at run time.
 struct EffectSet {
   std::uint64_t mask = 0;  ///< bit I: effect I is in the set
