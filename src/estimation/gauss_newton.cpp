@@ -123,7 +123,7 @@ void GaussNewton::take_start_if_better(std::size_t s, const PlantState<double>& 
 
 /// The same after a step. Infinity where one segment, in which the cart sticks or slides for all the others
 /// say, is further off than the others can make up for: the rest are not looked at, and it is looked at first
-/// from then on.
+/// from then on. A start at held speed keeps one segment from stopping all others; alone, its step is damped.
 double GaussNewton::evaluate_step(const Step& taken, double predicted_reduction) {
   constexpr double out_of_reach = 3.0;
   count_work();
@@ -133,7 +133,8 @@ double GaussNewton::evaluate_step(const Step& taken, double predicted_reduction)
     if (rejecting_segment != none) return;
     const std::size_t s = order_[i];
     linearise(s);
-    if (!(rise_of(s) < predicted_reduction)) take_start_if_better(s, taken.starts_at_held_speed[s]);
+    if (none > 1 && !(rise_of(s) < predicted_reduction))
+      take_start_if_better(s, taken.starts_at_held_speed[s]);
     if (!(rise_of(s) < out_of_reach * predicted_reduction)) rejecting_segment = i;
   });
   if (rejecting_segment == none) return objective_of_normals() + prior_.objective(point_.plant);
