@@ -56,10 +56,7 @@ def commands_of(program):
 
 
 def number_of(expression):
-    """A number of C++ as readers write it; a ratio as it stands; a limit that is also another's by the name of that one."""
-    shared = re.fullmatch(r"\w+\{\}\.(\w+)", expression)
-    if shared:
-        return f"as `{shared[1]}`"
+    """A number of C++ as readers write it; of a ratio, as it stands."""
     return f"{float(expression):g}" if re.fullmatch(r"[\d.e+-]+", expression) else re.sub(r"(\d)\.0\b", r"\1", expression)
 
 

@@ -52,8 +52,8 @@ std::optional<std::size_t> outdone_by_coloured_noise(const Search& search, const
     if (search.is_nuisance(found.effect) || white_evidence(found) > policy.overwhelming_evidence) continue;
     if (!null) null.emplace(search, known);
     const double evidence = null->evidence_of(found.effect);
-    const bool holds = evidence > policy.min_evidence &&
-                       null->certainty_of(found.effect) > search.policy().certainty.min_certainty;
+    const bool holds =
+        evidence > policy.min_evidence && null->certainty_of(found.effect) > policy.min_certainty;
     if (holds || !(evidence < least)) continue;
     least = evidence;
     worst = found.effect;

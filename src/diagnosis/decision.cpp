@@ -26,105 +26,136 @@ double saving_of(const Evidence& e, const Improvement& improvement) {
 }
 
 /// What a few moments hold has a small t on the training runs. Held-out runs are a witness of their own,
-/// whose evidence adds to its square.
-double combined_t(const Improvement& improvement) {
-  if (!(improvement.t_value > 0.0)) return improvement.t_value;
+/// whose evidence adds to its square, unless the training runs say no more than chance does.
+double combined_t(const Improvement& improvement, const AcceptancePolicy& p) {
+  if (!(improvement.t_value > p.chance_t)) return improvement.t_value;
   return std::sqrt(improvement.t_value * improvement.t_value + std::max(improvement.held, 0.0));
+}
+
+/// Whether training and held-out runs both speak for it, and together beyond doubt.
+bool is_borne_out(double saving, const Improvement& improvement, const AcceptancePolicy& p) {
+  return std::min(saving, improvement.held) > p.min_evidence_of_each &&
+         saving + improvement.held > p.min_evidence_together;
 }
 
 /// Evidence on the training runs that only something missing can hold against: held-out runs may excite what
 /// is missing still, and speak against a right effect until it is found too.
-bool is_overwhelming(const Evidence& e, const SelectionPolicy& p) {
-  return saving_of(e, e.improvement) > p.acceptance.overwhelming_evidence &&
-         e.improvement.t_value > p.certainty.min_t;
+bool is_overwhelming(const Evidence& e, const AcceptancePolicy& p) {
+  return saving_of(e, e.improvement) > p.overwhelming_evidence && e.improvement.t_value > p.min_t;
 }
 
 /// Whether the data show an effect at all.
-Decision decide_shown(const Evidence& e, const Improvement& improvement, const SelectionPolicy& p) {
+Decision decide_shown(const Evidence& e, const Improvement& improvement, const AcceptancePolicy& p) {
   const double saving = saving_of(e, improvement);
-  if (saving < p.acceptance.min_evidence) return rejected(Rule::too_little_evidence);
+  const double t = combined_t(improvement, p);
+  if (is_borne_out(saving, improvement, p) && t > p.min_t) return accepted(Rule::borne_out);
+  if (saving < p.min_evidence) return rejected(Rule::too_little_evidence);
   // Held-out data that do not excite the effect say nothing.
-  if (!(improvement.held > -p.acceptance.held_out_indifference)) return rejected(Rule::held_out_against);
-  if (combined_t(improvement) > p.certainty.min_t) return accepted(Rule::shown_throughout);
-  if (saving > p.acceptance.overwhelming_evidence) return accepted(Rule::overwhelming);
+  if (!(improvement.held > -p.held_out_indifference)) return rejected(Rule::held_out_against);
+  if (t > p.min_t) return accepted(Rule::shown_throughout);
+  if (saving > p.overwhelming_evidence) return accepted(Rule::overwhelming);
   // Numbers of the plant that need not be so far off are no matter of noise.
-  if (improvement.prior - e.penalty > p.acceptance.min_evidence) return accepted(Rule::plant_numbers);
-  return rejected(Rule::chance);
+  if (improvement.prior - e.penalty > p.min_evidence) return accepted(Rule::plant_numbers);
+  if (!(improvement.t_value > p.min_t_of_sensors && improvement.held > p.equally_good_evidence))
+    return rejected(Rule::chance);
+  // Where nothing but the sensors' noise is left, its evidence needs no other witness.
+  if (!e.simulated_gap) return waiting(MissingFit::simulation);
+  return *e.simulated_gap < p.sensors_gap ? accepted(Rule::sensors_noise_left) : rejected(Rule::chance);
 }
 
-bool has_certain_size(const Evidence& e, const SelectionPolicy& p) {
-  return e.certainty >= p.certainty.min_certainty;
+/// Whether the size of an effect is certain. A fit that is less certain than its evidence says has not
+/// arrived.
+Decision decide_certain(const Evidence& e, const Improvement& improvement, const AcceptancePolicy& p) {
+  const auto enough = [&](double certainty) { return certainty >= p.min_certainty; };
+  if (enough(e.certainty)) return accepted(Rule::shown_throughout);
+  if (is_borne_out(saving_of(e, improvement), improvement, p)) {
+    if (!e.certainty_of_all_runs) return waiting(MissingFit::all_runs);
+    if (enough(*e.certainty_of_all_runs)) return accepted(Rule::borne_out);
+  }
+  if (improvement.train < p.unconverged_evidence_ratio * std::max(e.certainty * e.certainty, 1.0))
+    return rejected(Rule::uncertain_size);
+  if (!e.certainty_converged) return waiting(MissingFit::converged);
+  return enough(*e.certainty_converged) ? accepted(Rule::shown_throughout) : rejected(Rule::uncertain_size);
 }
 
 /// The last question of a change that is accepted otherwise, by `rule`. Forces that look right a sample ahead
 /// can simulate badly: then the name is wrong.
-Decision decide_simulation(const Evidence& e, Rule rule, const SelectionPolicy& p) {
+Decision decide_simulation(const Evidence& e, Rule rule, const AcceptancePolicy& p) {
   if (!e.simulated_segments) return waiting(MissingFit::simulated_segments);
   const SimulationChange& change = *e.simulated_segments;
   if (change.segments == 0) return accepted(rule);
-  const double by_chance =
-      p.acceptance.worse_simulation_by_chance + change.standard_error(p.acceptance.min_simulation_scatter);
+  const double by_chance = p.worse_simulation_by_chance + change.standard_error(p.min_simulation_scatter);
   return change.mean < by_chance ? accepted(rule) : rejected(Rule::simulates_worse);
 }
 
-Decision decide_addition(const Evidence& e, const SelectionPolicy& p) {
+bool is_open(const Decision& decision) {
+  return decision.waits_for != MissingFit::none;
+}
+
+Decision decide_addition(const Evidence& e, const AcceptancePolicy& p) {
   if (!e.plausible) return rejected(Rule::cannot_be);
   if (e.bends_another) return rejected(Rule::bends_another);
   Decision shown = decide_shown(e, e.improvement, p);
+  if (is_open(shown)) return shown;
   if (!shown.accepted) {
     if (!is_overwhelming(e, p)) return shown;
-    return rejected(has_certain_size(e, p) ? Rule::held_out_in_doubt : Rule::uncertain_size);
+    const Decision certain = decide_certain(e, e.improvement, p);
+    if (is_open(certain) || !certain.accepted) return certain;
+    return rejected(Rule::held_out_in_doubt);
   }
   // A better estimate of the noise is not taken for an effect.
-  if (e.with_low_noise || e.improvement.train < p.acceptance.overwhelming_evidence) {
+  if (e.with_low_noise || e.improvement.train < p.overwhelming_evidence) {
     if (!e.at_equal_noise) return waiting(MissingFit::equal_noise);
     shown = decide_shown(e, *e.at_equal_noise, p);
     if (!shown.accepted) return shown;
   }
-  if (!e.is_correction && !has_certain_size(e, p)) return rejected(Rule::uncertain_size);
+  if (!e.is_correction) {
+    const Decision certain = decide_certain(e, e.at_equal_noise.value_or(e.improvement), p);
+    if (!certain.accepted) return certain;
+  }
   const Decision simulated = decide_simulation(e, shown.rule, p);
   const bool doubtful = simulated.rule == Rule::simulates_worse && is_overwhelming(e, p);
   return doubtful ? rejected(Rule::simulation_in_doubt) : simulated;
 }
 
 /// What stands in the place of another must be possible, certain, and simulate as well.
-Decision decide_stand_in(const Evidence& e, Rule rule, const SelectionPolicy& p) {
+Decision decide_stand_in(const Evidence& e, Rule rule, const AcceptancePolicy& p) {
   if (!e.plausible) return rejected(Rule::cannot_be);
-  if (!has_certain_size(e, p)) return rejected(Rule::uncertain_size);
+  if (e.certainty < p.min_certainty) return rejected(Rule::uncertain_size);
   return decide_simulation(e, rule, p);
 }
 
-Decision decide_exchange(const Evidence& e, const SelectionPolicy& p) {
+Decision decide_exchange(const Evidence& e, const SelectionPolicy& policy) {
+  const AcceptancePolicy& p = policy.acceptance;
   const double saving = saving_of(e, e.improvement), held = e.improvement.held;
-  const bool as_good = std::min({saving, held, saving + held}) > -p.acceptance.equally_good_evidence;
-  const bool better = saving > p.certainty.min_evidence() && held > 0.0;
+  const bool as_good = std::min({saving, held, saving + held}) > -p.equally_good_evidence;
+  const bool better = saving > policy.distinction.indistinguishable_evidence && held > 0.0;
   if (!better && !(as_good && e.is_plainer)) return rejected(Rule::no_better);
   return decide_stand_in(e, better ? Rule::better : Rule::plainer, p);
 }
 
-Decision decide_simplification(const Evidence& e, const SelectionPolicy& p) {
+Decision decide_simplification(const Evidence& e, const AcceptancePolicy& p) {
   if (!(saving_of(e, e.improvement) > 0.0)) return rejected(Rule::no_better);
-  if (!(e.improvement.held > -p.acceptance.equally_good_evidence)) return rejected(Rule::held_out_against);
+  if (!(e.improvement.held > -p.equally_good_evidence)) return rejected(Rule::held_out_against);
   return decide_stand_in(e, Rule::plainer, p);
 }
 
-Decision decide_pair(const Evidence& e, const SelectionPolicy& p) {
-  if (saving_of(e, e.improvement) < p.acceptance.min_evidence) return rejected(Rule::too_little_evidence);
+Decision decide_pair(const Evidence& e, const AcceptancePolicy& p) {
+  if (saving_of(e, e.improvement) < p.min_evidence) return rejected(Rule::too_little_evidence);
   if (e.improvement.held < 0.0) return rejected(Rule::held_out_against);
   return decide_stand_in(e, Rule::better, p);
 }
 
-Decision decide_keeping(const Evidence& e, const SelectionPolicy& p) {
-  if (saving_of(e, e.improvement) > p.acceptance.min_evidence &&
-      e.improvement.t_value > p.acceptance.kept_t_share * p.certainty.min_t)
+Decision decide_keeping(const Evidence& e, const AcceptancePolicy& p) {
+  if (saving_of(e, e.improvement) > p.min_evidence && e.improvement.t_value > p.kept_t_share * p.min_t)
     return accepted(Rule::still_shown);
   const Decision shown = decide_shown(e, e.improvement, p);
-  if (shown.accepted) return shown;
+  if (is_open(shown) || shown.accepted) return shown;
   // What does without it by becoming what cannot be does not do without it.
   return e.bends_another ? accepted(Rule::needed_by_another) : shown;
 }
 
-Decision decide_trust(const Evidence& e, const SelectionPolicy& p) {
+Decision decide_trust(const Evidence& e, const AcceptancePolicy& p) {
   if (!(e.improvement.held > 0.0)) return rejected(Rule::held_out_against);
   return decide_simulation(e, Rule::held_out_agree, p);
 }
@@ -156,10 +187,14 @@ std::string_view name_of(Rule rule) {
       return "undecided";
     case Rule::shown_throughout:
       return "shown_throughout";
+    case Rule::borne_out:
+      return "borne_out";
     case Rule::overwhelming:
       return "overwhelming";
     case Rule::plant_numbers:
       return "plant_numbers";
+    case Rule::sensors_noise_left:
+      return "sensors_noise_left";
     case Rule::better:
       return "better";
     case Rule::plainer:
@@ -197,17 +232,17 @@ std::string_view name_of(Rule rule) {
 Decision decide(const Evidence& evidence, const SelectionPolicy& policy) {
   switch (evidence.change) {
     case Change::add:
-      return decide_addition(evidence, policy);
+      return decide_addition(evidence, policy.acceptance);
     case Change::exchange:
       return decide_exchange(evidence, policy);
     case Change::simplify:
-      return decide_simplification(evidence, policy);
+      return decide_simplification(evidence, policy.acceptance);
     case Change::pair:
-      return decide_pair(evidence, policy);
+      return decide_pair(evidence, policy.acceptance);
     case Change::keep:
-      return decide_keeping(evidence, policy);
+      return decide_keeping(evidence, policy.acceptance);
     case Change::trust_added:
-      return decide_trust(evidence, policy);
+      return decide_trust(evidence, policy.acceptance);
   }
   return {};
 }

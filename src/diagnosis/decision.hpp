@@ -55,24 +55,29 @@ struct Evidence {
 
   // From fits that only some rules ask for.
   std::optional<Improvement> at_equal_noise;  ///< over the model from the same noise
+  std::optional<double> simulated_gap;        ///< of held-out data [sensor noise]
   std::optional<SimulationChange> simulated_segments;
+  std::optional<double> certainty_of_all_runs;
+  std::optional<double> certainty_converged;  ///< once more fits gain nothing
 };
 
 /// A fit that a decision waits for.
-enum class MissingFit { none, equal_noise, simulated_segments };
+enum class MissingFit { none, equal_noise, simulation, simulated_segments, all_runs, converged };
 
 /// Why a change was accepted, or why not.
 enum class Rule {
   undecided,
   // Accepted.
-  shown_throughout,   ///< evidence on the training runs, all along them
-  overwhelming,       ///< evidence that no coloured noise makes
-  plant_numbers,      ///< numbers of the plant need not be so far off
-  better,             ///< than what it stands for
-  plainer,            ///< as good, and fewer words
-  still_shown,        ///< beside the others
-  needed_by_another,  ///< without it another becomes what cannot be
-  held_out_agree,     ///< in the end
+  shown_throughout,    ///< evidence on the training runs, all along them
+  borne_out,           ///< training and held-out runs both say so
+  overwhelming,        ///< evidence that no coloured noise makes
+  plant_numbers,       ///< numbers of the plant need not be so far off
+  sensors_noise_left,  ///< nothing else is left that could have made it
+  better,              ///< than what it stands for
+  plainer,             ///< as good, and fewer words
+  still_shown,         ///< beside the others
+  needed_by_another,   ///< without it another becomes what cannot be
+  held_out_agree,      ///< in the end
   // Not accepted.
   cannot_be,
   bends_another,

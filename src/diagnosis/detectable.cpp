@@ -42,11 +42,11 @@ double usual_size(std::size_t effect, const Search& search) {
 }  // namespace
 
 double standard_errors_to_be_shown(std::size_t effect, bool is_correction, const SelectionPolicy& policy) {
-  if (is_correction) return policy.certainty.min_certainty + policy.power.power_z;
+  if (is_correction) return policy.correction.min_z + policy.power.power_z;
   const AcceptancePolicy& p = policy.acceptance;
   const auto more = static_cast<double>(effect_registry()[effect].parameters.size() - 1);
   // The evidence of an effect is the square of its size in standard errors.
-  return std::max(policy.certainty.min_certainty, std::sqrt(p.min_evidence + p.parameter_penalty * more)) +
+  return std::max(p.min_certainty, std::sqrt(p.min_evidence + p.parameter_penalty * more)) +
          policy.power.power_z;
 }
 

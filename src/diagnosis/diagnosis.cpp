@@ -270,7 +270,7 @@ class Diagnostician {
     if (options_.quick && withdraw_doubtful()) return true;
     const Reproduction* worst = nullptr;
     for (const Reproduction& r : reproductions_)
-      if (is_contradicted(r, policy_.certainty) && (worst == nullptr || r.t_value < worst->t_value))
+      if (is_contradicted(r, policy_.reproducibility) && (worst == nullptr || r.t_value < worst->t_value))
         worst = &r;
     if (worst != nullptr) {
       withdraw(worst->effect, worst->where);
@@ -338,7 +338,7 @@ class Diagnostician {
     differences_ = run_differences(search_, fits_.known(), fits_.effects());
     const RunDifference* most = nullptr;
     for (const RunDifference& difference : differences_)
-      if (is_of_single_runs(difference, policy_.certainty) &&
+      if (is_of_single_runs(difference, policy_.reproducibility) &&
           (most == nullptr || difference.certainty > most->certainty))
         most = &difference;
     return most;
@@ -466,7 +466,7 @@ class Diagnostician {
         search_.refit(*without, alternative);
         const Improvement worse = compare(alternative, selection_.current());
         if (!search_.is_plausible(alternative, other)) continue;
-        if (!is_indistinguishable(worse.train, worse.t_value, policy_)) continue;
+        if (!is_indistinguishable(worse.train, worse.t_value, policy_.distinction)) continue;
         declare(effect, other);
         alternatives.emplace_back(other, alternative.train.point.plant);
       }

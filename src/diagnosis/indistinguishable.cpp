@@ -55,14 +55,13 @@ bool grows_from_nothing(std::size_t effect) {
 
 }  // namespace
 
-bool reduces_certainty(double distance_with_other, double distance_alone, const SelectionPolicy& policy) {
-  return distance_with_other < policy.certainty.min_certainty &&
-         distance_with_other < policy.distinction.min_loss * distance_alone;
+bool reduces_certainty(double distance_with_other, double distance_alone, const DistinctionPolicy& policy) {
+  return distance_with_other < policy.min_distance && distance_with_other < policy.min_loss * distance_alone;
 }
 
-bool is_indistinguishable(double evidence_lost, double t_value, const SelectionPolicy& policy) {
-  return evidence_lost < policy.certainty.min_evidence() ||
-         (evidence_lost < policy.distinction.max_scattered_evidence && t_value < policy.certainty.interval);
+bool is_indistinguishable(double evidence_lost, double t_value, const DistinctionPolicy& policy) {
+  return evidence_lost < policy.indistinguishable_evidence ||
+         (evidence_lost < policy.max_scattered_evidence && t_value < policy.scattered_t);
 }
 
 std::vector<FreedEffect> freed_effects(const Search& search, const Hypothesis& h,
@@ -89,7 +88,7 @@ std::vector<Alternative> linear_alternatives(const Search& search, const Hypothe
       const Eigen::Index before = size_place(h, effect), after = size_place(fit, effect);
       if (before < 0 || after < 0 || !std::isfinite(absent_value(h, before))) continue;
       const double doubt = distance(fit, after);
-      if (reduces_certainty(doubt, distance(h, before), search.policy()))
+      if (reduces_certainty(doubt, distance(h, before), search.policy().distinction))
         alternatives.push_back({effect, other, without(fit, after)});
     }
   }

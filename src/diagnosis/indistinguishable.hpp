@@ -28,11 +28,11 @@ std::vector<FreedEffect> freed_effects(const Search& search, const Hypothesis& h
 
 /// Whether an effect that is so many standard errors from nothing may be another, which leaves it fewer once
 /// it is left open too.
-bool reduces_certainty(double distance_with_other, double distance_alone, const SelectionPolicy& policy);
+bool reduces_certainty(double distance_with_other, double distance_alone, const DistinctionPolicy& policy);
 
 /// Whether an effect that was fitted in the place of another does as well: by the evidence that is lost, and
 /// the t value of the loss.
-bool is_indistinguishable(double evidence_lost, double t_value, const SelectionPolicy& policy);
+bool is_indistinguishable(double evidence_lost, double t_value, const DistinctionPolicy& policy);
 
 /// Alternatives of `listed` effects of `h` among the `freed` ones that act in proportion to their size where
 /// they do nothing. What acts otherwise (saturation, lag, delay, ...) does not show here and has to be

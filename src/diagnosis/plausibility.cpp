@@ -27,7 +27,7 @@ void set_back(ParameterPosterior& posterior, Eigen::Index place) {
 
 std::vector<std::size_t> certain_parameters(ParameterPosterior posterior,
                                             const std::vector<bool>& is_correction,
-                                            const CertaintyPolicy& policy) {
+                                            const CorrectionPolicy& policy) {
   std::vector<std::size_t> open(is_correction.size());
   std::iota(open.begin(), open.end(), std::size_t{0});
   for (;;) {
@@ -43,18 +43,18 @@ std::vector<std::size_t> certain_parameters(ParameterPosterior posterior,
         place = a;
       }
     }
-    if (!(min_z < policy.min_certainty)) return open;
+    if (!(min_z < policy.min_z)) return open;
     set_back(posterior, static_cast<Eigen::Index>(place));
     open.erase(open.begin() + static_cast<std::ptrdiff_t>(place));
   }
 }
 
-bool is_certain_of_all_runs(double certainty, const CertaintyPolicy& policy) {
-  return !(certainty < policy.interval);
+bool is_certain_of_all_runs(double certainty, const CorrectionPolicy& policy) {
+  return !(certainty < policy.min_certainty_of_all_runs);
 }
 
-bool is_within_prior(double value, double prior_mean, double prior_sigma, const CertaintyPolicy& policy) {
-  return std::abs(value - prior_mean) < policy.min_t * prior_sigma;
+bool is_within_prior(double value, double prior_mean, double prior_sigma, const CorrectionPolicy& policy) {
+  return std::abs(value - prior_mean) < policy.within_prior * prior_sigma;
 }
 
 EndOfRange end_of_range(double scale, double low, double high, const CorrectionPolicy& policy) {

@@ -19,14 +19,14 @@ struct ParameterPosterior {
 /// the likelihood). What is no correction stays.
 std::vector<std::size_t> certain_parameters(ParameterPosterior posterior,
                                             const std::vector<bool>& is_correction,
-                                            const CertaintyPolicy& policy);
+                                            const CorrectionPolicy& policy);
 
 /// Whether a correction is still certain once all runs are fitted.
-bool is_certain_of_all_runs(double certainty, const CertaintyPolicy& policy);
+bool is_certain_of_all_runs(double certainty, const CorrectionPolicy& policy);
 
 /// A coefficient of the plant file that moved no further than such coefficients do from day to day: the
 /// number is set right, but nothing was missing.
-bool is_within_prior(double value, double prior_mean, double prior_sigma, const CertaintyPolicy& policy);
+bool is_within_prior(double value, double prior_mean, double prior_sigma, const CorrectionPolicy& policy);
 
 /// Where a scale is at an end of what it may be, and stands for something else.
 enum class EndOfRange { none, low, high };

@@ -8,13 +8,14 @@
 
 namespace upright {
 
-/// One candidate is fitted completely in each round.
+/// One candidate is fitted completely in each round, and each fit is made once.
 inline SearchBudget quick_budget() {
   SearchBudget budget;
   budget.min_screening_segments = budget.quick_screening_segments;
   budget.max_screening_stride *= 2;
   budget.min_screened /= 2;
   budget.max_finalists = 1;
+  budget.max_refits = 1;
   budget.clear_evidence = 0.0;
   return budget;
 }

@@ -103,7 +103,7 @@ std::vector<RunDifference> run_differences(const Search& search, const Hypothesi
   return result;
 }
 
-bool is_of_single_runs(const RunDifference& difference, const CertaintyPolicy& policy) {
+bool is_of_single_runs(const RunDifference& difference, const ReproducibilityPolicy& policy) {
   const auto runs = static_cast<double>(difference.sizes.size());
   const bool differs = upper_tail(difference.certainty) < upper_tail(policy.min_t) / runs;
   return differs && difference.certainty_of_help < normal_95;

@@ -36,7 +36,7 @@ std::vector<RunDifference> run_differences(const Search& search, const Hypothesi
                                            const std::vector<std::size_t>& effects);
 
 /// Whether the sizes differ so that the effect need not help on a further run.
-bool is_of_single_runs(const RunDifference& difference, const CertaintyPolicy& policy);
+bool is_of_single_runs(const RunDifference& difference, const ReproducibilityPolicy& policy);
 
 /// A sentence for the listing of effects that help here only.
 std::string sentence_on(const RunDifference& difference, const std::vector<Measurement>& runs);

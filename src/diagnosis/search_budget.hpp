@@ -78,6 +78,11 @@ struct SearchBudget {
   int predictive_noise_rounds = 1;
   /// [steps] The steps of that fit. Chosen.
   int predictive_steps = 4;
+  /// [fits] The most further fits of an effect that is less certain than its evidence suggests. A poor fit is
+  /// hidden by a large noise estimate; each further fit reduces both. Chosen.
+  int max_refits = 6;
+  /// [evidence] The least gain of each such fit for another one to follow. Chosen.
+  double min_refit_gain = 10.0;
   /// [evidence] Above this evidence, the screening segments decide first whether a fit from less noise could
   /// be better. Below it every difference counts, so all the data are used. Chosen.
   double clear_evidence = 1000.0;

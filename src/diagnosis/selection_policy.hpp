@@ -22,33 +22,20 @@
 
 namespace upright {
 
-/// What counts as certain. All rules share these limits.
-struct CertaintyPolicy {
-  /// [robust standard errors] The least certainty of the size of an effect, of a correction of the plant
-  /// file, and of the difference between two effects. By chance, four occurs once in 16,000 times. Chosen.
-  double min_certainty = 4.0;
-  /// [standard errors] The least t value of a saving per quarter of a second, which remains reliable if the
-  /// noise is not white. An effect is contradicted by the same t value, if what one part of the data says of
-  /// it costs another part, and a coefficient of the plant file that moved by less counts as unchanged. By
-  /// chance, three occurs once in 700 times. Chosen.
-  double min_t = 3.0;
-  /// [standard errors] Half of an interval of 95 %. A correction or an effect with less after the final fit
-  /// to all runs is removed, because its interval includes nothing. A difference in evidence with a smaller t
-  /// value is within its own scatter.
-  double interval = 2.0;
-
-  /// Of an effect as certain as is asked, or of a difference [evidence].
-  constexpr double min_evidence() const { return min_certainty * min_certainty; }
-};
-
 /// When an effect is added to the model.
 struct AcceptancePolicy {
   /// [evidence] The least evidence on the training runs, after the penalty of the parameters. About 30
   /// candidates with up to three parameters are tried. With white noise, 25 keeps a chance result below one
   /// in a thousand diagnoses. Computed from that number of candidates.
   double min_evidence = 25.0;
+  /// [standard errors] The least t value of the saving per quarter of a second. It remains reliable if the
+  /// noise is not white. By chance, three occurs once in 700 times. Chosen.
+  double min_t = 3.0;
   /// [evidence] Coloured noise cannot produce this much, even if few segments contain it. Chosen.
   double overwhelming_evidence = 1000.0;
+  /// [robust standard errors] The least certainty of the size of an effect. Equivalent to an evidence of 16.
+  /// Chosen.
+  double min_certainty = 4.0;
   /// [evidence] Each parameter beyond the first must save this in addition, so a simpler effect that fits
   /// nearly as well is preferred. Chosen.
   double parameter_penalty = 10.0;
@@ -59,6 +46,25 @@ struct AcceptancePolicy {
   /// it by this much: odds of 2 to 1. Without it, an effect with an evidence of 448 was rejected at odds of
   /// 1.05 to 1.
   double held_out_indifference = 1.4;
+  /// [evidence] If training and held-out runs both support an effect, each needs at least this. Without this
+  /// rule, weak effects in one short run were missed (new seeds of the matrix).
+  double min_evidence_of_each = 8.0;
+  /// [evidence] The sum that both need. It is larger than `min_evidence` because it replaces it. Same
+  /// origin.
+  double min_evidence_together = 40.0;
+  /// [standard errors] Below this t value, held-out evidence is not added to its square: one standard error
+  /// is what chance produces. Chosen. (Held-out evidence of 25 confirmed a t of 1.5: seeds 181/83 and
+  /// 182/114.)
+  double chance_t = 1.0;
+  /// [standard errors] The least t value if only sensor noise remains, because then nothing else can have
+  /// produced the evidence. Chosen.
+  double min_t_of_sensors = 1.5;
+  /// [sensor noise] A plain simulation of held-out runs with a smaller error leaves only sensor noise. This
+  /// is the matrix's limit for the error of a right model relative to the floor.
+  double sensors_gap = 1.05;
+  /// [1] The evidence of an effect is about the square of its certainty. If it is this many times larger, the
+  /// fit has not converged and is continued. A smaller ratio can come from noise that is not white. Chosen.
+  double unconverged_evidence_ratio = 4.0;
   /// [ln of a ratio] The mean error of simulated held-out segments may grow by this. A tenth is not visible.
   /// An effect goes if the error with it is larger by this and a standard error. So does the fitted value of
   /// a number that moved further than believed. A curve that lowers the error by more shows that something is
@@ -67,10 +73,10 @@ struct AcceptancePolicy {
   /// [ln of a ratio] It may also grow by one standard error of its scatter over the segments, which is taken
   /// to be at least this: while another effect is missing, errors change by half in either direction.
   double min_simulation_scatter = 0.5;
-  /// [1] An effect that was found stays in the model while its t value is above this share of the least
-  /// t value. It
+  /// [1] An effect that was found stays in the model while its t value is above this share of `min_t`. It
   /// is not dropped because other effects make it slightly less certain. Chosen.
   double kept_t_share = 0.7;
+
   /// [1] Effects that gain this share of the gain of the best one are similar to it: they may be the same
   /// force, or a part of it. Chosen.
   double resembling_share = 0.3;
@@ -81,6 +87,14 @@ struct AcceptancePolicy {
 
 /// When a number of the plant file is wrong, and which sizes are impossible.
 struct CorrectionPolicy {
+  /// [standard errors] A correction of the plant file is listed from here on. As `min_certainty`. Chosen.
+  double min_z = 4.0;
+  /// [standard errors] A correction or an effect with less than this after the final fit to all runs is
+  /// removed, because its 95 % interval would include nothing.
+  double min_certainty_of_all_runs = 2.0;
+  /// [prior standard deviations] A coefficient of the plant file that moved by less counts as unchanged: its
+  /// number is adjusted, but nothing was missing. Such coefficients change this much from day to day. Chosen.
+  double within_prior = 3.0;
   /// [1] The factor by which priors are widened in the final fits. The plant file still has weight there, but
   /// less, where the data correct it. Chosen.
   double prior_widening = 4.0;
@@ -99,14 +113,28 @@ struct CorrectionPolicy {
 
 /// When two effects are confusable.
 struct DistinctionPolicy {
-  /// [evidence] The most that a difference within its own scatter may be. Ten times what tells two effects
-  /// apart. Chosen.
+  /// [evidence] Two effects that differ by less are confusable. Odds of 3000 to 1, or four standard errors.
+  /// Chosen.
+  double indistinguishable_evidence = 16.0;
+  /// [evidence] The most that a difference within its own scatter may be. Ten times the limit above. Chosen.
   double max_scattered_evidence = 160.0;
+  /// [standard errors] A difference is within its own scatter if its t value is below this: a 95 % interval.
+  double scattered_t = 2.0;
+  /// [standard errors] An effect whose certainty falls below this once another effect is left open may be
+  /// that other effect. Equivalent to an evidence of 16.
+  double min_distance = 4.0;
   /// [1] The other effect must reduce the certainty to less than this share of it. Chosen.
   double min_loss = 0.5;
   /// [1] An effect with this share of the evidence of the effect that was added, and not confusable with it,
   /// is named as next best. Chosen for the reader; it decides nothing.
   double next_best_share = 1.0 / 3.0;
+};
+
+/// When an effect does not reproduce.
+struct ReproducibilityPolicy {
+  /// [standard errors] An effect is contradicted if what one part of the data says of it costs another part
+  /// more than this, compared with no such effect. By chance, three occurs once in 700 times. Chosen.
+  double min_t = 3.0;
 };
 
 /// What the data would have shown.
@@ -182,7 +210,7 @@ struct ResidualPolicy {
   std::size_t draws = 499;
   /// [standard errors] A smaller dependence of the residual is not looked at: by chance, the largest of a
   /// dozen exceeds three in one diagnosis of thirty. Chosen.
-  double min_dependence = CertaintyPolicy{}.min_t;
+  double min_dependence = 3.0;
   /// [1] No sensor is perfect, so a shift of a sensor counts only if it accounts for this share of the
   /// residual. A flexible drive accounted for 27 to 31 percent (aau data).
   double min_sensor_share = 0.05;
@@ -201,7 +229,7 @@ struct ResidualPolicy {
   double quickest = 0.5;
   /// [1] A plain simulation may be this many times as far off as the largest of the noise draws, and held-out
   /// runs this many times further. Chosen.
-  double max_excess = PowerPolicy{}.clear_gap;
+  double max_excess = 2.0;
 };
 
 /// How the residual is located: the regression of the residual force on measured quantities. Its result is
@@ -313,10 +341,10 @@ struct ExcitationPolicy {
 };
 
 struct SelectionPolicy {
-  CertaintyPolicy certainty;
   AcceptancePolicy acceptance;
   CorrectionPolicy correction;
   DistinctionPolicy distinction;
+  ReproducibilityPolicy reproducibility;
   PowerPolicy power;
   MotionPolicy motion;
   ResidualPolicy residual;

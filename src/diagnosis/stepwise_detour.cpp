@@ -44,7 +44,7 @@ bool StepwiseSelection::find_without(std::size_t effect) {
   if (brought.empty()) return false;
   Evidence e = evidence_of(Change::pair, current_, other.hypothesis, brought);
   e.penalty = penalty_of_change(current_, other.hypothesis);
-  const bool better = decided(e, other.hypothesis).accepted;
+  const bool better = decided(e, other.hypothesis, brought.front()).accepted;
   if (better) {
     current_ = std::move(other.hypothesis);
     found_ = std::move(other.found);

@@ -157,7 +157,7 @@ Evidence StepwiseSelection::evidence_of(Change change, const Hypothesis& from, c
   return e;
 }
 
-Decision StepwiseSelection::decided(Evidence& e, Hypothesis& h) {
+Decision StepwiseSelection::decided(Evidence& e, Hypothesis& h, std::size_t effect) {
   for (;;) {
     const Decision decision = decide(e, policy_);
     switch (decision.waits_for) {
@@ -167,11 +167,31 @@ Decision StepwiseSelection::decided(Evidence& e, Hypothesis& h) {
         equalise_noise(h);
         e.at_equal_noise = compare(current_, h, 1.0);
         break;
+      case MissingFit::simulation:
+        e.simulated_gap = search_.simulate(h).gap;
+        break;
       case MissingFit::simulated_segments:
         // What stands in the place of something else is compared where both were fitted, too.
         e.simulated_segments = change_of_simulation(h, e.change == Change::pair);
         break;
+      case MissingFit::all_runs:
+        e.certainty_of_all_runs = search_.certainty(search_.fitted_to_all_runs(h), effect);
+        break;
+      case MissingFit::converged:
+        converge(h);
+        e.certainty_converged = search_.certainty(h, effect);
+        break;
     }
+  }
+}
+
+void StepwiseSelection::converge(Hypothesis& h) {
+  for (int refit = 0; refit < budget_.max_refits; ++refit) {
+    Hypothesis further = h;
+    search_.refine(h, further);
+    const double gain = h.train.objective - further.train.objective;
+    if (gain > 0.0) h = std::move(further);
+    if (!(gain > budget_.min_refit_gain)) break;
   }
 }
 
@@ -197,7 +217,7 @@ void StepwiseSelection::resolve_doubt() {
   std::swap(current_, added.hypothesis);
   std::swap(found_, added.found);
   Evidence e = evidence_of(Change::trust_added, current_, added.hypothesis, {});
-  if (decided(e, added.hypothesis).accepted) {
+  if (decided(e, added.hypothesis, 0).accepted) {
     current_ = std::move(added.hypothesis);
     found_ = std::move(added.found);
   } else {
@@ -346,7 +366,7 @@ Decision StepwiseSelection::try_finalist(int round, bool with_low_noise, Finalis
   e.is_correction = current_.train.point.plant.find(effect) != nullptr;
   e.with_low_noise = with_low_noise;
   record_trial(round, effect, h, e.improvement);
-  const Decision decision = decided(e, h);
+  const Decision decision = decided(e, h, effect);
   record_.trials.back().rule = name_of(decision.rule);
   const bool as_first_seen = decision.rule == Rule::held_out_in_doubt;
   finalist.score = (as_first_seen ? e.improvement : compare(current_, h, 1.0)).train - penalty_of(effect);
@@ -420,13 +440,14 @@ bool StepwiseSelection::exchange() {
       // What was found beside the one is of the wrong size for the other: the way is longer than a few steps.
       if (h.train.objective + penalty_of(other) < to_beat + budget_.exchange_share * worth)
         search_.converge_on_subset(h);
-      if (!(h.train.objective + penalty_of(other) < to_beat + policy_.certainty.min_evidence())) continue;
+      if (!(h.train.objective + penalty_of(other) < to_beat + policy_.distinction.indistinguishable_evidence))
+        continue;
       search_.refine(without, h);
       Evidence e = evidence_of(Change::exchange, current_, h, {other});
       e.penalty = penalty_of(other);
       e.penalty_saved = penalty_of(effect);
       e.is_plainer = is_plainer(other, effect);
-      if (!decided(e, h).accepted) continue;
+      if (!decided(e, h, other).accepted) continue;
       where_[other] = where_.at(effect);
       similar_effects_[other] = similar_effects_[effect];
       similar_effects_[other].push_back(effect);
@@ -472,7 +493,7 @@ bool StepwiseSelection::simplify() {
     for (const PlantEffect& other : form.others) brought.push_back(other.number);
     Evidence e = evidence_of(Change::simplify, current_, h, brought);
     e.penalty = penalty_of_change(current_, h);
-    if (!decided(e, h).accepted) continue;
+    if (!decided(e, h, brought.front()).accepted) continue;
     current_ = std::move(h);
     auto place = found_.erase(std::find(found_.begin(), found_.end(), form.effect));
     for (const PlantEffect& other : form.others) {
@@ -504,7 +525,7 @@ bool StepwiseSelection::try_pairs(const std::vector<std::pair<std::size_t, Hypot
       Hypothesis h = search_.with_pair(given_, contenders[a].second, contenders[b].second);
       Evidence e = evidence_of(Change::pair, so_far, h, {first, second});
       e.penalty = penalty_of_change(so_far, h);
-      if (!decided(e, h).accepted) continue;
+      if (!decided(e, h, first).accepted) continue;
       best = std::move(h);
       best_found = {first, second};
       to_beat.reset();
@@ -529,7 +550,7 @@ void StepwiseSelection::eliminate_backward() {
       Evidence e = evidence_of(Change::keep, h, current_, {});
       e.penalty = penalty_of(found_[i]);
       e.bends_another = bends_another(h, found_[i], &Search::is_plausible);
-      if (decided(e, current_).accepted) continue;
+      if (decided(e, current_, found_[i]).accepted) continue;
       current_ = std::move(h);
       found_.erase(found_.begin() + static_cast<std::ptrdiff_t>(i));
       record_step();

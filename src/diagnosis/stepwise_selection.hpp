@@ -109,7 +109,10 @@ class StepwiseSelection {
                        const std::vector<std::size_t>& brought) const;
   /// The decision on a change to `h`, with the fits that it waits for made on the way: they may bring `h`
   /// further, and give `current_` less noise.
-  Decision decided(Evidence& evidence, Hypothesis& h);
+  Decision decided(Evidence& evidence, Hypothesis& h, std::size_t effect);
+  /// Fits until that gains nothing more. Much noise hides what a poor fit leaves, and each gives way to the
+  /// other by and by.
+  void converge(Hypothesis& h);
   /// By how much `h` simulates held-out segments worse than `current_` does, and training segments if these
   /// count too: while more is missing, one and the other come out better or worse by half.
   SimulationChange change_of_simulation(Hypothesis& h, bool of_training_too);

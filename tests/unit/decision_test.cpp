@@ -14,7 +14,6 @@ namespace {
 
 constexpr SelectionPolicy policy;
 constexpr AcceptancePolicy p = policy.acceptance;
-constexpr CertaintyPolicy certainty = policy.certainty;
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
 double above(double value) {
@@ -78,17 +77,32 @@ TEST(Addition, IsRefusedWhereHeldOutRunsSpeakAgainstIt) {
 }
 
 TEST(Addition, MustShowAllAlongTheTrainingRuns) {
-  EXPECT_EQ(rule_of(addition(500.0, 0.0, certainty.min_t)), Rule::chance);
-  EXPECT_EQ(rule_of(addition(500.0, 0.0, above(certainty.min_t))), Rule::shown_throughout);
+  EXPECT_EQ(rule_of(addition(500.0, 0.0, p.min_t)), Rule::chance);
+  EXPECT_EQ(rule_of(addition(500.0, 0.0, above(p.min_t))), Rule::shown_throughout);
 }
 
 TEST(Addition, HasHeldOutRunsAsAWitnessOfItsT) {
   Evidence e = addition(500.0, 5.0, 2.0);  // 2^2 + 5 = 3^2
+  e.simulated_gap = 2.0;
   EXPECT_EQ(rule_of(e), Rule::chance);
   e.improvement.held = 5.01;
   e.at_equal_noise = e.improvement;
   EXPECT_EQ(rule_of(e), Rule::shown_throughout);
-  EXPECT_EQ(rule_of(addition(500.0, 1000.0, 0.0)), Rule::chance) << "training runs say nothing";
+}
+
+TEST(Addition, HasNoWitnessWhereTrainingRunsSayNoMoreThanChance) {
+  EXPECT_EQ(rule_of(addition(500.0, 1000.0, p.chance_t)), Rule::chance);
+  EXPECT_EQ(rule_of(addition(500.0, 1000.0, above(p.chance_t))), Rule::borne_out);
+}
+
+TEST(Addition, IsBorneOutByTrainingAndHeldOutRuns) {
+  EXPECT_EQ(rule_of(addition(p.min_evidence_of_each, 1000.0, 5.0)), Rule::too_little_evidence);
+  EXPECT_EQ(rule_of(addition(above(p.min_evidence_of_each), 1000.0, 5.0)), Rule::borne_out);
+  EXPECT_EQ(rule_of(addition(1000.0, p.min_evidence_of_each, 5.0)), Rule::shown_throughout);
+  EXPECT_EQ(rule_of(addition(1000.0, above(p.min_evidence_of_each), 5.0)), Rule::borne_out);
+  const double half = 0.5 * p.min_evidence_together;
+  EXPECT_EQ(rule_of(addition(half, half, 5.0)), Rule::too_little_evidence);
+  EXPECT_EQ(rule_of(addition(half, half + 0.1, 5.0)), Rule::borne_out);
 }
 
 TEST(Addition, NeedsNoTWithOverwhelmingEvidence) {
@@ -106,14 +120,51 @@ TEST(Addition, NeedsNoTWhereNumbersOfThePlantNeedNotBeSoFarOff) {
   EXPECT_EQ(rule_of(e), Rule::plant_numbers);
 }
 
+TEST(Addition, NeedsALittleTWhereTheSensorsNoiseIsLeft) {
+  const auto rule = [](double held, double t_value, double gap) {
+    Evidence e = addition(500.0, held, t_value);
+    e.simulated_gap = gap;
+    return rule_of(e);
+  };
+  EXPECT_EQ(rule(4.5, p.min_t_of_sensors, 1.0), Rule::chance);
+  EXPECT_EQ(rule(4.5, above(p.min_t_of_sensors), 1.0), Rule::sensors_noise_left);
+  EXPECT_EQ(rule(p.equally_good_evidence, 1.6, 1.0), Rule::chance);
+  EXPECT_EQ(rule(above(p.equally_good_evidence), 1.6, 1.0), Rule::sensors_noise_left);
+  EXPECT_EQ(rule(4.5, 1.6, p.sensors_gap), Rule::chance);
+  EXPECT_EQ(rule(4.5, 1.6, below(p.sensors_gap)), Rule::sensors_noise_left);
+}
+
 TEST(Addition, MustBeOfACertainSize) {
-  Evidence e = addition(60.0, 0.0, 5.0);
-  e.certainty = certainty.min_certainty;
+  Evidence e = addition(60.0, 0.0, 5.0);  // less than four times the square of the certainty
+  e.certainty = p.min_certainty;
   EXPECT_EQ(rule_of(e), Rule::shown_throughout);
-  e.certainty = below(certainty.min_certainty);
+  e.certainty = below(p.min_certainty);
   EXPECT_EQ(rule_of(e), Rule::uncertain_size);
   e.is_correction = true;
   EXPECT_EQ(rule_of(e), Rule::shown_throughout);
+}
+
+TEST(Addition, GoesOnWhereItsFitIsLessCertainThanItsEvidence) {
+  Evidence e = addition(9.0 * p.unconverged_evidence_ratio, 0.0, 5.0);
+  e.certainty = 3.0;
+  EXPECT_EQ(missing_of(e), MissingFit::converged);
+  e.certainty_converged = below(p.min_certainty);
+  EXPECT_EQ(rule_of(e), Rule::uncertain_size);
+  e.certainty_converged = p.min_certainty;
+  EXPECT_EQ(rule_of(e), Rule::shown_throughout);
+  e.certainty = above(3.0);
+  e.certainty_converged.reset();
+  EXPECT_EQ(rule_of(e), Rule::uncertain_size);
+}
+
+TEST(Addition, MayBeMadeCertainByAllRuns) {
+  Evidence e = addition(21.0, 20.0, 5.0);
+  e.certainty = 3.0;
+  EXPECT_EQ(missing_of(e), MissingFit::all_runs);
+  e.certainty_of_all_runs = p.min_certainty;
+  EXPECT_EQ(rule_of(e), Rule::borne_out);
+  e.certainty_of_all_runs = below(p.min_certainty);
+  EXPECT_EQ(rule_of(e), Rule::uncertain_size);
 }
 
 TEST(SimulationChange, IsTheMeanLogarithmOverTheSegments) {
@@ -153,10 +204,11 @@ TEST(Addition, IsFollowedInDoubtWithOverwhelmingEvidenceOnly) {
   const auto against = [](double train, double t_value) { return rule_of(addition(train, -5.0, t_value)); };
   EXPECT_EQ(against(p.overwhelming_evidence, 5.0), Rule::held_out_against);
   EXPECT_EQ(against(above(p.overwhelming_evidence), 5.0), Rule::held_out_in_doubt);
-  EXPECT_EQ(against(2000.0, certainty.min_t), Rule::held_out_against);
-  EXPECT_EQ(against(2000.0, above(certainty.min_t)), Rule::held_out_in_doubt);
+  EXPECT_EQ(against(2000.0, p.min_t), Rule::held_out_against);
+  EXPECT_EQ(against(2000.0, above(p.min_t)), Rule::held_out_in_doubt);
   Evidence uncertain = addition(2000.0, -5.0, 5.0);
   uncertain.certainty = 1.0;
+  uncertain.certainty_converged = 1.0;
   EXPECT_EQ(rule_of(uncertain), Rule::uncertain_size);
 
   const auto worse = [](double train) {
@@ -182,14 +234,15 @@ TEST(Addition, CountsOverTheModelWithTheSameNoise) {
   EXPECT_EQ(missing_of(e), MissingFit::equal_noise);
 }
 
-TEST(Addition, WaitsForTheSimulationOfSegments) {
+TEST(Addition, WaitsForTheSimulationsThatARuleAsksFor) {
+  EXPECT_EQ(missing_of(addition(500.0, 4.5, 1.6)), MissingFit::simulation);
   Evidence e = addition(500.0, 0.0, 5.0);
   e.simulated_segments.reset();
   EXPECT_EQ(missing_of(e), MissingFit::simulated_segments);
 }
 
 TEST(Exchange, IsForWhatIsBetter) {
-  const double threshold = certainty.min_evidence();
+  const double threshold = policy.distinction.indistinguishable_evidence;
   EXPECT_EQ(rule_of(evidence(Change::exchange, threshold, 1.0, 0.0)), Rule::no_better);
   EXPECT_EQ(rule_of(evidence(Change::exchange, above(threshold), 1.0, 0.0)), Rule::better);
   EXPECT_EQ(rule_of(evidence(Change::exchange, 100.0, 0.0, 0.0)), Rule::no_better);
@@ -215,9 +268,9 @@ TEST(Exchange, IsForWhatIsAsGoodAndPlainer) {
 
 TEST(Exchange, AsksThatTheSubstituteIsPossibleAndCertain) {
   Evidence e = evidence(Change::exchange, 100.0, 1.0, 0.0);
-  e.certainty = certainty.min_certainty;
+  e.certainty = p.min_certainty;
   EXPECT_EQ(rule_of(e), Rule::better);
-  e.certainty = below(certainty.min_certainty);
+  e.certainty = below(p.min_certainty);
   EXPECT_EQ(rule_of(e), Rule::uncertain_size);
   e.plausible = false;
   EXPECT_EQ(rule_of(e), Rule::cannot_be);
@@ -245,11 +298,12 @@ TEST(Pair, NeedsEvidenceAndNoHeldOutRunsAgainstIt) {
 }
 
 TEST(Keeping, NeedsALittleLessTThanAdding) {
-  const double min_t = p.kept_t_share * certainty.min_t;
+  const double min_t = p.kept_t_share * p.min_t;
   EXPECT_EQ(rule_of(evidence(Change::keep, 100.0, 0.0, min_t)), Rule::chance);
   EXPECT_EQ(rule_of(evidence(Change::keep, 100.0, 0.0, above(min_t))), Rule::still_shown);
   EXPECT_EQ(rule_of(evidence(Change::keep, p.min_evidence, 0.0, 2.5)), Rule::chance);
   EXPECT_EQ(rule_of(evidence(Change::keep, above(p.min_evidence), 0.0, 2.5)), Rule::still_shown);
+  EXPECT_EQ(rule_of(evidence(Change::keep, 20.0, 21.0, 5.0)), Rule::borne_out);
 }
 
 TEST(Keeping, IsForWhatAnotherNeeds) {
@@ -295,20 +349,20 @@ TEST(BestContender, IsChosenByHeldOutRunsAmongEquals) {
 
 TEST(Indistinguishable, IsWhatLosesLittleEvidence) {
   const DistinctionPolicy& d = policy.distinction;
-  EXPECT_TRUE(is_indistinguishable(below(certainty.min_evidence()), 100.0, policy));
-  EXPECT_FALSE(is_indistinguishable(certainty.min_evidence(), 100.0, policy));
-  EXPECT_TRUE(is_indistinguishable(100.0, below(certainty.interval), policy));
-  EXPECT_FALSE(is_indistinguishable(100.0, certainty.interval, policy));
-  EXPECT_TRUE(is_indistinguishable(below(d.max_scattered_evidence), 0.0, policy));
-  EXPECT_FALSE(is_indistinguishable(d.max_scattered_evidence, 0.0, policy));
+  EXPECT_TRUE(is_indistinguishable(below(d.indistinguishable_evidence), 100.0, d));
+  EXPECT_FALSE(is_indistinguishable(d.indistinguishable_evidence, 100.0, d));
+  EXPECT_TRUE(is_indistinguishable(100.0, below(d.scattered_t), d));
+  EXPECT_FALSE(is_indistinguishable(100.0, d.scattered_t, d));
+  EXPECT_TRUE(is_indistinguishable(below(d.max_scattered_evidence), 0.0, d));
+  EXPECT_FALSE(is_indistinguishable(d.max_scattered_evidence, 0.0, d));
 }
 
 TEST(Alternative, TakesTheCertaintyOfAnEffectAway) {
   const DistinctionPolicy& d = policy.distinction;
-  EXPECT_TRUE(reduces_certainty(below(certainty.min_certainty), 100.0, policy));
-  EXPECT_FALSE(reduces_certainty(certainty.min_certainty, 100.0, policy));
-  EXPECT_TRUE(reduces_certainty(below(3.0), 3.0 / d.min_loss, policy));
-  EXPECT_FALSE(reduces_certainty(3.0, 3.0 / d.min_loss, policy));
+  EXPECT_TRUE(reduces_certainty(below(d.min_distance), 100.0, d));
+  EXPECT_FALSE(reduces_certainty(d.min_distance, 100.0, d));
+  EXPECT_TRUE(reduces_certainty(below(3.0), 3.0 / d.min_loss, d));
+  EXPECT_FALSE(reduces_certainty(3.0, 3.0 / d.min_loss, d));
 }
 
 }  // namespace

@@ -11,7 +11,6 @@ namespace upright {
 namespace {
 
 constexpr CorrectionPolicy policy;
-constexpr CertaintyPolicy certainty;
 
 double above(double value) {
   return std::nextafter(value, 1e9);
@@ -24,12 +23,12 @@ double below(double value) {
 std::vector<std::size_t> certain(double value, bool is_correction) {
   return certain_parameters(
       {Eigen::VectorXd::Constant(1, value), Eigen::VectorXd::Zero(1), Eigen::MatrixXd::Identity(1, 1)},
-      {is_correction}, certainty);
+      {is_correction}, policy);
 }
 
 TEST(Correction, IsThereFromItsMinimumCertaintyOn) {
-  EXPECT_TRUE(certain(below(certainty.min_certainty), true).empty());
-  EXPECT_EQ(certain(certainty.min_certainty, true).size(), 1u);
+  EXPECT_TRUE(certain(below(policy.min_z), true).empty());
+  EXPECT_EQ(certain(policy.min_z, true).size(), 1u);
   EXPECT_EQ(certain(0.0, false).size(), 1u) << "what is no correction stays";
 }
 
@@ -38,22 +37,22 @@ TEST(Correction, FollowsWhereOneThatIsAlikeIsSetBack) {
   ParameterPosterior posterior{Eigen::Vector2d(3.9, 5.0), Eigen::Vector2d::Zero(),
                                Eigen::Matrix2d::Identity()};
   posterior.covariance(0, 1) = posterior.covariance(1, 0) = -0.9;
-  EXPECT_EQ(certain_parameters(posterior, {true, true}, certainty), std::vector<std::size_t>{1});
+  EXPECT_EQ(certain_parameters(posterior, {true, true}, policy), std::vector<std::size_t>{1});
   // The other way round the second gives way as the first is set back.
   posterior.covariance(0, 1) = posterior.covariance(1, 0) = 0.9;
-  EXPECT_EQ(certain_parameters(posterior, {true, true}, certainty), std::vector<std::size_t>{});
+  EXPECT_EQ(certain_parameters(posterior, {true, true}, policy), std::vector<std::size_t>{});
 }
 
 TEST(Correction, MustIncludeNothingOnAllRunsNoLonger) {
-  EXPECT_FALSE(is_certain_of_all_runs(below(certainty.interval), certainty));
-  EXPECT_TRUE(is_certain_of_all_runs(certainty.interval, certainty));
+  EXPECT_FALSE(is_certain_of_all_runs(below(policy.min_certainty_of_all_runs), policy));
+  EXPECT_TRUE(is_certain_of_all_runs(policy.min_certainty_of_all_runs, policy));
 }
 
 TEST(Correction, IsAsBelievedWithinWhatCoefficientsMove) {
-  const double sigma = 0.5, far = certainty.min_t * sigma;
-  EXPECT_TRUE(is_within_prior(below(far), 0.0, sigma, certainty));
-  EXPECT_FALSE(is_within_prior(far, 0.0, sigma, certainty));
-  EXPECT_FALSE(is_within_prior(-far, 0.0, sigma, certainty));
+  const double sigma = 0.5, far = policy.within_prior * sigma;
+  EXPECT_TRUE(is_within_prior(below(far), 0.0, sigma, policy));
+  EXPECT_FALSE(is_within_prior(far, 0.0, sigma, policy));
+  EXPECT_FALSE(is_within_prior(-far, 0.0, sigma, policy));
 }
 
 TEST(Scale, IsAtAnEndOfItsRangeJustBeforeIt) {

@@ -60,7 +60,7 @@ class Fitted {
     known_ = search_->fitted_to_all_runs(final_);
   }
   Reproduction reproduction() const { return reproduce(*search_, known_, {force}).front(); }
-  bool is_contradicted() const { return upright::is_contradicted(reproduction(), policy_.certainty); }
+  bool is_contradicted() const { return upright::is_contradicted(reproduction(), policy_.reproducibility); }
   Listing listing() {
     return list_effects(*search_, final_, {.effects = {force}, .corrections = corrections_});
   }
@@ -222,7 +222,7 @@ TEST(Power, GrowsWithTheParametersThatHaveToBePaidFor) {
   EXPECT_DOUBLE_EQ(one, std::sqrt(policy.acceptance.min_evidence) + policy.power.power_z);
   EXPECT_GT(standard_errors_to_be_shown(effect_number("cogging_force"), false, policy), one);
   EXPECT_DOUBLE_EQ(standard_errors_to_be_shown(effect_number("cart_mass"), true, policy),
-                   policy.certainty.min_certainty + policy.power.power_z);
+                   policy.correction.min_z + policy.power.power_z);
 }
 
 TEST(Power, LetsHideOnlyTheFrictionThatThePlantLacks) {
