@@ -124,17 +124,18 @@ void GaussNewton::take_start_if_better(std::size_t s, const PlantState<double>& 
 /// The same after a step. Infinity where one segment, in which the cart sticks or slides for all the others
 /// say, is further off than the others can make up for: the rest are not looked at, and it is looked at first
 /// from then on. A start at held speed keeps one segment from stopping all others; alone, its step is damped.
-double GaussNewton::evaluate_step(const Step& taken, double predicted_reduction) {
+double GaussNewton::evaluate_step(const std::vector<PlantState<double>>& starts_at_held_speed,
+                                  double predicted_reduction) {
   constexpr double out_of_reach = 3.0;
   count_work();
   const std::size_t none = order_.size();
+  const bool has_others = order_.size() > 1;
   std::atomic<std::size_t> rejecting_segment = none;
   parallel_for(order_.size(), [&](std::size_t i) {
     if (rejecting_segment != none) return;
     const std::size_t s = order_[i];
     linearise(s);
-    if (none > 1 && !(rise_of(s) < predicted_reduction))
-      take_start_if_better(s, taken.starts_at_held_speed[s]);
+    if (has_others && !(rise_of(s) < predicted_reduction)) take_start_if_better(s, starts_at_held_speed[s]);
     if (!(rise_of(s) < out_of_reach * predicted_reduction)) rejecting_segment = i;
   });
   if (rejecting_segment == none) return objective_of_normals() + prior_.objective(point_.plant);
@@ -189,9 +190,9 @@ double GaussNewton::try_steps(double objective, double min_fall, double& damping
     // not even promise to fall.
     constexpr double alike = 0.9;
     if (promises && next.predicted_reduction < alike * rejected) {
-      point_ = next.point;
+      point_ = std::move(next.point);
       linearised_.swap(former_);
-      next_objective = evaluate_step(next, std::max(next.predicted_reduction, min_fall));
+      next_objective = evaluate_step(next.starts_at_held_speed, std::max(next.predicted_reduction, min_fall));
       if (next_objective < objective) break;
       point_ = former;
       linearised_.swap(former_);

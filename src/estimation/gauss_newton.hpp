@@ -77,7 +77,8 @@ class GaussNewton {
 
   void linearise(std::size_t s);
   void count_work();
-  double evaluate_step(const Step& taken, double predicted_reduction);
+  double evaluate_step(const std::vector<PlantState<double>>& starts_at_held_speed,
+                       double predicted_reduction);
   double rise_of(std::size_t s) const;
   void take_start_if_better(std::size_t s, const PlantState<double>& alternative);
   double objective_of_normals() const;
