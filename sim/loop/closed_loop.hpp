@@ -19,26 +19,16 @@ using Measured = std::array<double, 4>;
 /// Volts per unit of `Measured`, in the order of the gain file.
 using FeedbackGains = std::array<double, 4>;
 
-/// The sensors' outputs as a linear function of the state, with a rigid drive; computed once.
+/// The sensors' outputs as a linear function of the state, with a rigid drive and an encoder that runs true;
+/// computed once.
 class MeasuredState {
  public:
-  explicit MeasuredState(const Dynamics<double>& dynamics) {
-    const auto shown = [&](double x, double theta) {
-      PlantState<double> s;
-      s.cart_m = x;
-      s.theta_rad = theta;
-      return dynamics.measure(s);
-    };
-    const Outputs<double> zero = shown(0.0, 0.0);
-    cart_offset_m_ = zero.cart_m;
-    theta_offset_rad_ = zero.theta_rad;
-    cart_scale_ = shown(1.0, 0.0).cart_m - zero.cart_m;
-    theta_scale_ = shown(0.0, 1.0).theta_rad - zero.theta_rad;
-  }
+  explicit MeasuredState(const Dynamics<double>& dynamics) : line_(dynamics.model()) {}
 
   Measured operator()(const PlantState<double>& s) const {
-    return {cart_scale_ * s.cart_m + cart_offset_m_, theta_scale_ * s.theta_rad + theta_offset_rad_,
-            cart_scale_ * s.cart_mps, theta_scale_ * s.theta_radps};
+    return {line_.cart_gain * s.cart_m + line_.cart_offset_m,
+            line_.theta_gain * s.theta_rad + line_.theta_offset_rad, line_.cart_gain * s.cart_mps,
+            line_.theta_gain * s.theta_radps};
   }
   /// gains . measured
   double volts(const FeedbackGains& gains, const PlantState<double>& s) const {
@@ -47,12 +37,12 @@ class MeasuredState {
   }
   /// The same without the offsets: for rates and the higher coefficients of a polynomial.
   double volts_of_change(const FeedbackGains& gains, const PlantState<double>& s) const {
-    return gains[0] * cart_scale_ * s.cart_m + gains[1] * theta_scale_ * s.theta_rad +
-           gains[2] * cart_scale_ * s.cart_mps + gains[3] * theta_scale_ * s.theta_radps;
+    return gains[0] * line_.cart_gain * s.cart_m + gains[1] * line_.theta_gain * s.theta_rad +
+           gains[2] * line_.cart_gain * s.cart_mps + gains[3] * line_.theta_gain * s.theta_radps;
   }
 
  private:
-  double cart_scale_, theta_scale_, cart_offset_m_, theta_offset_rad_;
+  SensorLine<double> line_;
 };
 
 /// A sampled controller with a held voltage.

@@ -26,20 +26,14 @@ struct FeedbackLine {
   double cart_m, theta_rad, cart_mps, theta_radps, offset_v;
 
   FeedbackLine(const Gains& gains, const Dynamics<Lanes>& physics) {
-    const auto shown = [&](double x, double theta) {
-      State s{};
-      s.cart_m = x;
-      s.theta_rad = theta;
-      const Outputs<Lanes> outputs = physics.measure(s);
-      return std::array{outputs.cart_m.values()[0], outputs.theta_rad.values()[0]};
-    };
-    const auto zero = shown(0.0, 0.0);
-    const double cart_scale = shown(1.0, 0.0)[0] - zero[0], angle_scale = shown(0.0, 1.0)[1] - zero[1];
-    cart_m = gains.cart_position_v_per_m * cart_scale;
-    theta_rad = gains.pendulum_angle_v_per_rad * angle_scale;
-    cart_mps = gains.cart_velocity_v_per_mps * cart_scale;
-    theta_radps = gains.pendulum_rate_v_per_radps * angle_scale;
-    offset_v = gains.cart_position_v_per_m * zero[0] + gains.pendulum_angle_v_per_rad * zero[1];
+    const SensorLine<Lanes> line(physics.model());
+    const double cart_gain = line.cart_gain.values()[0], theta_gain = line.theta_gain.values()[0];
+    cart_m = gains.cart_position_v_per_m * cart_gain;
+    theta_rad = gains.pendulum_angle_v_per_rad * theta_gain;
+    cart_mps = gains.cart_velocity_v_per_mps * cart_gain;
+    theta_radps = gains.pendulum_rate_v_per_radps * theta_gain;
+    offset_v = gains.cart_position_v_per_m * line.cart_offset_m.values()[0] +
+               gains.pendulum_angle_v_per_rad * line.theta_offset_rad.values()[0];
   }
 
   Lanes of_change(const State& s) const {

@@ -34,7 +34,8 @@ ExtendedKalmanFilter::ExtendedKalmanFilter(const ControlConfig& config, const Pl
       period_s_(config.period_s()),
       early_s_(input_fraction() * config.period_s()),
       volts_per_newton_(1.0 / plant.motor.force_per_volt_n),
-      drive_deflects_(plant.find("drive_compliance") != nullptr),
+      encoder_differs_(plant.find("drive_compliance") != nullptr ||
+                       plant.find("encoder_eccentricity") != nullptr),
       friction_share_(config.friction.share),
       friction_follows_(config.period_s() / (config.period_s() + config.friction.lag_s)) {
   ExtendedKalmanFilter::start(0.0, 0.0);
@@ -78,8 +79,8 @@ void ExtendedKalmanFilter::propagate(double late_v, double early_v) noexcept {
   friction_lagged_n_ += friction_follows_ * (friction_n() - friction_lagged_n_);
 }
 
-double ExtendedKalmanFilter::drive_deflection_m() const noexcept {
-  if (!drive_deflects_) return 0.0;
+double ExtendedKalmanFilter::encoder_ahead_m() const noexcept {
+  if (!encoder_differs_) return 0.0;
   PlantState<double> state = engine_.state();
   state.motor_v -= volts_per_newton_ * state_(filter_cart_force);
   return position_of(engine_.dynamics().measure(state).cart_m) - state.cart_m;

@@ -25,7 +25,7 @@ class ExtendedKalmanFilter final : public KalmanFilter {
 
  private:
   void propagate(double late_v, double early_v) noexcept override;
-  double drive_deflection_m() const noexcept override;
+  double encoder_ahead_m() const noexcept override;
   double rejected_force_n() const noexcept override;
 
   PlantState<double> plant_state(double drive_v) const noexcept;
@@ -34,7 +34,7 @@ class ExtendedKalmanFilter final : public KalmanFilter {
 
   EventEngine<double> engine_;
   double period_s_, early_s_, volts_per_newton_;
-  bool drive_deflects_;
+  bool encoder_differs_;  ///< from the cart, beyond scale and offset
   double friction_share_, friction_follows_;
   double friction_lagged_n_ = 0.0;
 };

@@ -115,7 +115,7 @@ ControlState KalmanFilter::update(double cart_m, double theta_rad, double applie
     state_(filter_cart_force) = 0.0;
     return shown();
   }
-  const double cart_off = position - drive_deflection_m() - state_(filter_cart);
+  const double cart_off = position - encoder_ahead_m() - state_(filter_cart);
   const double angle_off = lean - state_(filter_theta) - state_(filter_angle_zero);
   step_.correct(state_, cart_off, angle_off);
   return shown();

@@ -50,7 +50,7 @@ class KalmanFilter : public StateEstimator {
   /// `early_v` before that for the fraction of a period that the input delay has.
   virtual void propagate(double late_v, double early_v) noexcept;
   /// How far the sensor shows the cart from where `state_` has it, beyond scale and offset [m].
-  virtual double drive_deflection_m() const noexcept { return 0.0; }
+  virtual double encoder_ahead_m() const noexcept { return 0.0; }
   /// The force on the cart that the voltage takes away, beyond what is known and constant [N].
   virtual double rejected_force_n() const noexcept { return step_.share * state_(filter_cart_force); }
 

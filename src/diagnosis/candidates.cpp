@@ -228,8 +228,9 @@ std::vector<std::size_t> candidate_effects(const Plant& plant, const DataRange& 
     if ((info.enters == Enters::pendulum || angle) && !plant.pendulum) continue;
     if ((info.enters == Enters::pendulum || angle) && !range.theta_measured) continue;
     const bool of_motor =
-        info.enters == Enters::actuator || info.kind == "drive_compliance" || info.kind == "torque_ripple";
-    if ((info.enters == Enters::cart || info.kind == "cart_scale") && !range.cart_moves) continue;
+        info.enters == Enters::actuator || is_named(i, "drive_compliance") || is_named(i, "torque_ripple");
+    const bool of_cart_encoder = info.enters == Enters::sensor && !angle;
+    if ((info.enters == Enters::cart || of_cart_encoder) && !range.cart_moves) continue;
     if (of_motor && (!range.cart_moves || range.largest_voltage_v == 0.0)) continue;
     Plant with = plant;
     std::vector<double> typical;

@@ -15,6 +15,7 @@ namespace {
 std::vector<PlaceForce> force_residual(const FitData& data, const FitPoint& point,
                                        const SelectionPolicy& policy, std::size_t max_samples) {
   const Dynamics<double> dynamics(make_model<double>(point.plant));
+  const double mass_kg = dynamics.base().cart_mass_kg;
   std::vector<PlaceForce> residual;
   for (const ResidualTrace& trace : smooth_residuals(data, point, policy.location.walk))
     for (std::size_t k = 0; k < trace.time_s.size(); ++k) {
@@ -24,7 +25,8 @@ std::vector<PlaceForce> force_residual(const FitData& data, const FitPoint& poin
       state.cart_mps = trace.cart_mps[k];
       const double ripple_n = dynamics.motor_force(state, dynamics.actuate(trace.voltage_v[k])) -
                               dynamics.base().back_emf_n_per_mps * state.cart_mps;
-      residual.push_back({trace.cart_m[k], trace.force_n[k], ripple_n});
+      residual.push_back(
+          {state.cart_m, trace.force_n[k], ripple_n, mass_kg * state.cart_mps * state.cart_mps});
     }
   if (residual.size() > max_samples) {
     std::vector<PlaceForce> thinned;

@@ -201,6 +201,8 @@ class Innovations::Collector {
  public:
   explicit Collector(Innovations& into) : into_(into) {}
 
+  void begin_step() { new_step_ = true; }
+
   void advance(const LinearStep& step, const ProbeValues& acting) {
     for (std::size_t i = 0; i < probes.size(); ++i) responses_[i].advance(step, probes[i].on, acting[i]);
     for (std::size_t i = 0; i < 2; ++i)
@@ -210,6 +212,10 @@ class Innovations::Collector {
   void add(const LinearStep& step, std::size_t channel, const ProbeValues& acting) {
     const double deviation = std::sqrt(step.variance[channel]), weight = step.weight[channel];
     Row row{channel, step.innovation[channel] / deviation, weight, {}};
+    row.keeps = new_step_ ? step.keeps : 1.0;
+    new_step_ = false;
+    for (std::size_t d = 0; d < row.adds.size(); ++d)
+      row.adds[d] = step.update[channel][states + d] * deviation;
     const ActsOn sensor = channel == 0 ? ActsOn::position : ActsOn::angle;
     for (std::size_t i = 0; i < response_count; ++i) {
       const double shift = i < probes.size() && probes[i].on == sensor ? acting[i] : 0.0;
@@ -238,6 +244,17 @@ class Innovations::Collector {
   std::array<Response, response_count> responses_;
   Responses information_{};
   double power_ = 0.0, weight_ = 0.0;
+  bool new_step_ = true;
+};
+
+/// The disturbance that a filter estimates, in its standard deviations: innovations are white.
+struct EstimatedDisturbance {
+  double value = 0.0, variance = 0.0;
+
+  void take(double keeps, double added, double normalised) {
+    value = keeps * value + added * normalised;
+    variance = keeps * keeps * variance + added * added;
+  }
 };
 
 Innovations::Innovations(const FitData& data, const FitPoint& point, const SelectionPolicy& policy)
@@ -260,6 +277,7 @@ void Innovations::examine_segment(const Measurement& run, const Segment& segment
   Collector collector(*this);
   for (std::size_t k = 0; k < steps.size(); ++k) {
     const LinearStep& step = steps[k];
+    collector.begin_step();
     if (k > 0) collector.advance(step, acting);
     for (std::size_t channel = 0; channel < 2; ++channel)
       if (present[channel]) collector.add(step, channel, acting);
@@ -279,7 +297,8 @@ template <class Normalised>
 InnovationStatistics Innovations::statistics_of(Normalised normalised) const {
   std::vector<double> rms;
   std::array<std::vector<Score>, residual_probe_count> probe;
-  std::array<std::vector<double>, 2> pulses;
+  std::array<std::vector<double>, 2> pulses, disturbances;
+  std::array<EstimatedDisturbance, 2> disturbance;
   double power = 0.0;
   std::size_t at = 0;
   for (const Block& block : blocks_) {
@@ -289,6 +308,7 @@ InnovationStatistics Innovations::statistics_of(Normalised normalised) const {
       const Row& row = rows_[at];
       const double e = normalised(row);
       for (std::size_t i = 0; i < response_count; ++i) score[i] += e * row.responses[i];
+      for (std::size_t i = 0; i < 2; ++i) disturbance[i].take(row.keeps, row.adds[i], e);
       block_power += row.weight * e * e;
       block_weight += row.weight;
     }
@@ -300,6 +320,8 @@ InnovationStatistics Innovations::statistics_of(Normalised normalised) const {
       const double information = block.information[residual_probe_count + i];
       if (information > 0.0 && block.visible[i])
         pulses[i].push_back(score[residual_probe_count + i] / std::sqrt(information));
+      if (disturbance[i].variance > 0.0 && block.visible[i])
+        disturbances[i].push_back(disturbance[i].value / std::sqrt(disturbance[i].variance));
     }
   }
   InnovationStatistics result;
@@ -309,6 +331,7 @@ InnovationStatistics Innovations::statistics_of(Normalised normalised) const {
         rms[rms.size() * large_block_percentile_ / 100] / std::max(rms[rms.size() / 2], 1e-12);
   }
   for (std::size_t i = 0; i < 2; ++i) {
+    if (!disturbances[i].empty()) result.disturbance_kurtosis[i] = kurtosis_of(disturbances[i]);
     if (pulses[i].empty()) continue;
     result.kurtosis[i] = kurtosis_of(pulses[i]);
     result.pulse_size[i] = robust_deviation(pulses[i]);

@@ -28,6 +28,9 @@ struct InnovationStatistics {
   double dispersion = 1.0;
   /// [1] Of the pulses, fitted block by block; 3 for a Gaussian.
   std::array<double, 2> kurtosis{not_shown, not_shown};
+  /// [1] Of the disturbance with a memory that the filter estimates, block by block; 3 for a Gaussian. NaN of
+  /// a filter that estimates none.
+  std::array<double, 2> disturbance_kurtosis{not_shown, not_shown};
   /// [1] Over a tenth of a second and more: the size of most pulses over that which white noise that accounts
   /// for single samples makes of them.
   std::array<double, 2> pulse_size{not_shown, not_shown};
@@ -68,6 +71,10 @@ class Innovations {
     double normalised;    ///< measured, in its standard deviations
     double weight;
     Responses responses;  ///< scores per normalised innovation
+    /// Of the estimated disturbances, what remains since the row before, and what a normalised innovation
+    /// adds to each [N, N m].
+    double keeps = 1.0;
+    std::array<double, 2> adds{};
   };
   /// Consecutive innovations of one segment.
   struct Block {

@@ -28,8 +28,13 @@ struct Wave {
   double sine, cosine, turn_sine, turn_cosine;
 };
 
-/// The force of an effect of size one at its crest, to first order.
+bool is_of_encoder(std::size_t effect) {
+  return effect == effect_index<effects::EncoderEccentricity>();
+}
+
+/// The force of an effect of size one at its crest, to first order; of an encoder at a pitch of 2 pi.
 double force_of_unit_size(std::size_t effect, const PlaceForce& at) {
+  if (is_of_encoder(effect)) return -at.speed_squared_nm;
   return effect == effect_index<effects::TorqueRipple>() ? at.ripple_n : 1.0;
 }
 
@@ -38,6 +43,13 @@ struct FittedSine {
   double explained;  ///< of the sum of squares of the residual force [N^2]
   double size, frequency_per_m, phase_rad;
 };
+
+/// Parameters of an effect whose force is this sine.
+std::vector<double> start_at(const FittedSine& sine, std::size_t effect) {
+  const double waves_per_m = is_of_encoder(effect) ? 2.0 * std::numbers::pi * sine.frequency_per_m : 1.0;
+  const double largest = effect_registry()[effect].parameters[0].range.high;
+  return {std::min(sine.size / waves_per_m, largest), 1.0 / sine.frequency_per_m, sine.phase_rad};
+}
 
 /// Sines of all frequencies beside a force that has no period: a periodogram over x.
 std::vector<FittedSine> periodogram(const std::vector<PlaceForce>& residual,
@@ -87,8 +99,7 @@ double longest_pitch_m(const DataRange& range, const PriorPolicy& prior) {
 std::vector<std::vector<double>> periodic_starts(std::size_t effect, const std::vector<PlaceForce>& residual,
                                                  const DataRange& range, const PriorPolicy& prior,
                                                  const SearchBudget& budget) {
-  const ParameterInfo& size = effect_registry()[effect].parameters[0];
-  const std::vector<std::vector<double>> any = {{size.typical, 0.02, 0.0}};
+  const std::vector<std::vector<double>> any = {{effect_registry()[effect].parameters[0].typical, 0.02, 0.0}};
   const double travel = range.cart_high_m - range.cart_low_m;
   if (residual.size() < budget.min_residual_samples || travel <= 0.0) return any;
   std::vector<double> unit_n;
@@ -106,8 +117,7 @@ std::vector<std::vector<double>> periodic_starts(std::size_t effect, const std::
     const bool near = std::any_of(starts.begin(), starts.end(), [&](const std::vector<double>& start) {
       return std::abs(1.0 / start[1] - sine.frequency_per_m) < 4.0 * spacing;
     });
-    if (!near)
-      starts.push_back({std::min(sine.size, size.range.high), 1.0 / sine.frequency_per_m, sine.phase_rad});
+    if (!near) starts.push_back(start_at(sine, effect));
     if (starts.size() == budget.max_pitches) break;
   }
   return starts.empty() ? any : starts;

@@ -16,6 +16,9 @@ struct PlaceForce {
   double cart_m;    ///< position of the cart
   double force_n;   ///< that the model lacks there
   double ripple_n;  ///< that a torque ripple of the whole motor's constant would add there
+  /// Mass times squared speed [N m]. An encoder of eccentricity e and pitch p seems to show -2 pi e / p times
+  /// as much force, with the sine of its angle: the second derivative of what it adds.
+  double speed_squared_nm;
 };
 
 /// The longest pitch [m] of such an effect that these data can show.

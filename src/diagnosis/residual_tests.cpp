@@ -33,6 +33,10 @@ template <std::size_t Pulse>
 double kurtosis(const Statistics& s) {
   return s.kurtosis[Pulse];
 }
+template <std::size_t Disturbance>
+double disturbance_kurtosis(const Statistics& s) {
+  return s.disturbance_kurtosis[Disturbance];
+}
 template <std::size_t Pulse>
 double pulse_size(const Statistics& s) {
   return s.pulse_size[Pulse];
@@ -52,6 +56,11 @@ template <std::size_t Pulse>
 std::string has_heavy_tails(const Statistics& s) {
   return text("what is left comes in bursts: short pulses of ", Pulse == 0 ? "force" : "torque",
               " have a kurtosis of ", s.kurtosis[Pulse], ", chance gives 3");
+}
+template <std::size_t Disturbance>
+std::string comes_and_goes(const Statistics& s) {
+  return text("what is left comes in bursts: a slow ", Disturbance == 0 ? "force" : "torque",
+              " has a kurtosis of ", s.disturbance_kurtosis[Disturbance], ", chance gives 3");
 }
 template <std::size_t Pulse>
 std::string is_too_slow(const Statistics& s) {
@@ -96,6 +105,10 @@ constexpr std::array table = {
     ResidualTest{"dispersion of blocks", dispersion, above, &P::min_dispersion, comes_in_bursts},
     ResidualTest{"kurtosis of pulses of force", kurtosis<0>, above, &P::min_kurtosis, has_heavy_tails<0>},
     ResidualTest{"kurtosis of pulses of torque", kurtosis<1>, above, &P::min_kurtosis, has_heavy_tails<1>},
+    ResidualTest{"kurtosis of slow force", disturbance_kurtosis<0>, above, &P::min_kurtosis,
+                 comes_and_goes<0>},
+    ResidualTest{"kurtosis of slow torque", disturbance_kurtosis<1>, above, &P::min_kurtosis,
+                 comes_and_goes<1>},
     ResidualTest{"size of slow force, too large", pulse_size<0>, above, &P::slowest, is_too_slow<0>},
     ResidualTest{"size of slow torque, too large", pulse_size<1>, above, &P::slowest, is_too_slow<1>},
     ResidualTest{"size of slow force, too small", pulse_size<0>, below, &P::quickest, is_too_quick<0>},

@@ -205,8 +205,8 @@ struct ResidualPolicy {
   /// [1] The probability that chance makes any of the tests significant (Holm). The usual level. A test fails
   /// only if its statistic is beyond its limit below as well.
   double level = 0.05;
-  /// [draws] From the fitted model, for the p-values of the tests. The smallest p-value is 1/500 then, a
-  /// third of the level divided by the eight tests.
+  /// [draws] From the fitted model, for the p-values of the tests. The smallest p-value is 1/500 then, less
+  /// than half of the level divided by the ten tests.
   std::size_t draws = 499;
   /// [standard errors] A smaller dependence of the residual is not looked at: by chance, the largest of a
   /// dozen exceeds three in one diagnosis of thirty. Chosen.
@@ -217,7 +217,8 @@ struct ResidualPolicy {
   /// [1] A smaller dispersion (95th percentile of block RMS over the median) is too little to count, however
   /// certain. Chosen.
   double min_dispersion = 1.3;
-  /// [kurtosis] The same for the kurtosis of short pulses, which is 3 for a Gaussian. Chosen.
+  /// [kurtosis] The same for the kurtosis of short pulses, and of the slow force or torque that a filter
+  /// estimates. It is 3 for a Gaussian. Chosen.
   double min_kurtosis = 4.0;
   /// [1] Over a tenth of a second and more, the residual may be this many times as large as white noise that
   /// accounts for single samples. A disturbance of 10 Hz, which is not white, reaches at most 1.8 (measured

@@ -8,7 +8,6 @@
 
 #include "base/parallel.hpp"
 #include "fit.hpp"
-#include "sensor_gains.hpp"
 
 namespace upright {
 
@@ -41,14 +40,14 @@ std::pair<double, double> local_fit(const std::vector<double>& t, const std::vec
 
 /// The state of which the sensors show these values.
 void state_from_outputs(const Dynamics<double>& dynamics, PlantState<double>& state) {
-  const auto [cart_gain, theta_gain] = sensor_gains(dynamics);
-  state.cart_mps /= cart_gain;
-  state.theta_radps /= theta_gain;
+  const SensorLine<double> line(dynamics.model());
+  state.cart_mps /= line.cart_gain;
+  state.theta_radps /= line.theta_gain;
   PlantState<double> at_origin = state;
   at_origin.cart_m = at_origin.theta_rad = 0.0;
   const Outputs<double> shown = dynamics.measure(at_origin);
-  state.cart_m = (state.cart_m - shown.cart_m) / cart_gain;
-  state.theta_rad = (state.theta_rad - shown.theta_rad) / theta_gain;
+  state.cart_m = (state.cart_m - shown.cart_m) / line.cart_gain;
+  state.theta_rad = (state.theta_rad - shown.theta_rad) / line.theta_gain;
 }
 
 PlantState<double> estimate_initial_state(const Measurement& run, const Segment& segment, const Plant& plant,
@@ -105,13 +104,13 @@ FitResult fit_initial_state(const FitData& segment, const FitPoint& point, const
 void convert_initial_states(std::vector<PlantState<double>>& starts, const Plant& from, const Plant& to) {
   const PlantModel<double> model_from = make_model<double>(from), model_to = make_model<double>(to);
   const Dynamics<double> before(model_from), after(model_to);
-  const auto [cart_gain, theta_gain] = sensor_gains(before);
+  const SensorLine<double> line(model_from);
   for (PlantState<double>& state : starts) {
     const Outputs<double> shown = before.measure(state);
     state.cart_m = shown.cart_m;
     state.theta_rad = shown.theta_rad;
-    state.cart_mps *= cart_gain;
-    state.theta_radps *= theta_gain;
+    state.cart_mps *= line.cart_gain;
+    state.theta_radps *= line.theta_gain;
     state_from_outputs(after, state);
   }
 }

@@ -11,7 +11,6 @@
 
 #include "model/rigid_body.hpp"
 #include "segment_start.hpp"
-#include "sensor_gains.hpp"
 #include "state_vector.hpp"
 #include "upright/model/elementary.hpp"
 #include "upright/sim/simulator.hpp"
@@ -128,7 +127,7 @@ class SegmentLineariser {
         segment_(segment),
         columns_(state_count + static_cast<int>(free.size())),
         simulator_(model_of(run, point.plant, free), engine_options(), max_commands(run, segment)),
-        sensors_(sensor_gains(dynamics())),
+        sensors_(sensor_gains(dynamics().model())),
         shown_of_speed_s_(shown_of_cart_speed_s(dynamics())),
         noise_input_(point.plant, run.cart_locked),
         covariance_(run, point.plant, noise_of_filter(point.noise)) {
@@ -180,6 +179,11 @@ class SegmentLineariser {
       model.parameters[effect_parameter_offset(free[j].effect) + free[j].index]
           .v[state_count + static_cast<int>(j)] = 1.0;
     return model;
+  }
+
+  static std::array<Jet, 2> sensor_gains(const PlantModel<Jet>& model) {
+    const SensorLine<Jet> line(model);
+    return {line.cart_gain, line.theta_gain};
   }
 
   static PlantState<Jet> without_bristles(const PlantState<double>& state) {

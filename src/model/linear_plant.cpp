@@ -69,10 +69,7 @@ std::vector<Place> places_of(const Dynamics<Dual>& dynamics) {
 }
 
 void read_sensors(const Dynamics<Dual>& dynamics, LinearPlant& linear) {
-  PlantState<Dual> state{};
-  state.cart_m = Dual(0.0, 0);
-  state.theta_rad = Dual(0.0, 1);
-  const Outputs<Dual> outputs = dynamics.measure(state);
+  const Outputs<Dual> outputs = outputs_of_true_encoder(dynamics.model(), Dual(0.0, 0), Dual(0.0, 1));
   const Eigen::Vector4d scale(outputs.cart_m.v(0), outputs.theta_rad.v(1), outputs.cart_m.v(0),
                               outputs.theta_rad.v(1));
   const Eigen::Vector4d offset(outputs.cart_m.a, outputs.theta_rad.a, 0.0, 0.0);
@@ -93,6 +90,11 @@ Plant without_dead_zone(Plant plant, LinearPlant& linear) {
   linear.notes.emplace_back(
       "voltage_dead_zone: the slope outside the zone is used, inside it the voltage does nothing");
   return plant;
+}
+
+void record_true_encoder(const Plant& plant, LinearPlant& linear) {
+  if (plant.find("encoder_eccentricity") != nullptr)
+    linear.notes.emplace_back("encoder_eccentricity: the encoder is taken to run true");
 }
 
 void record_stiff_drive(const Plant& plant, LinearPlant& linear) {
@@ -170,6 +172,7 @@ LinearPlant linearize(const Plant& plant, double smoothing) {
   linear.input_delay_s = dynamics.input_delay_s().a;
   read_sensors(dynamics, linear);
   record_stiff_drive(plant, linear);
+  record_true_encoder(plant, linear);
   refuse_not_finite(linear);
   return linear;
 }

@@ -59,6 +59,7 @@ const std::vector<std::string>& hidden_kinds() {
                                                  "pivot_quadratic_drag",
                                                  "drive_compliance",
                                                  "angle_offset",
+                                                 "encoder_eccentricity",
                                                  "cart_scale",
                                                  "angle_scale",
                                                  "cart_mass",
@@ -126,6 +127,9 @@ std::vector<double> values_for(const std::string& kind, Size size, const Plant& 
     return {force, s.travel_m / between(random, 4.0, 15.0), between(random, -3.0, 3.0)};
   if (kind == "torque_ripple")
     return {1.5 * share, s.travel_m / between(random, 4.0, 15.0), between(random, -3.0, 3.0)};
+  if (kind == "encoder_eccentricity")
+    return {pick(size, 0.005, 0.02, 0.06) * between(random, 0.8, 1.25),
+            s.travel_m / between(random, 4.0, 12.0), between(random, -3.0, 3.0)};
   if (kind == "drive_compliance") return {pick(size, 0.0002, 0.0006, 0.002) * s.travel_m / s.force_n};
   if (kind == "voltage_saturation") return {s.high_volts * pick(size, 0.85, 0.65, 0.45)};
   if (kind == "voltage_dead_zone") return {share * s.volts};

@@ -271,6 +271,7 @@ const Friction everywhere[] = {{"smooth", "exponential", 100.0},
                                {"bristles", "dynamic", 0.0},
                                {"table", "viscous", 0.0, "force_table", table},
                                {"torque_ripple", "exponential", 0.0, "torque_ripple", {0.1, 0.02, 0.4}},
+                               {"eccentric", "exponential", 0.0, "encoder_eccentricity", {0.03, 0.02, 0.4}},
                                {"pivot_drag", "exponential", 0.0, "pivot_quadratic_drag", {0.003}}};
 const Friction sampled_only[] = {
     {"pivot_smooth", "exponential", 100.0, "pivot_coulomb_friction", {0.01}},

@@ -198,6 +198,14 @@ const std::map<std::string, std::function<void()>>& answers() {
          const double force = 4.0 * 1.7189 - 0.5 * 7.682;
          EXPECT_DOUBLE_EQ(with("drive_compliance", {1e-3}).measure(s).cart_m, 0.1 + 1e-3 * force);
        }},
+      {"encoder_eccentricity",
+       [] {
+         constexpr double turn_m = 0.4, radius_m = 0.4 / (2.0 * std::numbers::pi);
+         const Physics p = with("encoder_eccentricity", {0.03, turn_m, 0.0});
+         EXPECT_NEAR(shown(p).cart_m, 0.1 + 0.03 * radius_m, 1e-15);  // a quarter of a turn
+         const Physics shifted = with("encoder_eccentricity", {0.03, turn_m, 0.5});
+         EXPECT_EQ(shifted.measure({}).cart_m, 0.0);
+       }},
       {"cart_scale", [] { EXPECT_DOUBLE_EQ(shown(with("cart_scale", {1.02})).cart_m, 0.102); }},
       {"angle_scale", [] { EXPECT_DOUBLE_EQ(shown(with("angle_scale", {0.98})).theta_rad, 0.196); }},
       {"cart_mass", [] { EXPECT_DOUBLE_EQ(with("cart_mass", {1.1}).base().cart_mass_kg, 1.1 * 0.815); }},
@@ -261,7 +269,7 @@ INSTANTIATE_TEST_SUITE_P(All, Effect, testing::Range(std::size_t{0}, effect_coun
 });
 
 TEST(Registry, IsWhole) {
-  EXPECT_EQ(effect_count, 32u);
+  EXPECT_EQ(effect_count, 33u);
   std::set<std::string_view> kinds;
   std::size_t offset = 0;
   for (std::size_t i = 0; i < effect_count; ++i) {

@@ -121,6 +121,16 @@ TEST_P(ExtendedKalman, FollowsTheWholeActuatorChain) {
   EXPECT_LT(off.velocity_mps, 2e-3);
 }
 
+TEST_P(ExtendedKalman, CorrectsAnEncoderThatErrsOncePerTurn) {
+  config.friction.share = 0.0;
+  const Plant even = plant;
+  plant.set("encoder_eccentricity", {0.1, 0.02, 0.5});
+  const Beside::Off known = Beside(plant, config, plant).go_on(400);
+  const Beside::Off unknown = Beside(plant, config, even).go_on(400);
+  EXPECT_LT(known.velocity_mps, 2e-3);
+  EXPECT_GT(unknown.velocity_mps, 5.0 * known.velocity_mps);
+}
+
 TEST_P(ExtendedKalman, PredictsThroughMissingReadings) {
   Beside whole(plant, config, plant), holed(plant, config, plant);
   whole.go_on(300);

@@ -476,6 +476,37 @@ TYPED_TEST(KnownAnswers, DelayedFeedbackFollowsTheMethodOfSteps) {
   }
 }
 
+// The chain rule, with what the engine shows at close times: the encoder turns (1 + e cos(angle)) times as
+// fast.
+TYPED_TEST(KnownAnswers, EccentricEncoderTurnsUnevenly) {
+  constexpr double share = 0.05, pitch_m = 0.06, phase_rad = 0.7, speed_mps = 0.4, step_s = 1e-4;
+  Plant plant = free_cart();
+  plant.set("encoder_eccentricity", {share, pitch_m, phase_rad});
+  auto e = this->engine(plant);
+  e.start({0.0, 0.0, speed_mps, 0.0});
+  EXPECT_EQ(e.outputs().cart_m, 0.0);
+  double last_m = 0.0, largest = 0.0;
+  for (int k = 0; k < 2000; ++k) {
+    e.advance(step_s, 0.0);
+    const double middle_m = e.state().cart_m - 0.5 * speed_mps * step_s;
+    const double rate_mps = (e.outputs().cart_m - last_m) / step_s;
+    const double turn = 2.0 * pi * middle_m / pitch_m + phase_rad;
+    EXPECT_NEAR(rate_mps, speed_mps * (1.0 + share * std::cos(turn)), 1e-6);
+    last_m = e.outputs().cart_m;
+    largest = std::max(largest, std::abs(last_m - e.state().cart_m));
+  }
+  EXPECT_GT(largest, share * pitch_m / (2.0 * pi));  // it came around
+}
+
+TYPED_TEST(KnownAnswers, UnsampledLoopsTakeTheEncoderToRunTrue) {
+  Plant plant = paper_plant();
+  plant.set("cart_scale", {0.9});
+  plant.set("encoder_eccentricity", {0.3, 0.2, 0.5});
+  const Measured seen = MeasuredState(Dynamics<double>(make_model<double>(plant)))({0.1, 0.0, 0.3, 0.0});
+  EXPECT_DOUBLE_EQ(seen[0], 0.09);
+  EXPECT_DOUBLE_EQ(seen[2], 0.27);
+}
+
 TYPED_TEST(KnownAnswers, SensorsScaleAndShiftWhatTheLoopSees) {
   Plant plant = paper_plant();
   plant.set("angle_offset", {0.02});

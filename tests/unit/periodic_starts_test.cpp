@@ -25,7 +25,7 @@ std::vector<PlaceForce> residual_with(double cogging_n, double ripple) {
     const double wave = std::sin(2.0 * std::numbers::pi * x / pitch_m + phase_rad);
     // A motor that is a tenth too strong everywhere, and a constant force: neither has a period.
     const double even_n = 0.1 * unit_n + 0.2;
-    residual.push_back({x, even_n + (cogging_n + ripple * unit_n) * wave + noise_n(random), unit_n});
+    residual.push_back({x, even_n + (cogging_n + ripple * unit_n) * wave + noise_n(random), unit_n, 0.0});
   }
   return residual;
 }
@@ -60,6 +60,21 @@ TEST(PeriodicStarts, TorqueRippleIsFoundThoughItsForceChangesSign) {
   expect_found(effect_number("torque_ripple"), residual_with(0.0, size));
 }
 
+// What an encoder shows of a cart that moves at even speed: its second derivative is taken for a force.
+TEST(PeriodicStarts, EccentricEncoderIsFoundInTheForceItShows) {
+  constexpr double mass_kg = 0.8, waves_per_m = 2.0 * std::numbers::pi / pitch_m;
+  std::mt19937_64 random(6);
+  std::uniform_real_distribution<double> place_m(-0.1, 0.3), speed_mps(-0.5, 0.5);
+  std::normal_distribution<double> noise_n(0.0, 0.02);
+  std::vector<PlaceForce> residual;
+  for (int i = 0; i < 3000; ++i) {
+    const double x = place_m(random), v = speed_mps(random);
+    const double shown_mps2 = -size * waves_per_m * v * v * std::sin(waves_per_m * x + phase_rad);
+    residual.push_back({x, 0.2 + mass_kg * shown_mps2 + noise_n(random), 1.0, mass_kg * v * v});
+  }
+  expect_found(effect_number("encoder_eccentricity"), residual);
+}
+
 TEST(PeriodicStarts, FewSamplesStartAnywhere) {
   std::vector<PlaceForce> few = residual_with(size, 0.0);
   few.resize(10);
@@ -70,6 +85,7 @@ TEST(PeriodicStarts, FewSamplesStartAnywhere) {
 TEST(PeriodicStarts, EffectsWithAPitchArePeriodic) {
   EXPECT_TRUE(is_periodic(effect_number("cogging_force")));
   EXPECT_TRUE(is_periodic(effect_number("torque_ripple")));
+  EXPECT_TRUE(is_periodic(effect_number("encoder_eccentricity")));
   EXPECT_FALSE(is_periodic(effect_number("cable_spring")));
 }
 

@@ -160,6 +160,36 @@ TEST(Bootstrap, FindsBacklashAndNotWhiteForce) {
   EXPECT_TRUE(fails());
 }
 
+/// Statistics beside a Gauss-Markov force of this size, as the fit of a disturbance has it.
+ResidualTests beside_coloured_force(const blind::Rig& rig, double force_n, double correlation_s) {
+  const std::vector<Measurement> runs = runs_of(rig);
+  const FitData data{&runs, cut_segments(runs)};
+  FitPoint point{rig.plant, estimate_initial_states(runs, data.segments, rig.plant), {.force = 0.01}};
+  point.noise.coloured_force_n = force_n;
+  point.noise.correlation_s = correlation_s;
+  const Innovations innovations(data, with_fitted_initial_states(data, point), {});
+  ResidualTests tests;
+  tests.noise_ratio = 10.0;
+  tests.statistics = innovations.measured();
+  tests.p_values = residual_p_values(innovations, tests.statistics, {});
+  return tests;
+}
+
+TEST(Bootstrap, FindsGustsThatASlowForceAccountsFor) {
+  constexpr double force_n = 0.2, correlation_s = 0.15;
+  blind::Rig rig{.plant = cart(), .coloured = {.force_n = force_n, .force_time_s = correlation_s}};
+  const ResidualTests gaussian = beside_coloured_force(rig, force_n, correlation_s);
+  EXPECT_EQ(failed_test(gaussian, {}), nullptr);
+  EXPECT_NEAR(gaussian.statistics.disturbance_kurtosis[0], 3.0, 1.0);
+  rig.coloured = {};
+  rig.disturbance_n = 0.02;
+  rig.unknown = blind::Unknown::gusts;
+  rig.gust_force_n = 1.0;
+  const ResidualTests gusts = beside_coloured_force(rig, force_n, correlation_s);
+  EXPECT_GT(gusts.statistics.disturbance_kurtosis[0], 2.0 * ResidualPolicy{}.min_kurtosis);
+  EXPECT_NE(failed_test(gusts, {}), nullptr);
+}
+
 TEST(Bootstrap, EndsEarlyWhereChanceIsPlain) {
   const blind::Rig rig{.plant = cart(), .disturbance_n = 0.05};
   const std::vector<Measurement> runs = runs_of(rig);

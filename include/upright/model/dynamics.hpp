@@ -14,6 +14,7 @@
 #include "upright/model/plant_model.hpp"
 #include "upright/model/plant_state.hpp"
 #include "upright/model/scalar.hpp"
+#include "upright/model/sensors.hpp"
 
 namespace upright {
 
@@ -121,14 +122,7 @@ class Dynamics {
 
   /// The outputs of the sensors in a state (before quantisation).
   Outputs<S> measure(const PlantState<S>& state) const {
-    Outputs<S> outputs{state.cart_m + drive_deflection_m(state), state.theta_rad};
-    for (int stage = 1; stage <= 2; ++stage)
-      for_each_effect([&]<std::size_t I>() {
-        using E = EffectAt<I>;
-        if constexpr (requires { E::sensor_stage; })
-          if (E::sensor_stage == stage && present_.template has<I>()) E::measure(p<I>(), outputs);
-      });
-    return outputs;
+    return sensor_outputs(model_, S(state.cart_m + drive_deflection_m(state)), state.theta_rad);
   }
 
   /// Level of dry friction of the cart in direction +1 or -1 at a speed >= 0: the friction while sliding,

@@ -19,7 +19,8 @@
 //   S input_delay_s(p), S motor_time_constant_s(p)
 //   S bristle_stiffness(p), S bristle_damping(p)
 //   S drive_deflection_m(p, force)                  position of the motor relative to the cart [m]
-//   void measure(p, Outputs<S>&)                    one stage of the sensors, by `sensor_stage`
+//   S encoder_error_m(p, x)                         what the cart's encoder shows too much [m]
+//   void measure(p, Outputs<S>&)                    one linear stage of the sensors, by `sensor_stage`
 //   void correct(p, BaseParameters<S>&)             the true base parameters from the model's
 //   double rate_radps(p, v, mass)                   its greatest rate [1/s], by which engines choose
 //                                                   their steps

@@ -14,6 +14,7 @@
 #include "upright/model/effects/constant_force.hpp"
 #include "upright/model/effects/coulomb_friction.hpp"
 #include "upright/model/effects/drive_compliance.hpp"
+#include "upright/model/effects/encoder_eccentricity.hpp"
 #include "upright/model/effects/force_table.hpp"
 #include "upright/model/effects/friction_asymmetry.hpp"
 #include "upright/model/effects/input_delay.hpp"
@@ -66,6 +67,7 @@ using AllEffects =
                effects::PivotQuadraticDrag,
                effects::DriveCompliance,
                effects::AngleOffset,
+               effects::EncoderEccentricity,
                effects::CartScale,
                effects::AngleScale,
                effects::CartMass,

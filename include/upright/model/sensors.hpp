@@ -1,0 +1,54 @@
+// What the sensors show of the position of the drive and the angle of the pendulum, before quantisation.
+#pragma once
+
+#include "upright/model/plant_model.hpp"
+
+namespace upright {
+
+/// The outputs of sensors whose encoder of the cart runs true: linear in position and angle.
+template <class S>
+Outputs<S> outputs_of_true_encoder(const PlantModel<S>& model, const S& drive_m, const S& theta_rad) {
+  Outputs<S> outputs{drive_m, theta_rad};
+  for (int stage = 1; stage <= 2; ++stage)
+    for_each_effect([&]<std::size_t I>() {
+      using E = EffectAt<I>;
+      if constexpr (requires { E::sensor_stage; })
+        if (E::sensor_stage == stage && model.present.template has<I>())
+          E::measure(model.template of<I>(), outputs);
+    });
+  return outputs;
+}
+
+/// The outputs of the sensors.
+template <class S>
+Outputs<S> sensor_outputs(const PlantModel<S>& model, const S& drive_m, const S& theta_rad) {
+  S turned_m = drive_m;  // as the encoder's pinion says
+  for_each_effect([&]<std::size_t I>() {
+    using E = EffectAt<I>;
+    if constexpr (requires { E::encoder_error_m(model.template of<I>(), drive_m); })
+      if (model.present.template has<I>())
+        turned_m = turned_m + E::encoder_error_m(model.template of<I>(), drive_m);
+  });
+  return outputs_of_true_encoder(model, turned_m, theta_rad);
+}
+
+/// The outputs as linear functions of position and angle, of an encoder that runs true.
+template <class S>
+struct SensorLine {
+  S cart_gain;         ///< metres shown per metre
+  S theta_gain;        ///< radians shown per radian
+  S cart_offset_m;     ///< shown at x = 0
+  S theta_offset_rad;  ///< shown at theta = 0
+
+  /// Of a plant.
+  explicit SensorLine(const PlantModel<S>& model) {
+    const Outputs<S> zero = outputs_of_true_encoder(model, S(0.0), S(0.0));
+    const Outputs<S> one = outputs_of_true_encoder(model, S(1.0), S(1.0));
+    cart_gain = one.cart_m - zero.cart_m;
+    theta_gain = one.theta_rad - zero.theta_rad;
+    cart_offset_m = zero.cart_m;
+    theta_offset_rad = zero.theta_rad;
+  }
+};
+
+}  // namespace upright
