@@ -46,7 +46,10 @@ void state_from_outputs(const Dynamics<double>& dynamics, PlantState<double>& st
   PlantState<double> at_origin = state;
   at_origin.cart_m = at_origin.theta_rad = 0.0;
   const Outputs<double> shown = dynamics.measure(at_origin);
-  state.cart_m = (state.cart_m - shown.cart_m) / line.cart_gain;
+  const double turned_m = (state.cart_m - shown.cart_m) / line.cart_gain;
+  const double ahead_m = shown.cart_m / line.cart_gain;  // of the cart is a drive that gives way
+  state.cart_m =
+      drive_position_m(dynamics.model(), turned_m + ahead_m) - drive_position_m(dynamics.model(), ahead_m);
   state.theta_rad = (state.theta_rad - shown.theta_rad) / line.theta_gain;
 }
 

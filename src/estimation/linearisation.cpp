@@ -200,8 +200,12 @@ class SegmentLineariser {
   void start_sensitivity(const PlantState<double>& start) {
     for (int i = 0; i < state_count; ++i) sensitivity_[static_cast<std::size_t>(i)] = Row::Unit(i);
     // Parameters of the sensors change what is meant by what they show at the start, not what they show.
-    const Outputs<Jet> shown = dynamics().measure(without_bristles(start));
-    sensitivity_[0] -= shown.cart_m.v / sensors_[0].a;
+    PlantState<Jet> at_start = without_bristles(start);
+    at_start.cart_m.v[0] = 1.0;
+    const Outputs<Jet> shown = dynamics().measure(at_start);
+    Row by_parameters = shown.cart_m.v;
+    by_parameters[0] = 0.0;
+    sensitivity_[0] -= by_parameters / shown.cart_m.v[0];
     sensitivity_[1] -= shown.theta_rad.v / sensors_[1].a;
     sensitivity_[2] -= start.cart_mps * worth_less_[0];
     sensitivity_[3] -= start.theta_radps * worth_less_[1];

@@ -19,17 +19,31 @@ Outputs<S> outputs_of_true_encoder(const PlantModel<S>& model, const S& drive_m,
   return outputs;
 }
 
-/// The outputs of the sensors.
+/// What the pinion of the cart's encoder says too much at this position of the drive [m].
 template <class S>
-Outputs<S> sensor_outputs(const PlantModel<S>& model, const S& drive_m, const S& theta_rad) {
-  S turned_m = drive_m;  // as the encoder's pinion says
+S encoder_error_m(const PlantModel<S>& model, const S& drive_m) {
+  S error_m(0.0);
   for_each_effect([&]<std::size_t I>() {
     using E = EffectAt<I>;
     if constexpr (requires { E::encoder_error_m(model.template of<I>(), drive_m); })
       if (model.present.template has<I>())
-        turned_m = turned_m + E::encoder_error_m(model.template of<I>(), drive_m);
+        error_m = error_m + E::encoder_error_m(model.template of<I>(), drive_m);
   });
-  return outputs_of_true_encoder(model, turned_m, theta_rad);
+  return error_m;
+}
+
+/// The outputs of the sensors.
+template <class S>
+Outputs<S> sensor_outputs(const PlantModel<S>& model, const S& drive_m, const S& theta_rad) {
+  return outputs_of_true_encoder(model, S(drive_m + encoder_error_m(model, drive_m)), theta_rad);
+}
+
+/// The position of the drive at which the encoder's pinion says `turned_m` [m].
+inline double drive_position_m(const PlantModel<double>& model, double turned_m) {
+  constexpr int steps = 60;  // each at least halves the error: a share is at most 0.5
+  double drive_m = turned_m;
+  for (int i = 0; i < steps; ++i) drive_m = turned_m - encoder_error_m(model, drive_m);
+  return drive_m;
 }
 
 /// The outputs as linear functions of position and angle, of an encoder that runs true.

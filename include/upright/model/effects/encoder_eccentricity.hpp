@@ -11,7 +11,7 @@ namespace upright::effects {
 struct EncoderEccentricity {
   /// Its parameters, in the order of a plant file.
   static constexpr ParameterInfo parameters[] = {
-      {"share", "1", (Range{0.0, 0.95}), 0.0, 0.01,
+      {"share", "1", (Range{0.0, 0.5}), 0.0, 0.01,
        "e: largest change of what is shown per metre, as a share"},
       {"pitch_m", "m", Range::positive(), no_neutral, 0.1, "p: travel of the cart per turn of the pinion"},
       {"phase_rad", "rad", Range::any(), no_neutral, 0.0, "phase at x = 0"},
