@@ -143,6 +143,12 @@ double robust_deviation(std::vector<double> values) {
   return median_of(std::move(values)) / median_of_gaussian_magnitudes;
 }
 
+/// A percentile of at least one number over their median.
+double dispersion_of(std::vector<double> values, std::size_t percentile) {
+  std::sort(values.begin(), values.end());
+  return values[values.size() * percentile / 100] / std::max(values[values.size() / 2], 1e-12);
+}
+
 Score sum_of(const std::vector<Score>& scores) {
   Score sum;
   for (const Score& s : scores) {
@@ -201,7 +207,11 @@ class Innovations::Collector {
  public:
   explicit Collector(Innovations& into) : into_(into) {}
 
-  void begin_step() { new_step_ = true; }
+  void begin_step(const LinearStep& step) {
+    new_step_ = true;
+    for (std::size_t i = 0; i < square_speed_.size(); ++i) square_speed_[i] += step.rate[i] * step.rate[i];
+    samples_ += 1.0;
+  }
 
   void advance(const LinearStep& step, const ProbeValues& acting) {
     for (std::size_t i = 0; i < probes.size(); ++i) responses_[i].advance(step, probes[i].on, acting[i]);
@@ -232,8 +242,15 @@ class Innovations::Collector {
   void close(const std::array<bool, 2>& visible, const ResidualPolicy& policy) {
     const bool shows_noise =
         weight_ > policy.min_block_weight && power_ > policy.at_rest * policy.at_rest * weight_;
-    into_.blocks_.push_back({into_.rows_.size(), !shows_noise, visible, information_});
+    const auto rms = [&](double square) { return std::sqrt(square / std::max(samples_, 1.0)); };
+    into_.blocks_.push_back({into_.rows_.size(),
+                             !shows_noise,
+                             visible,
+                             {rms(square_speed_[0]), rms(square_speed_[1])},
+                             information_});
     information_.fill(0.0);
+    square_speed_.fill(0.0);
+    samples_ = 0.0;
     power_ = weight_ = 0.0;
     // Each pulse acts in its block alone.
     for (std::size_t i = probes.size(); i < response_count; ++i) responses_[i] = {};
@@ -244,7 +261,20 @@ class Innovations::Collector {
   std::array<Response, response_count> responses_;
   Responses information_{};
   double power_ = 0.0, weight_ = 0.0;
+  std::array<double, 2> square_speed_{};
+  double samples_ = 0.0;
   bool new_step_ = true;
+};
+
+/// One number of each block, and a speed in it.
+struct BySpeed {
+  std::vector<double> values, speeds;
+
+  void add(double value, double speed) {
+    values.push_back(value);
+    speeds.push_back(speed);
+  }
+  std::vector<double> without_growth() const { return upright::without_growth(values, speeds); }
 };
 
 /// The disturbance that a filter estimates, in its standard deviations: innovations are white.
@@ -277,7 +307,7 @@ void Innovations::examine_segment(const Measurement& run, const Segment& segment
   Collector collector(*this);
   for (std::size_t k = 0; k < steps.size(); ++k) {
     const LinearStep& step = steps[k];
-    collector.begin_step();
+    collector.begin_step(step);
     if (k > 0) collector.advance(step, acting);
     for (std::size_t channel = 0; channel < 2; ++channel)
       if (present[channel]) collector.add(step, channel, acting);
@@ -295,9 +325,9 @@ void Innovations::examine_segment(const Measurement& run, const Segment& segment
 /// `normalised`: of a row, each in turn.
 template <class Normalised>
 InnovationStatistics Innovations::statistics_of(Normalised normalised) const {
-  std::vector<double> rms;
+  BySpeed rms;
   std::array<std::vector<Score>, residual_probe_count> probe;
-  std::array<std::vector<double>, 2> pulses, disturbances;
+  std::array<BySpeed, 2> pulses, disturbances;
   std::array<EstimatedDisturbance, 2> disturbance;
   double power = 0.0;
   std::size_t at = 0;
@@ -312,29 +342,26 @@ InnovationStatistics Innovations::statistics_of(Normalised normalised) const {
       block_power += row.weight * e * e;
       block_weight += row.weight;
     }
-    if (!block.at_rest) rms.push_back(std::sqrt(block_power / block_weight));
+    if (!block.at_rest) rms.add(std::sqrt(block_power / block_weight), block.speed[0]);
     power += block_power;
     for (std::size_t i = 0; i < residual_probe_count; ++i)
       probe[i].push_back({score[i], block.information[i]});
     for (std::size_t i = 0; i < 2; ++i) {
       const double information = block.information[residual_probe_count + i];
       if (information > 0.0 && block.visible[i])
-        pulses[i].push_back(score[residual_probe_count + i] / std::sqrt(information));
+        pulses[i].add(score[residual_probe_count + i] / std::sqrt(information), block.speed[i]);
       if (disturbance[i].variance > 0.0 && block.visible[i])
-        disturbances[i].push_back(disturbance[i].value / std::sqrt(disturbance[i].variance));
+        disturbances[i].add(disturbance[i].value / std::sqrt(disturbance[i].variance), block.speed[i]);
     }
   }
   InnovationStatistics result;
-  if (!rms.empty()) {
-    std::sort(rms.begin(), rms.end());
-    result.dispersion =
-        rms[rms.size() * large_block_percentile_ / 100] / std::max(rms[rms.size() / 2], 1e-12);
-  }
+  if (!rms.values.empty()) result.dispersion = dispersion_of(rms.without_growth(), large_block_percentile_);
   for (std::size_t i = 0; i < 2; ++i) {
-    if (!disturbances[i].empty()) result.disturbance_kurtosis[i] = kurtosis_of(disturbances[i]);
-    if (pulses[i].empty()) continue;
-    result.kurtosis[i] = kurtosis_of(pulses[i]);
-    result.pulse_size[i] = robust_deviation(pulses[i]);
+    if (!disturbances[i].values.empty())
+      result.disturbance_kurtosis[i] = kurtosis_of(disturbances[i].without_growth());
+    if (pulses[i].values.empty()) continue;
+    result.kurtosis[i] = kurtosis_of(pulses[i].without_growth());
+    result.pulse_size[i] = robust_deviation(pulses[i].values);
   }
   for (std::size_t i = 0; i < residual_probe_count; ++i) {
     const Score sum = sum_of(probe[i]);

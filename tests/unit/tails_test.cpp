@@ -2,7 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <random>
+#include <utility>
 
 namespace upright {
 namespace {
@@ -34,6 +36,40 @@ TEST(Kurtosis, OfNumbersThatAreTooSmallIsNone) {
   std::vector<double> quiet(100, 0.01);
   quiet[50] = 1.0;
   EXPECT_LT(kurtosis_of(quiet), 0.1);
+}
+
+/// Gaussian numbers whose scatter grows with a speed, and the speeds.
+std::pair<std::vector<double>, std::vector<double>> growing(std::size_t count, double growth) {
+  std::mt19937_64 random(11);
+  std::exponential_distribution<double> speed;
+  std::vector<double> values = gaussian(count, random), speeds;
+  for (double& v : values) {
+    speeds.push_back(0.3 * speed(random));
+    v *= std::sqrt(1.0 + growth * speeds.back() * speeds.back());
+  }
+  return {values, speeds};
+}
+
+double mean_square(const std::vector<double>& values) {
+  double sum = 0.0;
+  for (const double v : values) sum += v * v;
+  return sum / static_cast<double>(values.size());
+}
+
+TEST(Growth, WithSpeedIsNoHeavyTail) {
+  const auto [values, speeds] = growing(2000, 100.0);
+  EXPECT_GT(kurtosis_of(values), 6.0);
+  EXPECT_NEAR(kurtosis_of(without_growth(values, speeds)), 3.0, 0.5);
+  EXPECT_NEAR(mean_square(without_growth(values, speeds)), mean_square(values), 1e-9);
+}
+
+TEST(Growth, LeavesWhatDoesNotGoWithSpeed) {
+  auto [values, speeds] = growing(200, 0.0);
+  values[20] = 9.0;
+  values[21] = -8.0;
+  values[90] = 7.0;
+  EXPECT_GT(kurtosis_of(without_growth(values, speeds)), 0.8 * kurtosis_of(values));
+  EXPECT_EQ(without_growth(values, std::vector<double>(200, 0.0)), values);
 }
 
 }  // namespace
