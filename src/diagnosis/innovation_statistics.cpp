@@ -209,7 +209,10 @@ class Innovations::Collector {
 
   void begin_step(const LinearStep& step) {
     new_step_ = true;
-    for (std::size_t i = 0; i < square_speed_.size(); ++i) square_speed_[i] += step.rate[i] * step.rate[i];
+    for (std::size_t i = 0; i < square_speed_.size(); ++i) {
+      square_speed_[i] += step.rate[i] * step.rate[i];
+      held_[i] = held_[i] || step.holds[i] > 0.0;
+    }
     samples_ += 1.0;
   }
 
@@ -238,18 +241,22 @@ class Innovations::Collector {
     into_.rows_.push_back(row);
   }
 
-  /// Ends a block. Pulses count where they are `visible`.
-  void close(const std::array<bool, 2>& visible, const ResidualPolicy& policy) {
+  /// Ends a block. Pulses count where they are `visible`. A block counts where dry friction holds nothing:
+  /// where it holds and lets go, the innovations are not Gaussian under the right model.
+  void close(std::array<bool, 2> visible, const ResidualPolicy& policy) {
     const bool shows_noise =
         weight_ > policy.min_block_weight && power_ > policy.at_rest * policy.at_rest * weight_;
+    for (std::size_t i = 0; i < held_.size(); ++i) visible[i] = visible[i] && !held_[i];
+    const bool slides = !held_[0] && !held_[1];
     const auto rms = [&](double square) { return std::sqrt(square / std::max(samples_, 1.0)); };
     into_.blocks_.push_back({into_.rows_.size(),
-                             !shows_noise,
+                             shows_noise && slides,
                              visible,
                              {rms(square_speed_[0]), rms(square_speed_[1])},
                              information_});
     information_.fill(0.0);
     square_speed_.fill(0.0);
+    held_.fill(false);
     samples_ = 0.0;
     power_ = weight_ = 0.0;
     // Each pulse acts in its block alone.
@@ -262,6 +269,7 @@ class Innovations::Collector {
   Responses information_{};
   double power_ = 0.0, weight_ = 0.0;
   std::array<double, 2> square_speed_{};
+  std::array<bool, 2> held_{};  ///< by dry friction, for a while
   double samples_ = 0.0;
   bool new_step_ = true;
 };
@@ -342,7 +350,7 @@ InnovationStatistics Innovations::statistics_of(Normalised normalised) const {
       block_power += row.weight * e * e;
       block_weight += row.weight;
     }
-    if (!block.at_rest) rms.add(std::sqrt(block_power / block_weight), block.speed[0]);
+    if (block.counts) rms.add(std::sqrt(block_power / block_weight), block.speed[0]);
     power += block_power;
     for (std::size_t i = 0; i < residual_probe_count; ++i)
       probe[i].push_back({score[i], block.information[i]});

@@ -24,8 +24,8 @@ inline constexpr std::size_t residual_probe_count = 14;
 /// them would move its sensor.
 struct InnovationStatistics {
   static constexpr double not_shown = std::numeric_limits<double>::quiet_NaN();
-  // What grows with the speed of the cart or pendulum is taken out of these before their tails are compared: a
-  // disturbance may be larger in fast motion.
+  // What grows with the speed of the cart or pendulum is taken out of these before their tails are compared:
+  // a disturbance may be larger in fast motion.
   /// [1] 95th percentile of the blocks' rms over its median. 1 if there are no blocks.
   double dispersion = 1.0;
   /// [1] Of the pulses, fitted block by block; 3 for a Gaussian.
@@ -81,7 +81,7 @@ class Innovations {
   /// Consecutive innovations of one segment.
   struct Block {
     std::size_t end;              ///< number of the first row after it
-    bool at_rest;                 ///< within one encoder step: it shows no noise
+    bool counts;                  ///< nothing is held, and it moves more than an encoder step
     std::array<bool, 2> visible;  ///< whether a pulse moves its sensor
     std::array<double, 2> speed;  ///< rms of the cart's and of the pendulum's [m/s, rad/s]
     Responses information;

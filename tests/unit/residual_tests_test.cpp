@@ -19,11 +19,12 @@ Plant cart() {
   return plant;
 }
 
-std::vector<Measurement> runs_of(const blind::Rig& rig) {
+std::vector<Measurement> runs_of(const blind::Rig& rig,
+                                 blind::Experiment experiment = blind::Experiment::square) {
   std::vector<Measurement> runs;
   for (unsigned seed = 1; seed <= 2; ++seed) {
     blind::Plan plan;
-    plan.experiment = blind::Experiment::square;
+    plan.experiment = experiment;
     plan.rate_hz = 250.0;
     plan.seed = seed;
     runs.push_back(measure(rig, plan, "run"));
@@ -161,8 +162,9 @@ TEST(Bootstrap, FindsBacklashAndNotWhiteForce) {
 }
 
 /// Statistics beside a Gauss-Markov force of this size, as the fit of a disturbance has it.
-ResidualTests beside_coloured_force(const blind::Rig& rig, double force_n, double correlation_s) {
-  const std::vector<Measurement> runs = runs_of(rig);
+ResidualTests beside_coloured_force(const blind::Rig& rig, double force_n, double correlation_s,
+                                    blind::Experiment experiment = blind::Experiment::square) {
+  const std::vector<Measurement> runs = runs_of(rig, experiment);
   const FitData data{&runs, cut_segments(runs)};
   FitPoint point{rig.plant, estimate_initial_states(runs, data.segments, rig.plant), {.force = 0.01}};
   point.noise.coloured_force_n = force_n;
@@ -188,6 +190,22 @@ TEST(Bootstrap, FindsGustsThatASlowForceAccountsFor) {
   const ResidualTests gusts = beside_coloured_force(rig, force_n, correlation_s);
   EXPECT_GT(gusts.statistics.disturbance_kurtosis[0], 2.0 * ResidualPolicy{}.min_kurtosis);
   EXPECT_NE(failed_test(gusts, {}), nullptr);
+}
+
+// Where dry friction holds and lets go, a filter of the right model is far off for a moment.
+TEST(Bootstrap, TakesStickingForNoBursts) {
+  constexpr double force_n = 0.3, correlation_s = 0.15;
+  constexpr ResidualPolicy policy;
+  blind::Rig rig{.plant = cart(), .coloured = {.force_n = force_n, .force_time_s = correlation_s}};
+  for (const blind::Experiment experiment : {blind::Experiment::multisine, blind::Experiment::coast})
+    for (const double level_n : {1.0, 1.5}) {
+      rig.plant.set("coulomb_friction", {level_n});
+      const InnovationStatistics sticking =
+          beside_coloured_force(rig, force_n, correlation_s, experiment).statistics;
+      EXPECT_LT(sticking.dispersion, policy.min_dispersion) << level_n;
+      EXPECT_LT(sticking.kurtosis[0], policy.min_kurtosis) << level_n;
+      EXPECT_LT(sticking.disturbance_kurtosis[0], policy.min_kurtosis) << level_n;
+    }
 }
 
 TEST(Bootstrap, EndsEarlyWhereChanceIsPlain) {
