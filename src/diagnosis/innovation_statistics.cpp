@@ -335,7 +335,7 @@ template <class Normalised>
 InnovationStatistics Innovations::statistics_of(Normalised normalised) const {
   BySpeed rms;
   std::array<std::vector<Score>, residual_probe_count> probe;
-  std::array<BySpeed, 2> pulses, disturbances;
+  std::array<BySpeed, 2> pulses, estimates;
   std::array<EstimatedDisturbance, 2> disturbance;
   double power = 0.0;
   std::size_t at = 0;
@@ -359,14 +359,14 @@ InnovationStatistics Innovations::statistics_of(Normalised normalised) const {
       if (information > 0.0 && block.visible[i])
         pulses[i].add(score[residual_probe_count + i] / std::sqrt(information), block.speed[i]);
       if (disturbance[i].variance > 0.0 && block.visible[i])
-        disturbances[i].add(disturbance[i].value / std::sqrt(disturbance[i].variance), block.speed[i]);
+        estimates[i].add(disturbance[i].value / std::sqrt(disturbance[i].variance), block.speed[i]);
     }
   }
   InnovationStatistics result;
   if (!rms.values.empty()) result.dispersion = dispersion_of(rms.without_growth(), large_block_percentile_);
   for (std::size_t i = 0; i < 2; ++i) {
-    if (!disturbances[i].values.empty())
-      result.disturbance_kurtosis[i] = kurtosis_of(disturbances[i].without_growth());
+    if (!estimates[i].values.empty())
+      result.disturbance_kurtosis[i] = kurtosis_of(estimates[i].without_growth());
     if (pulses[i].values.empty()) continue;
     result.kurtosis[i] = kurtosis_of(pulses[i].without_growth());
     result.pulse_size[i] = robust_deviation(pulses[i].values);

@@ -2,8 +2,8 @@
 // same all along and goes with nothing. Statistics of the innovations are compared with those of innovations
 // that are drawn from the fitted model (a parametric bootstrap):
 // - dependence: no force that the registry lacks shows, nor does a shift of a sensor;
-// - dispersion: the innovations of short blocks are as large everywhere as chance allows. Here and below, they
-//   may grow with the speed;
+// - dispersion: the innovations of short blocks are as large everywhere as chance allows. (Here and in the
+//   tails, they may grow with the speed, and what dry friction holds does not count.)
 // - tails: short pulses of force or torque have no heavier tails than those of a Gaussian, nor has the slow
 //   disturbance that a filter with a memory estimates;
 // - colour: over a tenth of a second and more force and torque are not much larger than as white noise, nor
