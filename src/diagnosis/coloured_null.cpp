@@ -49,7 +49,8 @@ std::optional<std::size_t> outdone_by_coloured_noise(const Search& search, const
   double least = std::numeric_limits<double>::infinity();
   if (known.train.point.starts.size() != search.all_data().segments.size()) return worst;
   for (const Reproduction& found : effects) {
-    if (search.is_nuisance(found.effect) || white_evidence(found) > policy.overwhelming_evidence) continue;
+    if (search.is_plant_number(found.effect) || white_evidence(found) > policy.overwhelming_evidence)
+      continue;
     if (!null) null.emplace(search, known);
     const double evidence = null->evidence_of(found.effect);
     const bool holds =

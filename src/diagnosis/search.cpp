@@ -109,8 +109,12 @@ bool Search::is_unknown_zero(std::size_t effect) const {
   return effect == effect_number("angle_offset") && given_.find(effect) == nullptr;
 }
 
+bool Search::is_plant_number(std::size_t effect) const {
+  return is_nuisance(effect) && !is_unknown_zero(effect);
+}
+
 bool Search::can_hold(std::size_t effect) const {
-  return is_nuisance(effect) && !is_unknown_zero(effect) && !held_numbers_.contains(effect);
+  return is_plant_number(effect) && !held_numbers_.contains(effect);
 }
 
 void Search::choose_screening_subset(std::size_t stride) {

@@ -67,6 +67,8 @@ class Search {
   /// believed of them.
   const std::vector<std::size_t>& nuisances() const { return nuisances_; }
   bool is_nuisance(std::size_t effect) const;
+  /// Whether it corrects a number that stands in the plant file. The zero of the angle need not stand there.
+  bool is_plant_number(std::size_t effect) const;
   const FitData& train_data() const { return train_; }
   const FitData& held_data() const { return held_; }
   /// Both.
