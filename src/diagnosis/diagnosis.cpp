@@ -228,7 +228,7 @@ class Diagnostician {
 
   /// What is left at a fit to all runs, with this noise in held-out ones.
   ResidualTests tests_of(const FitPoint& fitted, const Noise& noise) const {
-    ResidualTests left = examine_fit(search_.all_data(), fitted, policy_, budget_);
+    ResidualTests left = examine_fit(search_.data_of(fitted), fitted, policy_, budget_);
     if (!left.structured) compare_held_out(search_, fits_.judged(), noise, left);
     if (left.structured) return left;
     if (const auto impossible =

@@ -85,8 +85,8 @@ void FinalFits::order_corrections(const std::vector<std::size_t>& corrections) {
 
 void FinalFits::fit_all_samples() {
   options_.report_progress(0.94, "fitting all samples");
-  reported_ =
-      all_samples_ == nullptr ? known_ : fitted_to_all_samples(known_, search_.all_data(), *all_samples_);
+  const FitData data = search_.data_of(known_.train.point);
+  reported_ = all_samples_ == nullptr ? known_ : fitted_to_all_samples(known_, data, *all_samples_);
 }
 
 std::optional<std::size_t> FinalFits::uncertain_effect() const {

@@ -99,8 +99,7 @@ ShownStretch best_window(const FitData& data, std::size_t s, const std::vector<L
 class Parts {
  public:
   Parts(const Search& search, const Hypothesis& h) : search_(search), free_(h.free), given_(search.given()) {
-    FitData all = search.all_data();
-    if (h.train.point.starts.size() != all.segments.size()) all = search.train_data();
+    const FitData all = search.data_of(h.train.point);
     const ExcitationPolicy& excitation = search.policy().excitation;
     for (const std::vector<std::size_t>& places : halves(all, excitation.arm_m, excitation.speed_window_s)) {
       if (places.empty()) continue;

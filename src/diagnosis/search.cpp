@@ -471,10 +471,15 @@ FitData Search::all_data() const {
   return all;
 }
 
+FitData Search::data_of(const FitPoint& fitted) const {
+  FitData all = all_data();
+  return fitted.starts.size() == all.segments.size() ? all : train_data();
+}
+
 FitResult Search::with_coloured_noise(const Hypothesis& known) const {
   FitOptions options;
   options.coloured_noise = true;
-  return fit(all_data(), known.train.point, {}, options);
+  return fit(data_of(known.train.point), known.train.point, {}, options);
 }
 
 Hypothesis Search::fitted_to_all_runs(const Hypothesis& h) const {

@@ -73,6 +73,8 @@ class Search {
   const FitData& held_data() const { return held_; }
   /// Both.
   FitData all_data() const;
+  /// The data to which a point was fitted: all, or the training data where a fit to all of them failed.
+  FitData data_of(const FitPoint& fitted) const;
 
   /// All of the training data are looked at from now on, not a part of them first.
   void screen_on_all();

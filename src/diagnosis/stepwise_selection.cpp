@@ -310,9 +310,10 @@ std::vector<StepwiseSelection::ScreenedCandidate> StepwiseSelection::screen(int 
         done + 0.02 + 0.1 * static_cast<double>(c) / static_cast<double>(candidates.size()),
         "trying " + kind_of(candidates[c]));
     Hypothesis h = search_.screened(from, candidates[c]);
-    const double gain = on_screening_subset - h.train.objective - penalty_of(candidates[c]);
+    const bool failed = !std::isfinite(h.train.objective);
+    const double gain = failed ? 0.0 : on_screening_subset - h.train.objective - penalty_of(candidates[c]);
     if (round == 0) note_candidate(candidates[c], gain);
-    screened.push_back({candidates[c], std::move(h), gain});
+    if (!failed) screened.push_back({candidates[c], std::move(h), gain});
   }
   return screened;
 }

@@ -92,11 +92,27 @@ FitResult result_of(const GaussNewton& solver, const std::vector<FreeParameter>&
   return result;
 }
 
+/// Of more parameters than a fit can free.
+FitResult failed_at(const FitPoint& start, std::size_t segments, std::size_t free) {
+  constexpr double infinite = std::numeric_limits<double>::infinity();
+  const auto n = static_cast<Eigen::Index>(free);
+  FitResult result;
+  result.point = start;
+  result.objective = infinite;
+  result.segment_objective.assign(segments, infinite);
+  result.segment_chi_square.assign(segments, infinite);
+  result.segment_samples.assign(segments, 0.0);
+  result.covariance = result.information = Eigen::MatrixXd::Zero(n, n);
+  result.bound_reach = Eigen::VectorXd::Zero(n);
+  return result;
+}
+
 }  // namespace
 
 FitResult fit(const FitData& data, const FitPoint& start, const std::vector<FreeParameter>& free,
               const FitOptions& options) {
   if (data.bound != nullptr) data.bound->check();
+  if (free.size() > max_free_parameters) return failed_at(start, data.segments.size(), free.size());
   GaussNewton solver(data, start, free, options);
   iterate(data, options, solver);
   FitResult result = result_of(solver, free);

@@ -90,9 +90,9 @@ struct FitOptions {
 /// The most parameters that a fit can free.
 inline constexpr std::size_t max_free_parameters = 27;
 
-/// Fits a plant. At most `max_free_parameters` are free. The objective of a failed fit is infinite. Throws
-/// only Interrupted (parallel.hpp), and BoundReached if the bound of the data was reached beforehand. A fit
-/// that reaches the bound returns its present point.
+/// Fits a plant. The objective of a failed fit is infinite; with more than `max_free_parameters` free it
+/// fails. Throws only Interrupted (parallel.hpp), and BoundReached if the bound of the data was reached
+/// beforehand. A fit that reaches the bound returns its present point.
 FitResult fit(const FitData& data, const FitPoint& start, const std::vector<FreeParameter>& free,
               const FitOptions& options = {});
 

@@ -79,6 +79,33 @@ TEST(Fit, FollowsACartWhoseEncoderErrsOncePerTurn) {
   }
 }
 
+TEST(Fit, FailsWithMoreParametersThanItCanFree) {
+  Plant plant = cart_alone();
+  blind::Plan plan;
+  plan.duration_s = 1.0;
+  const std::vector<Measurement> runs = {measure({.plant = plant}, plan, "run")};
+  const FitData data{&runs, cut_segments(runs)};
+  std::vector<FreeParameter> free;
+  for (std::size_t effect = 0; free.size() <= max_free_parameters; ++effect) {
+    const EffectInfo& info = effect_registry()[effect];
+    if (info.enters != Enters::cart || plant.find(effect) != nullptr) continue;
+    std::vector<double> values;
+    for (std::size_t i = 0; i < info.parameters.size(); ++i) {
+      values.push_back(info.parameters[i].typical);
+      free.push_back({.effect = effect, .index = i});
+    }
+    plant.set(effect, values);
+  }
+  const FitPoint start{plant, estimate_initial_states(runs, data.segments, plant), {.force = 0.1}};
+  FitOptions quick;
+  quick.max_iterations = 1;
+  const FitResult of_too_many = fit(data, start, free, quick);
+  EXPECT_TRUE(std::isinf(of_too_many.objective));
+  EXPECT_EQ(of_too_many.covariance.rows(), static_cast<Eigen::Index>(free.size()));
+  free.resize(max_free_parameters);
+  EXPECT_TRUE(std::isfinite(fit(data, start, free, quick).objective));
+}
+
 TEST(Fit, FindsTheMostLikelyNoise) {
   Plant plant = cart_alone();
   plant.set("coulomb_friction", {0.3});
