@@ -310,6 +310,11 @@ class Diagnostician {
                "its phase at the zero of the cart is open, so its force is known only where it was measured");
       return true;
     }
+    if (const auto open = fits_.effect_with_open_pitch()) {
+      withdraw(*open,
+               "its pitch may be as long as a third of the travel, so the data do not show that it repeats");
+      return true;
+    }
     return false;
   }
 

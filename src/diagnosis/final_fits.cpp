@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <tuple>
 
+#include "periodic_starts.hpp"
 #include "phases.hpp"
 #include "plausibility.hpp"
 #include "thinned_record.hpp"
@@ -105,6 +106,14 @@ std::optional<std::size_t> FinalFits::uncertain_effect() const {
 std::optional<std::size_t> FinalFits::effect_with_open_phase() const {
   for (const std::size_t effect : effects())
     if (is_phase_open(estimates_of(effect, reported_))) return effect;
+  return std::nullopt;
+}
+
+std::optional<std::size_t> FinalFits::effect_with_open_pitch() const {
+  const double longest_m = longest_pitch_m(search_.range(), policy_.prior);
+  for (const std::size_t effect : effects())
+    if (search_.given().find(effect) == nullptr && is_pitch_open(estimates_of(effect, reported_), longest_m))
+      return effect;
   return std::nullopt;
 }
 

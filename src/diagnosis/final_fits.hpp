@@ -27,6 +27,8 @@ class FinalFits {
   std::optional<std::size_t> uncertain_effect() const;
   /// An effect whose phase that fit leaves open.
   std::optional<std::size_t> effect_with_open_phase() const;
+  /// Not of the plant file.
+  std::optional<std::size_t> effect_with_open_pitch() const;
 
   /// Fitted to the training runs, judged on the others.
   const Hypothesis& judged() const { return judged_; }

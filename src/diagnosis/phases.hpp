@@ -1,4 +1,4 @@
-// Phases are reported within (-pi, pi].
+// Phases are reported within (-pi, pi]. An effect repeats along the track where its pitch is known.
 #pragma once
 
 #include <algorithm>
@@ -26,6 +26,14 @@ inline double wrapped_phase(double phase_rad) {
 inline bool is_phase_open(const std::vector<ParameterEstimate>& parameters) {
   return std::any_of(parameters.begin(), parameters.end(), [](const ParameterEstimate& p) {
     return is_phase(p.name) && p.high - p.low >= 2.0 * std::numbers::pi;
+  });
+}
+
+/// Whether the interval of a pitch reaches the longest one that the data can show: then they do not show that
+/// the effect repeats.
+inline bool is_pitch_open(const std::vector<ParameterEstimate>& parameters, double longest_m) {
+  return std::any_of(parameters.begin(), parameters.end(), [&](const ParameterEstimate& p) {
+    return p.name == "pitch_m" && !(p.high < longest_m);
   });
 }
 

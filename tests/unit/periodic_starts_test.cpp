@@ -8,6 +8,7 @@
 #include <random>
 
 #include "diagnosis/candidates.hpp"
+#include "diagnosis/phases.hpp"
 
 namespace upright {
 namespace {
@@ -80,6 +81,19 @@ TEST(PeriodicStarts, FewSamplesStartAnywhere) {
   few.resize(10);
   const ParameterInfo& share = effect_registry()[effect_number("torque_ripple")].parameters[0];
   EXPECT_EQ(first_start(effect_number("torque_ripple"), few)[0], share.typical);
+}
+
+TEST(Pitch, IsOpenWhereItMayBeTheLongest) {
+  const auto interval = [](double high_m) {
+    ParameterEstimate pitch;
+    pitch.name = "pitch_m";
+    pitch.high = high_m;
+    return std::vector<ParameterEstimate>{pitch};
+  };
+  EXPECT_FALSE(is_pitch_open(interval(0.0099), 0.01));
+  EXPECT_TRUE(is_pitch_open(interval(0.01), 0.01));
+  EXPECT_TRUE(is_pitch_open(interval(0.02), 0.01));
+  EXPECT_FALSE(is_pitch_open({}, 0.01));
 }
 
 TEST(PeriodicStarts, EffectsWithAPitchArePeriodic) {
