@@ -21,11 +21,12 @@ inline double wrapped_phase(double phase_rad) {
   return wrapped == -std::numbers::pi ? std::numbers::pi : wrapped;
 }
 
-/// Whether the interval of a phase contains every phase. The phase is that at the zero of the cart, so data
-/// far from it leave it open, and with it the force everywhere but where they were measured.
+/// Whether the interval of a phase is as long as half a turn, so that the sign of the force is not known. The
+/// phase is that at the zero of the cart, so data far from it leave it open, and with it the force everywhere
+/// but where they were measured.
 inline bool is_phase_open(const std::vector<ParameterEstimate>& parameters) {
   return std::any_of(parameters.begin(), parameters.end(), [](const ParameterEstimate& p) {
-    return is_phase(p.name) && p.high - p.low >= 2.0 * std::numbers::pi;
+    return is_phase(p.name) && p.high - p.low >= std::numbers::pi;
   });
 }
 
