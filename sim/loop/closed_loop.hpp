@@ -62,7 +62,12 @@ class SampledLoop {
   /// One period: `law(tick, Measured)` returns the voltage commanded at its beginning.
   template <class Law>
   void step(Law&& law) {
-    voltage_v_ = law(tick_, measured_(engine().state()));
+    Measured measured = measured_(engine().state());
+    const Outputs<double> shown =
+        engine().outputs();  // also of a drive that gives way and an eccentric encoder
+    measured[0] = shown.cart_m;
+    measured[1] = shown.theta_rad;
+    voltage_v_ = law(tick_, measured);
     plant_.command(time_of(tick_), voltage_v_);
     plant_.advance_to(time_of(++tick_));
   }

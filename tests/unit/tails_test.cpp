@@ -43,6 +43,7 @@ std::pair<std::vector<double>, std::vector<double>> growing(std::size_t count, d
   std::mt19937_64 random(11);
   std::exponential_distribution<double> speed;
   std::vector<double> values = gaussian(count, random), speeds;
+  speeds.reserve(count);
   for (double& v : values) {
     speeds.push_back(0.3 * speed(random));
     v *= std::sqrt(1.0 + growth * speeds.back() * speeds.back());
