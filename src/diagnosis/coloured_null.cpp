@@ -47,7 +47,7 @@ std::optional<std::size_t> outdone_by_coloured_noise(const Search& search, const
   std::optional<ColouredNull> null;
   std::optional<std::size_t> worst;
   double least = std::numeric_limits<double>::infinity();
-  if (known.train.point.starts.size() != search.all_data().segments.size()) return worst;
+  if (!search.is_of_all_data(known.train.point)) return worst;
   for (const Reproduction& found : effects) {
     if (search.is_plant_number(found.effect) || white_evidence(found) > policy.overwhelming_evidence)
       continue;

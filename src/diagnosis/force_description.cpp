@@ -310,7 +310,7 @@ std::optional<ForceDescription> describe_force(const Search& search, const Hypot
   const FitData& held = search.held_data();
   if (!search.range().cart_moves || held.segments.empty()) return std::nullopt;
   if (search.given().find(effect_index<Table>()) != nullptr) return std::nullopt;
-  if (known.train.point.starts.size() != search.all_data().segments.size()) return std::nullopt;
+  if (!search.is_of_all_data(known.train.point)) return std::nullopt;
   const ResidualWalk& walk = search.policy().location.walk;
   const Followed fitted(train, judged.train.point, walk);
   std::vector<Curve> curves = curves_of(fitted, Followed(held, judged.held.point, walk),

@@ -154,7 +154,7 @@ std::optional<OutdoneEffect> outdone_by_place(Search& search, const Hypothesis& 
                                               const Hypothesis& judged,
                                               const std::vector<Reproduction>& effects) {
   std::optional<OutdoneEffect> worst;
-  if (known.train.point.starts.size() != search.all_data().segments.size()) return worst;
+  if (!search.is_of_all_data(known.train.point)) return worst;
   std::optional<PlaceNull> null;
   double least = search.policy().acceptance.min_evidence;
   for (const Reproduction& found : effects) {
@@ -176,7 +176,7 @@ std::optional<OutdoneEffect> outdone_by_place(Search& search, const Hypothesis& 
 }
 
 std::optional<std::string> place_force_left(const Search& search, const Hypothesis& known) {
-  if (known.train.point.starts.size() != search.all_data().segments.size()) return std::nullopt;
+  if (!search.is_of_all_data(known.train.point)) return std::nullopt;
   const PlaceNull null(search, known);
   const RandomCurve* track = null.track_force();
   if (track == nullptr || !(-track->change() > search.policy().acceptance.min_evidence)) return std::nullopt;

@@ -85,7 +85,7 @@ std::vector<RunDifference> run_differences(const Search& search, const Hypothesi
                                            const std::vector<std::size_t>& effects) {
   std::vector<RunDifference> result;
   const FitData all = search.all_data();
-  if (all.runs->size() < 2 || h.train.point.starts.size() != all.segments.size()) return result;
+  if (all.runs->size() < 2 || !search.is_of_all_data(h.train.point)) return result;
   std::vector<ParameterEquations> equations;
   for (const std::size_t effect : effects) {
     const ParameterInfo& size = effect_registry()[effect].parameters[0];

@@ -471,9 +471,12 @@ FitData Search::all_data() const {
   return all;
 }
 
+bool Search::is_of_all_data(const FitPoint& fitted) const {
+  return fitted.starts.size() == train_.segments.size() + held_.segments.size();
+}
+
 FitData Search::data_of(const FitPoint& fitted) const {
-  FitData all = all_data();
-  return fitted.starts.size() == all.segments.size() ? all : train_data();
+  return is_of_all_data(fitted) ? all_data() : train_;
 }
 
 FitResult Search::with_coloured_noise(const Hypothesis& known) const {

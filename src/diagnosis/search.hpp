@@ -73,6 +73,9 @@ class Search {
   const FitData& held_data() const { return held_; }
   /// Both.
   FitData all_data() const;
+  /// Whether a point has the initial states of all data. Where the fit to them failed, it has those of the
+  /// training data.
+  bool is_of_all_data(const FitPoint& fitted) const;
   /// The data to which a point was fitted: all, or the training data where a fit to all of them failed.
   FitData data_of(const FitPoint& fitted) const;
 
