@@ -62,9 +62,9 @@ class SampledLoop {
   /// One period: `law(tick, Measured)` returns the voltage commanded at its beginning.
   template <class Law>
   void step(Law&& law) {
+    // The positions as the sensors show them, also of a drive that gives way and an eccentric encoder.
+    const Outputs<double> shown = engine().outputs();
     Measured measured = measured_(engine().state());
-    const Outputs<double> shown =
-        engine().outputs();  // also of a drive that gives way and an eccentric encoder
     measured[0] = shown.cart_m;
     measured[1] = shown.theta_rad;
     voltage_v_ = law(tick_, measured);

@@ -5,7 +5,9 @@
 #include <Eigen/Dense>
 #include <cmath>
 #include <cstdio>
+#include <string>
 #include <unsupported/Eigen/MatrixFunctions>
+#include <utility>
 
 #include "upright/base/error.hpp"
 #include "upright/model/dynamics.hpp"
@@ -92,14 +94,10 @@ Plant without_dead_zone(Plant plant, LinearPlant& linear) {
   return plant;
 }
 
-void record_true_encoder(const Plant& plant, LinearPlant& linear) {
-  if (plant.find("encoder_eccentricity") != nullptr)
-    linear.notes.emplace_back("encoder_eccentricity: the encoder is taken to run true");
-}
-
-void record_stiff_drive(const Plant& plant, LinearPlant& linear) {
-  if (plant.find("drive_compliance") != nullptr)
-    linear.notes.emplace_back("drive_compliance: the drive is taken as stiff");
+void record_ideal_sensors(const Plant& plant, LinearPlant& linear) {
+  for (const auto& [kind, note] : {std::pair{"drive_compliance", "the drive is taken as stiff"},
+                                   std::pair{"encoder_eccentricity", "the encoder is taken to run true"}})
+    if (plant.find(kind) != nullptr) linear.notes.push_back(std::string(kind) + ": " + note);
 }
 
 void refuse_not_finite(const LinearPlant& linear) {
@@ -171,8 +169,7 @@ LinearPlant linearize(const Plant& plant, double smoothing) {
   linear.actuator_slope = dynamics.actuate(Dual(0.0, 0)).v(0);
   linear.input_delay_s = dynamics.input_delay_s().a;
   read_sensors(dynamics, linear);
-  record_stiff_drive(plant, linear);
-  record_true_encoder(plant, linear);
+  record_ideal_sensors(plant, linear);
   refuse_not_finite(linear);
   return linear;
 }

@@ -120,6 +120,14 @@ Innovations of_white_force(const std::vector<Measurement>& runs, const blind::Ri
   return {data, fit(data, start, {}).point, {}};
 }
 
+ResidualTests tests_of(const Innovations& innovations) {
+  ResidualTests tests;
+  tests.noise_ratio = 10.0;
+  tests.statistics = innovations.measured();
+  tests.p_values = residual_p_values(innovations, tests.statistics, {});
+  return tests;
+}
+
 /// How many draws are at least as large as another draw of the same model.
 double share_as_large(const std::vector<double>& draws, double value) {
   return static_cast<double>(
@@ -148,12 +156,7 @@ TEST(Bootstrap, FindsBacklashAndNotWhiteForce) {
   blind::Rig rig{.plant = cart(), .disturbance_n = 0.05};
   const auto fails = [&] {
     const std::vector<Measurement> runs = runs_of(rig);
-    const Innovations innovations = of_white_force(runs, rig);
-    ResidualTests tests;
-    tests.noise_ratio = 10.0;
-    tests.statistics = innovations.measured();
-    tests.p_values = residual_p_values(innovations, tests.statistics, {});
-    return failed_test(tests, {}) != nullptr;
+    return failed_test(tests_of(of_white_force(runs, rig)), {}) != nullptr;
   };
   EXPECT_FALSE(fails());
   rig.unknown = blind::Unknown::backlash;
@@ -169,12 +172,7 @@ ResidualTests beside_coloured_force(const blind::Rig& rig, double force_n, doubl
   FitPoint point{rig.plant, estimate_initial_states(runs, data.segments, rig.plant), {.force = 0.01}};
   point.noise.coloured_force_n = force_n;
   point.noise.correlation_s = correlation_s;
-  const Innovations innovations(data, with_fitted_initial_states(data, point), {});
-  ResidualTests tests;
-  tests.noise_ratio = 10.0;
-  tests.statistics = innovations.measured();
-  tests.p_values = residual_p_values(innovations, tests.statistics, {});
-  return tests;
+  return tests_of({data, with_fitted_initial_states(data, point), {}});
 }
 
 TEST(Bootstrap, FindsGustsThatASlowForceAccountsFor) {

@@ -40,9 +40,13 @@ Outputs<S> sensor_outputs(const PlantModel<S>& model, const S& drive_m, const S&
 
 /// The position of the drive at which the encoder's pinion says `turned_m` [m].
 inline double drive_position_m(const PlantModel<double>& model, double turned_m) {
-  constexpr int steps = 60;  // each at least halves the error: a share is at most 0.5
+  constexpr int max_steps = 60;  // each at least halves the error: a share is at most 0.5
   double drive_m = turned_m;
-  for (int i = 0; i < steps; ++i) drive_m = turned_m - encoder_error_m(model, drive_m);
+  for (int i = 0; i < max_steps; ++i) {
+    const double former_m = drive_m;
+    drive_m = turned_m - encoder_error_m(model, drive_m);
+    if (drive_m == former_m) break;
+  }
   return drive_m;
 }
 
