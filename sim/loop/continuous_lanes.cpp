@@ -5,7 +5,9 @@
 
 #include <algorithm>
 #include <bit>
+#include <functional>
 #include <limits>
+#include <utility>
 #include <vector>
 
 #include "lane_history.hpp"
@@ -104,14 +106,41 @@ class Stops {
   std::vector<Stop> list_;
 };
 
-template <class Present, bool sticks>
+/// The physics, whatever its effects: so that the method is not compiled for each set.
+struct Physics {
+  /// Of a state, a motor voltage, and the direction of a cart that may stick.
+  std::function<State(const State&, const Lanes&, const Lanes&)> rate;
+  std::function<Excess(const State&, const Lanes&)> excess_load;  ///< of a cart that may stick
+};
+
+template <class Present>
+[[gnu::flatten, gnu::noinline]] State sliding_rate(const Dynamics<Lanes, Present>& physics, const State& s,
+                                                   const Lanes& motor_v, const Lanes& direction) {
+  return physics.derivative_by_direction(s, motor_v, direction);
+}
+
+template <class Present>
+Physics sliding_physics(const PlantModel<Lanes>& model, const Present& present) {
+  const Dynamics<Lanes, Present> physics(model, present);
+  return {[physics](const State& s, const Lanes& motor_v, const Lanes& direction) {
+            return sliding_rate(physics, s, motor_v, direction);
+          },
+          [physics](const State& s, const Lanes& motor_v) { return excess_load(physics, s, motor_v); }};
+}
+
+Physics smooth_physics(const PlantModel<Lanes>& model, const EffectSet& present) {
+  return {[rate = smooth_rate_of(model, present)](const State& s, const Lanes& motor_v,
+                                                  const Lanes& /*direction*/) { return rate(s, motor_v); },
+          {}};
+}
+
+template <bool has_bristles, bool sticks>
 class ContinuousRuns {
  public:
-  ContinuousRuns(const LoopSetup& setup, const PlantModel<Lanes>& model, const Present& present,
-                 LoopSource& source)
+  ContinuousRuns(const LoopSetup& setup, const PlantModel<Lanes>& model, Physics physics, LoopSource& source)
       : setup_(setup),
         chain_(model),
-        physics_(model, present),
+        physics_(std::move(physics)),
         feedback_(setup.control.gains, chain_),
         input_delay_s_(chain_.input_delay_s().values()[0]),
         source_(source) {
@@ -140,9 +169,8 @@ class ContinuousRuns {
     return chain_.actuate(volts);
   }
 
-  [[gnu::flatten, gnu::noinline]] State rate(const State& s, const Lanes& motor_v) const {
-    if constexpr (sticks) return physics_.derivative_by_direction(s, motor_v, Lanes::load(direction_.data()));
-    return physics_.derivative(s, motor_v, {});
+  State rate(const State& s, const Lanes& motor_v) const {
+    return physics_.rate(s, motor_v, Lanes::load(direction_.data()));
   }
 
   template <class F>
@@ -231,7 +259,7 @@ class ContinuousRuns {
   void renew_rates(const Lanes& time_s) {
     const Lanes motor_v = motor(time_s, y_);
     if constexpr (sticks) {
-      const Excess excess = excess_load(physics_, y_, motor_v);
+      const Excess excess = physics_.excess_load(y_, motor_v);
       const Values settled = upright::direction_of(excess).values(),
                    over = larger(excess.forward, excess.backward).values(), v = y_.cart_mps.values();
       for (std::uint32_t lanes = stale_; lanes != 0; lanes &= lanes - 1) {
@@ -272,7 +300,7 @@ class ContinuousRuns {
     Lanes highest(1.0);  // where in the step the load comes nearest to breaking away
     if (any(rests)) {
       const auto over = [&](const State& at, const Lanes& motor_v) {
-        const Excess excess = excess_load(physics_, at, motor_v);
+        const Excess excess = physics_.excess_load(at, motor_v);
         return larger(excess.forward, excess.backward);
       };
       // The load may rise over the level and sink again within a step: a parabola through three places tells.
@@ -532,11 +560,10 @@ class ContinuousRuns {
   }
 
   static constexpr std::uint32_t every_lane = (1u << lane_count) - 1u;
-  static constexpr bool has_bristles = may_have_bristles<Present>;
 
   const LoopSetup& setup_;
   Dynamics<Lanes> chain_;
-  Dynamics<Lanes, Present> physics_;
+  Physics physics_;
   FeedbackLine feedback_;
   double input_delay_s_;
   LoopSource& source_;
@@ -560,11 +587,12 @@ void UPRIGHT_LANES::run_continuous_on_lanes(const LoopSetup& setup, const PlantM
                                             LoopSource& source) {
   const PlantModel<Lanes> model = on_lanes(plant);
   const bool sticks = Dynamics<Lanes>(model).cart_can_stick();
-  with_effects(plant.present, [&](const auto& present) {
-    using Present = std::decay_t<decltype(present)>;
+  with_effects(plant.present, [&]<class Present>(const Present& present) {
+    constexpr bool bristles = may_have_bristles<Present>;
     if constexpr (may_stick<Present>)
-      if (sticks) return ContinuousRuns<Present, true>(setup, model, present, source).run();
-    ContinuousRuns<Present, false>(setup, model, present, source).run();
+      if (sticks)
+        return ContinuousRuns<bristles, true>(setup, model, sliding_physics(model, present), source).run();
+    ContinuousRuns<bristles, false>(setup, model, smooth_physics(model, plant.present), source).run();
   });
 }
 

@@ -22,6 +22,7 @@
 #include "lane_motor.hpp"
 #include "lane_relaxation.hpp"
 #include "series_step.hpp"
+#include "sliding_cart.hpp"
 #include "upright/sim/runge_kutta.hpp"
 
 namespace upright {
@@ -29,13 +30,17 @@ namespace upright {
 /// `second`: the pendulum may stick too, or the motor lag. Compiled apart: in one copy for all, loops
 /// without either took up to 20 percent longer.
 template <class Present, bool second>
-class EventPeriod {
+class EventPeriod : private SlidingCart<Present> {
+  using SlidingCart<Present>::physics_;
+  using SlidingCart<Present>::sticks_;
+  using SlidingCart<Present>::frictionless_rate;
+  using SlidingCart<Present>::rate_of_cart;
+
  public:
   EventPeriod(const LaneParts& parts, const PlantModel<Lanes>& model, const Present& present)
-      : physics_(model, present),
+      : SlidingCart<Present>(model, present),
         series_(with_numbers_of<LaneConstant>(model), present),
         motor_(model),
-        sticks_(may_stick<Present> && physics_.cart_can_stick()),
         pivot_sticks_(physics_.pivot_can_stick()),
         cart_turns_(physics_.cart_has_kink()),
         by_series_(sticks_ && parts.short_series),
@@ -105,10 +110,6 @@ class EventPeriod {
   /// No step that stiff bristles shorten is shorter: a bound on the work.
   static constexpr double shortest_on_bristles_s = 2e-6;
 
-  struct CartRate {
-    State of;
-    Lanes load_n;  ///< that the friction must hold if the cart is to rest
-  };
   struct BothRate : CartRate {
     Lanes pivot_load_nm;  ///< and the pendulum
   };
@@ -171,15 +172,10 @@ class EventPeriod {
     else
       return begin_of_called(steps);
   }
-  [[gnu::flatten, gnu::noinline]] Begin begin_of_called(Steps& steps) const {
-    return begin_of_inlined(steps);
-  }
   Begin begin_of_inlined(Steps& steps) const {
     Begin begin{};
     const State& at = steps.state;
     const Lanes& motor_v = motor_of(steps);
-    if constexpr (second)
-      if (pivot_sticks_) return begin_of_both(steps);
     if (!sticks_) {
       begin.rate = frictionless_rate(at, motor_v, steps.modes.cart);
       steps.modes.cart = select(steps.settles, sign_of(begin.rate.cart_mps), steps.modes.cart);
@@ -187,17 +183,35 @@ class EventPeriod {
     }
     const auto balance = physics_.cart_balance(at, motor_v);
     if (any(at.cart_mps == Lanes(0.0))) {
-      if constexpr (is_common_set<Present>)
-        static_cast<StaticFriction&>(begin) = everywhere_;
-      else
-        find_static_friction(at.cart_m, begin);
-      const Lanes& load = balance.load;
-      begin.excess_n = excess_of(load, begin.forward_n, begin.backward_n);
-      const Lanes moves = select(begin.excess_n > Lanes(0.0), sign_of(load), Lanes(0.0));
-      steps.modes.cart = select(steps.settles, moves, steps.modes.cart);
+      static_cast<StaticFriction&>(begin) = everywhere_;
+      settle_cart(steps, balance.load, begin);
     }
     begin.rate = physics_.derivative_by_direction(at, balance, steps.modes.cart);
     return begin;
+  }
+  /// The same with the rate that the stages of a step call too.
+  [[gnu::flatten, gnu::noinline]] Begin begin_of_called(Steps& steps) const {
+    if constexpr (second)
+      if (pivot_sticks_) return begin_of_both(steps);
+    Begin begin{};
+    const State& at = steps.state;
+    CartRate found = rate_of_cart(at, motor_of(steps), steps.modes.cart);
+    if (!sticks_) {
+      steps.modes.cart = select(steps.settles, sign_of(found.of.cart_mps), steps.modes.cart);
+    } else if (any(at.cart_mps == Lanes(0.0))) {
+      find_static_friction(at.cart_m, begin);
+      settle_cart(steps, found.load_n, begin);
+      if (any(steps.settles)) found = rate_of_cart(at, motor_of(steps), steps.modes.cart);
+    }
+    begin.rate = found.of;
+    return begin;
+  }
+
+  /// Lets the load decide how carts at rest go on.
+  void settle_cart(Steps& steps, const Lanes& load_n, Begin& begin) const {
+    begin.excess_n = excess_of(load_n, begin.forward_n, begin.backward_n);
+    const Lanes moves = select(begin.excess_n > Lanes(0.0), sign_of(load_n), Lanes(0.0));
+    steps.modes.cart = select(steps.settles, moves, steps.modes.cart);
   }
 
   void find_static_friction(const Lanes& cart_m, StaticFriction& friction) const {
@@ -348,14 +362,6 @@ class EventPeriod {
     }
   }
 
-  /// One copy for the stages of a step, as in SmoothPeriod.
-  [[gnu::flatten, gnu::noinline]] CartRate rate_of_cart(const State& state, const Lanes& motor_v,
-                                                        const Lanes& direction) const {
-    if (!sticks_) return {frictionless_rate(state, motor_v, direction), Lanes(0.0)};
-    const auto balance = physics_.cart_balance(state, motor_v);
-    return {physics_.derivative_by_direction(state, balance, direction), balance.load};
-  }
-
   [[gnu::flatten, gnu::noinline]] BothRate rate_of_both(const State& state, const Lanes& motor_v,
                                                         const LaneModes& modes) const {
     const auto applied = physics_.applied_forces(state, motor_v, modes.cart);
@@ -365,14 +371,6 @@ class EventPeriod {
     return {{physics_.derivative_by_directions(state, applied, modes.cart, level, modes.pivot),
              physics_.cart_load(applied, modes.pivot)},
             physics_.pivot_load(applied, modes.cart, level)};
-  }
-
-  /// Of a cart that nothing holds. At rest its direction makes no difference to it.
-  State frictionless_rate(const State& state, const Lanes& motor_v, const Lanes& direction) const {
-    if constexpr (may_have_bristles<Present>)
-      if (physics_.has_bristle_state())
-        return physics_.bristle_derivative_by_direction(state, motor_v, direction);
-    return physics_.derivative(state, motor_v, {});
   }
 
   /// To the end of the period, or to where a contact that slows down would stop.
@@ -461,10 +459,9 @@ class EventPeriod {
     steps.taken = steps.taken + (stiff_ ? met_one : one);
   }
 
-  Dynamics<Lanes, Present> physics_;
   std::conditional_t<may_step_by_series, Dynamics<LaneConstant, Present>, NoSeries> series_;
   std::conditional_t<second, LaneMotor, PromptMotor> motor_;
-  bool sticks_, pivot_sticks_, cart_turns_;
+  bool pivot_sticks_, cart_turns_;
   bool by_series_;               ///< in place of the classical method
   CoarseLanes sweep_mps_;        ///< change of the cart's velocity in a step by series, at most
   bool stiff_;                   ///< bristles relax too fast for the classical method

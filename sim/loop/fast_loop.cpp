@@ -4,15 +4,12 @@
 #include <type_traits>
 
 #include "continuous_lanes.hpp"
-#include "control/whole_periods.hpp"
 #include "event_period.hpp"
 #include "lane_builds.hpp"
+#include "lane_controller.hpp"
 #include "lane_model.hpp"
 #include "lane_motor.hpp"
-#include "lane_observer.hpp"
 #include "lane_results.hpp"
-#include "lane_ring.hpp"
-#include "upright/control/delay_line.hpp"
 #include "upright/model/dynamics.hpp"
 #include "upright/sim/runge_kutta.hpp"
 
@@ -20,70 +17,7 @@ namespace upright {
 
 namespace {
 
-/// Feedback voltages on their way. The feedback is linear, so that delaying the voltage is delaying the
-/// state.
-template <class Mask>
-class LaneDelay {
- public:
-  LaneDelay(double longest_delay_s, double period_s)
-      : period_s_(period_s), ring_(DelayLine(longest_delay_s, period_s).whole_periods() + 1) {}
-
-  /// Gives one lane this delay.
-  void take(std::size_t lane, double delay_s) {
-    const DelayLine line(delay_s, period_s_);
-    whole_[lane] = static_cast<std::uint32_t>(line.whole_periods());
-    put(fraction_, lane, line.fraction());
-    same_ = std::all_of(whole_.begin(), whole_.end(), [this](std::size_t of) { return of == whole_[0]; });
-    exact_ = exact_ && line.exact();
-  }
-
-  void start(const Mask& lanes, const Lanes& volts) { ring_.fill(lanes, volts); }
-
-  Lanes pass(const Mask& lanes, const Lanes& volts) {
-    ring_.push(lanes, volts);
-    const Lanes later = back(0);
-    if (exact_) return later;
-    return later + fraction_ * (back(1) - later);
-  }
-
- private:
-  Lanes back(std::uint32_t more) const {
-    return same_ ? ring_.ago(whole_[0] + more) : ring_.ago(whole_, more);
-  }
-
-  double period_s_;
-  LaneRing<Mask> ring_;
-  std::array<std::uint32_t, lane_count> whole_{};
-  Lanes fraction_;
-  bool same_ = true, exact_ = true;
-};
-
-/// The plant's own input delay, the same for all lanes. Before the first command zero volts are commanded.
-template <class Mask>
-class LaneInput {
- public:
-  LaneInput(const Dynamics<Lanes>& chain, double period_s)
-      : delay_(whole_periods(chain.input_delay_s().values()[0], period_s)),
-        period_s_(period_s),
-        drives_(delay_.whole + 1) {}
-
-  void start(const Mask& lanes, const Lanes& resting_v) { drives_.fill(lanes, resting_v); }
-
-  LaneDrive pass(const Mask& lanes, const Lanes& drive_v) {
-    if (delay_.whole == 0 && delay_.fraction == 0.0) return {drive_v, drive_v, 0.0, period_s_};
-    drives_.push(lanes, drive_v);
-    const double early_s = delay_.fraction * period_s_;
-    return {drives_.ago(delay_.whole + 1), drives_.ago(delay_.whole), early_s, period_s_ - early_s};
-  }
-
- private:
-  WholePeriods delay_;
-  double period_s_;
-  LaneRing<Mask> drives_;
-};
-
 /// How the motion gets through one period with the voltage held: smooth friction.
-template <class Present>
 class SmoothPeriod {
  public:
   using Mask = EveryLane;
@@ -100,17 +34,18 @@ class SmoothPeriod {
     advance(steps.state, drive.late_v, drive.late_s);
   }
 
-  SmoothPeriod(const LaneParts& /*parts*/, const PlantModel<Lanes>& model, const Present& present)
-      : physics_(model, present), motor_(model) {
+  SmoothPeriod(const LaneParts& /*parts*/, const PlantModel<Lanes>& model, const EffectSet& present)
+      : rate_of_(smooth_rate_of(model, present)), motor_(model) {
+    const Dynamics<Lanes> physics(model);
     const double smoothing = model.smoothing;
     if (smoothing > 0.0) {
       // tanh(smoothing v) turns within about 3 / smoothing; a step may sweep 0.7 / smoothing of it (errors of
       // 1e-8).
       // Near rest of both contacts the loop amplifies errors a hundredfold: there a third of it.
       turning_ = 3.0 / smoothing;
-      pivot_turns_ = physics_.pivot_is_dry();
+      pivot_turns_ = physics.pivot_is_dry();
       sweep_ = (pivot_turns_ ? 0.25 : 0.7) / smoothing;
-    } else if (physics_.cart_has_kink()) {
+    } else if (physics.cart_has_kink()) {
       turning_ = 0.0;
       sweep_ = kink_sweep_mps;
     }
@@ -118,7 +53,7 @@ class SmoothPeriod {
 
   [[gnu::flatten]] void advance(PlantState<Lanes>& state, const Lanes& motor_v, double period_s) const {
     if (motor_.lags()) return advance_lagging(state, motor_v, period_s);
-    const auto rate = [&](const PlantState<Lanes>& s, Stage) { return rate_of(s, motor_v); };
+    const auto rate = [&](const PlantState<Lanes>& s, Stage) { return rate_of_(s, motor_v); };
     const PlantState<Lanes> first = rate(state, Stage::end);
     const int pieces = pieces_for(state, first, period_s);
     const Lanes h(period_s / pieces);
@@ -127,25 +62,18 @@ class SmoothPeriod {
   }
 
  private:
-  // One copy for all nine stages, which takes no longer to run and half as long to compile. (With stick-slip
-  // a copy for each is 2 to 4 percent faster.)
-  [[gnu::flatten, gnu::noinline]] PlantState<Lanes> rate_of(const PlantState<Lanes>& state,
-                                                            const Lanes& motor_v) const {
-    return physics_.derivative(state, motor_v, {});
-  }
-
   void advance_lagging(PlantState<Lanes>& state, const Lanes& drive_v, double period_s) const {
     const Lanes after_v = motor_.after(state.motor_v, drive_v, Lanes(period_s));
-    int pieces = std::max(pieces_for(state, rate_of(state, state.motor_v), period_s),
-                          pieces_for(state, rate_of(state, after_v), period_s));
+    int pieces = std::max(pieces_for(state, rate_of_(state, state.motor_v), period_s),
+                          pieces_for(state, rate_of_(state, after_v), period_s));
     while (pieces < max_pieces && any(motor_.time_constant_s() < Lanes(period_s / pieces))) pieces *= 2;
     const Lanes h(period_s / pieces);
     for (int i = 0; i < pieces; ++i) {
       const LaggedMotor<Lanes> lagged = motor_.over(state.motor_v, drive_v, h);
       const auto rate = [&](const PlantState<Lanes>& s, Stage stage) {
-        return rate_of(s, stage == Stage::middle ? lagged.middle_v : lagged.end_v);
+        return rate_of_(s, stage == Stage::middle ? lagged.middle_v : lagged.end_v);
       };
-      state = runge_kutta_4(rate, state, rate_of(state, lagged.begin_v), h);
+      state = runge_kutta_4(rate, state, rate_of_(state, lagged.begin_v), h);
       state.motor_v = lagged.after_v;
     }
   }
@@ -167,18 +95,11 @@ class SmoothPeriod {
     return select(absolute(velocity) - reach < Lanes(turning_), reach, Lanes(0.0));
   }
 
-  Dynamics<Lanes, Present> physics_;
+  SmoothRate rate_of_;
   LaneMotor motor_;
   double turning_ = 0.0, sweep_ = 0.0;  ///< [m/s] of the cart, [rad/s] of the pendulum
   bool pivot_turns_ = false;
 };
-
-[[gnu::always_inline]] inline EveryLane narrowed(EveryLane lanes, const LaneMask& /*to*/) {
-  return lanes;
-}
-[[gnu::always_inline]] inline LaneMask narrowed(const LaneMask& lanes, const LaneMask& to) {
-  return lanes & to;
-}
 
 /// Sampled loops. Lanes go in step, or each at its own pace: then whichever has come to the end of its period
 /// is controlled, and one whose run has ended takes the next run.
@@ -193,11 +114,8 @@ class SampledRuns {
         plants_(plants),
         source_(source),
         model_(on_lanes(plants[0])),
-        chain_(model_),
         period_(parts, model_, present),
-        observer_(setup, parts, source.longest_delay_s()),
-        delay_(source.longest_delay_s(), setup.control.period_s()),
-        input_(chain_, setup.control.period_s()),
+        controller_(setup, parts, model_, source.longest_delay_s()),
         seen_(setup),
         periods_(std::round(setup.duration_s * setup.control.sample_rate_hz)),
         begun_(periods_ + Lanes(1.0)) {}
@@ -209,7 +127,7 @@ class SampledRuns {
     for (;;) {
       const Mask arrived = narrowed(Period::arrived(steps_), begun_ <= periods_);
       if (any(arrived)) {
-        seen_.take(arrived, begun_ * period_s, steps_.state, command_);
+        seen_.take(arrived, begun_ * period_s, steps_.state, controller_.command_v());
         begun_ = select(arrived, begun_ + one, begun_);
         if (!end_runs()) return true;
         control(narrowed(arrived, (begun_ > Lanes(0.0)) & (begun_ <= periods_)));
@@ -261,8 +179,7 @@ class SampledRuns {
   void place(std::size_t lane, const LoopRun& run) {
     if (run.plant != plant_of_[lane]) become(lane, run.plant);
     run_of_[lane] = run.number;
-    observer_.take_delay(lane, run.start.delay_s);
-    delay_.take(lane, run.start.delay_s);
+    controller_.take_delay(lane, run.start.delay_s);
     PlantState<Lanes>& state = steps_.state;
     for (Lanes* number :
          {&state.cart_m, &state.cart_mps, &state.theta_radps, &state.motor_v, &state.bristle_m, &begun_})
@@ -274,30 +191,14 @@ class SampledRuns {
   void become(std::size_t lane, std::size_t plant) {
     plant_of_[lane] = plant;
     put_on_lane(model_, lane, plants_[plant]);
-    chain_ = Dynamics<Lanes>(model_);
+    controller_.take_plant(model_);
     period_ = Period(parts_, model_, present_);
   }
 
-  /// The controllers of these lanes, of which some may be at the start of their runs.
-  [[gnu::flatten, gnu::noinline]] void control(const Mask& lanes) {
-    const Outputs<Lanes> shown = chain_.measure(steps_.state);
-    const LaneMask first = begun_ == Lanes(1.0);
-    const Mask starting = narrowed(lanes, first), going = narrowed(lanes, !first);
-    const bool some_start = any(lanes & first);
-    Lanes newest;
-    if (any(lanes & !first)) newest = observer_.take(going, shown, command_);
-    if (some_start) {
-      const Lanes held = observer_.start(starting, shown);
-      newest = select(starting, held, newest);
-      delay_.start(starting, held);
-      input_.start(starting, chain_.actuate(Lanes(0.0)));
-      command_ = select(starting, Lanes(0.0), command_);
-    }
-    const Lanes limit(setup_.amplifier_limit_v);
-    const Lanes wanted = observer_.command_v(lanes, delay_.pass(lanes, newest), command_);
-    command_ = select(lanes, smaller(larger(wanted, -limit), limit), command_);
-    const LaneDrive drive = input_.pass(lanes, chain_.actuate(command_));
-    if (!Period::may_lag || !chain_.has_motor_lag()) steps_.state.motor_v = drive.late_v;
+  /// Controls these lanes, of which some may be at the start of their runs.
+  void control(const Mask& lanes) {
+    const LaneDrive drive = controller_.take(lanes, begun_ == Lanes(1.0), steps_.state);
+    if (!Period::may_lag || !controller_.motor_lags()) steps_.state.motor_v = drive.late_v;
     period_.begin(steps_, lanes, drive);
   }
 
@@ -307,29 +208,24 @@ class SampledRuns {
   std::span<const PlantModel<double>> plants_;
   LoopSource& source_;
   PlantModel<Lanes> model_;
-  Dynamics<Lanes> chain_;
   Period period_;
-  LaneObserver<Mask> observer_;
-  LaneDelay<Mask> delay_;
-  LaneInput<Mask> input_;
+  LaneController<Mask> controller_;
   LaneResults seen_;
   typename Period::Steps steps_;
-  Lanes periods_, begun_, command_;
+  Lanes periods_, begun_;
   std::array<std::size_t, lane_count> run_of_{}, plant_of_{};
   std::uint32_t used_ = 0;  ///< bit i: lane i has a run
 };
 
+/// False: carts with these effects meet no events.
 template <class Present>
-void run_with(const LoopSetup& setup, const LaneParts& parts, const Present& present,
-              std::span<const PlantModel<double>> plants, LoopSource& source) {
-  if constexpr (may_stick<Present> || may_have_bristles<Present>)
-    if (parts.own_pace) {
-      SampledRuns<Present, EventPeriod<Present, false>>(setup, parts, present, plants, source).run();
-      return;
-    }
-  // One group after the other: smooth lanes share their substeps.
-  while (SampledRuns<Present, SmoothPeriod<Present>>(setup, parts, present, plants, source).run()) {
+bool run_at_own_pace(const LoopSetup& setup, const LaneParts& parts, const Present& present,
+                     std::span<const PlantModel<double>> plants, LoopSource& source) {
+  if constexpr (may_stick<Present> || may_have_bristles<Present>) {
+    SampledRuns<Present, EventPeriod<Present, false>>(setup, parts, present, plants, source).run();
+    return true;
   }
+  return false;
 }
 
 }  // namespace
@@ -343,12 +239,18 @@ std::size_t runs_side_by_side() {
 void run(const LoopSetup& setup, const LaneParts& parts, std::span<const PlantModel<double>> plants,
          LoopSource& source) {
   const EffectSet& present = plants[0].present;
-  if (!setup.sampled)
-    run_continuous_on_lanes(setup, plants[0], source);
-  else if (parts.pivot_or_lag)
+  if (!setup.sampled) return run_continuous_on_lanes(setup, plants[0], source);
+  if (parts.pivot_or_lag) {
     SampledRuns<EffectSet, EventPeriod<EffectSet, true>>(setup, parts, present, plants, source).run();
-  else
-    with_effects(present, [&](const auto& known) { run_with(setup, parts, known, plants, source); });
+    return;
+  }
+  const auto at_own_pace = [&](const auto& known) {
+    return run_at_own_pace(setup, parts, known, plants, source);
+  };
+  if (parts.own_pace && with_effects(present, at_own_pace)) return;
+  // One group after the other: smooth lanes share their substeps.
+  while (SampledRuns<EffectSet, SmoothPeriod>(setup, parts, present, plants, source).run()) {
+  }
 }
 
 }  // namespace UPRIGHT_LANES

@@ -2,6 +2,8 @@
 // in, and the direction in which a resting cart breaks away.
 #pragma once
 
+#include <functional>
+
 #include "lanes.hpp"
 #include "upright/model/dynamics.hpp"
 
@@ -101,7 +103,7 @@ inline constexpr bool may_have_bristles<StaticEffectSet<dynamic_set>> = true;
 
 /// Calls `run` with the plant's effects: common sets at compile time, all others at run time.
 template <class Run>
-void with_effects(const EffectSet& present, const Run& run) {
+auto with_effects(const EffectSet& present, const Run& run) {
   switch (moving_effects(present)) {
     case viscous_set:
       return run(StaticEffectSet<viscous_set>{});
@@ -114,6 +116,28 @@ void with_effects(const EffectSet& present, const Run& run) {
     default:
       return run(present);
   }
+}
+
+/// The derivative of the state. One copy for the stages of all loops, which takes no longer to run and half
+/// as long to compile. (With stick-slip a copy for each stage is 2 to 4 percent faster.)
+template <class Present>
+[[gnu::flatten, gnu::noinline]] PlantState<Lanes> smooth_rate(const Dynamics<Lanes, Present>& physics,
+                                                              const PlantState<Lanes>& state,
+                                                              const Lanes& motor_v) {
+  return physics.derivative(state, motor_v, {});
+}
+
+/// The same for any effects, so that what calls it is compiled once: state and motor voltage in.
+using SmoothRate = std::function<PlantState<Lanes>(const PlantState<Lanes>&, const Lanes&)>;
+inline SmoothRate smooth_rate_of(const PlantModel<Lanes>& model, const EffectSet& present) {
+  SmoothRate rate;
+  with_effects(present, [&]<class Present>(const Present& known) {
+    rate = [physics = Dynamics<Lanes, Present>(model, known)](const PlantState<Lanes>& state,
+                                                              const Lanes& motor_v) {
+      return smooth_rate(physics, state, motor_v);
+    };
+  });
+  return rate;
 }
 
 /// The load on a resting cart beyond the static friction, forward and backward [N].
