@@ -89,9 +89,10 @@ CurveEquations beyond_known(const CurveEquations& equations, const CurveNodes& n
     for (Eigen::Index j = 0; j < terms.cols(); ++j) terms(i, j) = row[static_cast<std::size_t>(j)];
   }
   const Eigen::MatrixXd coupled = equations.information * terms;
-  const auto [by_information, by_score] =
-      least_squares(terms.transpose() * coupled, coupled.transpose(), terms.transpose() * equations.score);
-  return {equations.information - coupled * by_information, equations.score - coupled * by_score};
+  Eigen::MatrixXd right(terms.cols(), rows + 1);
+  right << coupled.transpose(), terms.transpose() * equations.score;
+  const Eigen::MatrixXd both = least_squares(terms.transpose() * coupled, right);
+  return {equations.information - coupled * both.leftCols(rows), equations.score - coupled * both.col(rows)};
 }
 
 /// The data that a curve is found in: the segments of a fit, linearised, and their motion.

@@ -1,10 +1,11 @@
 #include "force_formula.hpp"
 
-#include <Eigen/Cholesky>
 #include <bit>
 #include <cmath>
 #include <sstream>
 #include <utility>
+
+#include "model/dense_algebra.hpp"
 
 namespace upright {
 
@@ -43,17 +44,17 @@ std::string name_of(Term term, const std::string& symbol) {
 
 /// Coefficients by weighted least squares.
 ForceFormula fit_terms(std::vector<Term> terms, const CurveNodes& nodes, const Eigen::VectorXd& force_n,
-                       const Eigen::LDLT<Eigen::MatrixXd>& covariance) {
+                       const Eigen::MatrixXd& covariance) {
   Eigen::MatrixXd design(force_n.size(), static_cast<Eigen::Index>(terms.size()));
   for (Eigen::Index i = 0; i < design.rows(); ++i)
     for (Eigen::Index j = 0; j < design.cols(); ++j)
       design(i, j) =
           value_of(terms[static_cast<std::size_t>(j)], nodes.first + nodes.spacing * static_cast<double>(i));
-  const Eigen::MatrixXd weighted = covariance.solve(design);
+  const Eigen::MatrixXd weighted = solve_symmetric(covariance, design);
   ForceFormula formula{std::move(terms),
-                       (design.transpose() * weighted).ldlt().solve(weighted.transpose() * force_n)};
+                       solve_symmetric(design.transpose() * weighted, weighted.transpose() * force_n)};
   const Eigen::VectorXd missed = force_n - design * formula.coefficients;
-  formula.chi_square = missed.dot(covariance.solve(missed));
+  formula.chi_square = missed.dot(Eigen::VectorXd(solve_symmetric(covariance, missed)));
   return formula;
 }
 
@@ -84,13 +85,12 @@ std::string ForceFormula::text(const std::string& symbol, const std::string& uni
 
 std::optional<ForceFormula> formula_of(const CurveNodes& nodes, const Eigen::VectorXd& force_n,
                                        const Eigen::MatrixXd& covariance) {
-  const Eigen::LDLT<Eigen::MatrixXd> factor(covariance);
-  if (!factor.isPositive() || !(factor.vectorD().minCoeff() > 0.0)) return std::nullopt;
+  if (!(symmetric_pivots(covariance).minCoeff() > 0.0)) return std::nullopt;
   for (int count = 1; count <= max_terms; ++count) {
     std::optional<ForceFormula> best;
     for (unsigned subset = 1; subset < 1U << all_terms.size(); ++subset) {
       if (std::popcount(subset) != count) continue;
-      ForceFormula formula = fit_terms(terms_of(subset), nodes, force_n, factor);
+      ForceFormula formula = fit_terms(terms_of(subset), nodes, force_n, covariance);
       if (!best || formula.chi_square < best->chi_square) best = std::move(formula);
     }
     const double freedom = static_cast<double>(force_n.size()) - count;

@@ -1,11 +1,11 @@
 #include "residual_location.hpp"
 
-#include <Eigen/Cholesky>
 #include <array>
 #include <cmath>
 #include <numeric>
 
 #include "estimation/smoother.hpp"
+#include "model/dense_algebra.hpp"
 #include "reversal.hpp"
 
 namespace upright {
@@ -139,7 +139,7 @@ std::pair<double, std::size_t> explained_share(const Rows& rows, const std::vect
   for (std::size_t f = 0; f < folds; ++f) {
     Matrix train = all_h - h[f];
     train.diagonal().array() += policy.ridge * static_cast<double>(n);
-    const Vector weights = train.ldlt().solve(all_g - g[f]);
+    const Vector weights = solve_symmetric(train, all_g - g[f]);
     for (std::size_t k = 0; k < n; ++k) {
       if (rows.fold[k] % folds != f) continue;
       const double off = y[k] - row_of(k).dot(weights);

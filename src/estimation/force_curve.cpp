@@ -1,11 +1,11 @@
 #include "force_curve.hpp"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <vector>
 
 #include "base/parallel.hpp"
+#include "model/dense_algebra.hpp"
 #include "state_vector.hpp"
 
 namespace upright {
@@ -69,12 +69,13 @@ class SegmentEquations {
     of_start = scale.asDiagonal() * of_start * scale.asDiagonal();
     constexpr double smallest_share = 1e-10;  // keeps the factor regular
     of_start.diagonal().array() += smallest_share;
-    const Eigen::MatrixXd coupled = scale.asDiagonal() * information_.topRightCorner(state_count, values);
-    const Eigen::VectorXd score = scale.asDiagonal() * score_.head(state_count);
-    const Eigen::LDLT<Eigen::MatrixXd> factor(of_start);
+    Eigen::MatrixXd right(state_count, values + 1);
+    right << information_.topRightCorner(state_count, values), score_.head(state_count);
+    right = scale.asDiagonal() * right;
+    const Eigen::MatrixXd accounted = right.leftCols(values).transpose() * solve_symmetric(of_start, right);
     all.information.block(first, first, values, values) +=
-        information_.bottomRightCorner(values, values) - coupled.transpose() * factor.solve(coupled);
-    all.score.segment(first, values) += score_.tail(values) - coupled.transpose() * factor.solve(score);
+        information_.bottomRightCorner(values, values) - accounted.leftCols(values);
+    all.score.segment(first, values) += score_.tail(values) - accounted.col(values);
   }
 
  private:

@@ -1,6 +1,5 @@
 #include "gauss_newton.hpp"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <array>
 #include <atomic>
@@ -11,6 +10,7 @@
 #include <utility>
 
 #include "base/parallel.hpp"
+#include "model/dense_algebra.hpp"
 #include "parameter_equations.hpp"
 #include "state_vector.hpp"
 
@@ -215,12 +215,13 @@ GaussNewton::ReducedEquations GaussNewton::eliminate_initial_states(double dampi
   reduced.base.resize(linearised_.size());
   for (std::size_t s = 0; s < linearised_.size(); ++s) {
     const NormalEquations& n = linearised_[s].normal;
-    Eigen::Matrix<double, state_count, state_count> hii =
-        n.information.topLeftCorner<state_count, state_count>();
+    Matrix hii = n.information.topLeftCorner(state_count, state_count);
     for (int i = 0; i < state_count; ++i) hii(i, i) += start_information[i] + damping * hii(i, i);
-    const Eigen::LDLT<Eigen::Matrix<double, state_count, state_count>> solver(hii);
-    reduced.back[s] = solver.solve(n.information.topRightCorner(state_count, np));
-    reduced.base[s] = solver.solve(n.score.head<state_count>());
+    Matrix right(state_count, np + 1);
+    right << n.information.topRightCorner(state_count, np), n.score.head(state_count);
+    const Matrix solved = solve_symmetric(hii, right);
+    reduced.back[s] = solved.leftCols(np);
+    reduced.base[s] = solved.col(np);
     reduced.information += n.information.bottomRightCorner(np, np) -
                            n.information.bottomLeftCorner(np, state_count) * reduced.back[s];
     reduced.score += n.score.tail(np) - n.information.bottomLeftCorner(np, state_count) * reduced.base[s];
@@ -233,7 +234,7 @@ namespace {
 ParameterEquations without_initial_state(const NormalEquations& n, Eigen::Index np) {
   Matrix hii = n.information.topLeftCorner(state_count, state_count);
   for (int i = 0; i < state_count; ++i) hii(i, i) += start_information[i];
-  const Matrix back = Eigen::LDLT<Matrix>(hii).solve(n.information.topRightCorner(state_count, np));
+  const Matrix back = solve_symmetric(hii, n.information.topRightCorner(state_count, np));
   return {n.information.bottomRightCorner(np, np) - n.information.bottomLeftCorner(np, state_count) * back,
           n.score.tail(np) - back.transpose() * n.score.head(state_count)};
 }
@@ -323,12 +324,12 @@ void GaussNewton::move_start_positions(const Eigen::VectorXd& delta, Step& resul
   constexpr int positions = 2;
   for (std::size_t s = 0; s < linearised_.size(); ++s) {
     const NormalEquations& n = linearised_[s].normal;
-    Eigen::Matrix2d information = n.information.topLeftCorner<positions, positions>();
+    Matrix information = n.information.topLeftCorner(positions, positions);
     for (int i = 0; i < positions; ++i) information(i, i) += start_information[i];
-    const Eigen::Vector2d score =
-        n.score.head<positions>() -
-        n.information.topRightCorner(state_count, delta.size()).topRows<positions>() * delta;
-    const Eigen::Vector2d way = information.ldlt().solve(score);
+    const Eigen::VectorXd score =
+        n.score.head(positions) -
+        n.information.topRightCorner(state_count, delta.size()).topRows(positions) * delta;
+    const Eigen::VectorXd way = solve_symmetric(information, score);
     const auto values = as_array(result.starts_at_held_speed[s]);
     for (int i = 0; i < positions; ++i) *values[static_cast<std::size_t>(i)] += way[i];
   }
@@ -380,7 +381,7 @@ Eigen::VectorXd GaussNewton::solve_for(const std::vector<Eigen::Index>& moving,
       small(a, b) = reduced.information(number(a), number(b)) * scale(a) * scale(b);
   }
   for (Eigen::Index a = 0; a < n; ++a) small(a, a) += damping * small(a, a) + 1e-6;
-  return small.ldlt().solve(right);
+  return solve_symmetric(small, right);
 }
 
 }  // namespace upright

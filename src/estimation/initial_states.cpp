@@ -1,5 +1,4 @@
 // The initial states of segments: a guess from the data alone, and their fit with plant and noise held.
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -8,6 +7,7 @@
 
 #include "base/parallel.hpp"
 #include "fit.hpp"
+#include "model/dense_algebra.hpp"
 
 namespace upright {
 
@@ -34,7 +34,7 @@ std::pair<double, double> local_fit(const std::vector<double>& t, const std::vec
     constant = constant && y[i] == y[k];
   }
   if (constant) return {y[k], 0.0};
-  const Eigen::Vector3d fitted = (h + 1e-12 * Eigen::Matrix3d::Identity()).ldlt().solve(g);
+  const Eigen::VectorXd fitted = solve_symmetric(h + 1e-12 * Eigen::Matrix3d::Identity(), g);
   return {y[k] + fitted[0], fitted[1] / width_s};
 }
 

@@ -1,10 +1,11 @@
 #include "parameter_covariance.hpp"
 
-#include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+
+#include "model/dense_algebra.hpp"
 
 namespace upright {
 
@@ -17,11 +18,12 @@ using Matrix = Eigen::MatrixXd;
 Matrix inverse_of(const Matrix& h) {
   const Eigen::VectorXd scale =
       h.diagonal().unaryExpr([](double v) { return v > 1e-200 ? 1.0 / std::sqrt(v) : 0.0; });
-  const Eigen::SelfAdjointEigenSolver<Matrix> solver(scale.asDiagonal() * h * scale.asDiagonal());
+  const SymmetricEigen eigen = symmetric_eigen(scale.asDiagonal() * h * scale.asDiagonal());
   constexpr double min_eigenvalue = 1e-13;
-  const Eigen::VectorXd inverse = solver.eigenvalues().cwiseMax(min_eigenvalue).cwiseInverse();
-  return scale.asDiagonal() * solver.eigenvectors() * inverse.asDiagonal() *
-         solver.eigenvectors().transpose() * scale.asDiagonal();
+  const Eigen::VectorXd inverse = eigen.values.cwiseMax(min_eigenvalue).cwiseInverse();
+  const Matrix directions = scale.asDiagonal() * eigen.vectors;
+  const Matrix weighted = directions * inverse.asDiagonal();
+  return weighted * directions.transpose();
 }
 
 /// The scatter of the scores over segments, but in no direction less than the likelihood itself says: noise
@@ -31,14 +33,18 @@ Matrix robust_spread(const Matrix& information, const Matrix& spread) {
   const Eigen::VectorXd unscale = scale.cwiseInverse();
   Matrix unit = unscale.asDiagonal() * information * unscale.asDiagonal();
   unit.diagonal().array() += 1e-12;
-  const Eigen::LLT<Matrix> root(unit);
-  if (root.info() != Eigen::Success) return information;
-  Matrix relative = root.matrixL().solve(Matrix(unscale.asDiagonal() * spread * unscale.asDiagonal()));
-  relative = root.matrixL().solve(Matrix(relative.transpose()));
-  const Eigen::SelfAdjointEigenSolver<Matrix> solver(0.5 * (relative + relative.transpose()));
-  const Eigen::VectorXd raised = solver.eigenvalues().cwiseMax(1.0);
-  const Matrix half = scale.asDiagonal() * Matrix(root.matrixL()) * solver.eigenvectors();
-  return half * raised.asDiagonal() * half.transpose();
+  const SymmetricEigen axes = symmetric_eigen(unit);
+  if (!(axes.values.minCoeff() > 0.0)) return information;
+  // In these directions the information is the identity.
+  const Matrix whitened =
+      unscale.asDiagonal() * axes.vectors * axes.values.cwiseSqrt().cwiseInverse().asDiagonal();
+  const Matrix spread_of_whitened = spread * whitened;
+  const Matrix relative = whitened.transpose() * spread_of_whitened;
+  const SymmetricEigen eigen = symmetric_eigen(0.5 * (relative + relative.transpose()));
+  const Matrix root = scale.asDiagonal() * axes.vectors * axes.values.cwiseSqrt().asDiagonal();
+  const Matrix half = root * eigen.vectors;
+  const Matrix raised = half * eigen.values.cwiseMax(1.0).asDiagonal();
+  return raised * half.transpose();
 }
 
 Matrix without_held(Matrix h, const std::vector<bool>& held) {
@@ -94,13 +100,13 @@ Eigen::VectorXd reach_from_bounds(const Matrix& information, const Eigen::Vector
 double dispersion(const Matrix& information, const Matrix& spread) {
   const Eigen::VectorXd scale =
       information.diagonal().unaryExpr([](double v) { return v > 1e-200 ? 1.0 / std::sqrt(v) : 0.0; });
-  const Eigen::SelfAdjointEigenSolver<Matrix> solver(scale.asDiagonal() * information * scale.asDiagonal());
+  const SymmetricEigen eigen = symmetric_eigen(scale.asDiagonal() * information * scale.asDiagonal());
   constexpr double min_eigenvalue = 1e-9;
   double sum = 0.0, directions = 0.0;
-  for (Eigen::Index i = 0; i < solver.eigenvalues().size(); ++i) {
-    if (!(solver.eigenvalues()[i] > min_eigenvalue)) continue;
-    const Eigen::VectorXd way = scale.cwiseProduct(solver.eigenvectors().col(i));
-    sum += way.dot(spread * way) / solver.eigenvalues()[i];
+  for (Eigen::Index i = 0; i < eigen.values.size(); ++i) {
+    if (!(eigen.values[i] > min_eigenvalue)) continue;
+    const Eigen::VectorXd way = scale.cwiseProduct(eigen.vectors.col(i));
+    sum += way.dot(spread * way) / eigen.values[i];
     directions += 1.0;
   }
   return directions > 0.0 ? std::max(sum / directions, 1.0) : 1.0;

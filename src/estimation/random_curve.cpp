@@ -88,7 +88,7 @@ Eigen::VectorXd RandomCurve::mean(const CurveEquations& equations) const {
 
 Eigen::MatrixXd RandomCurve::prior_information(const CurveNodes& nodes) const {
   const auto n = static_cast<Eigen::Index>(nodes.count);
-  return correlation(nodes, length_).llt().solve(Eigen::MatrixXd::Identity(n, n)) / variance_;
+  return solve_symmetric(correlation(nodes, length_), Eigen::MatrixXd::Identity(n, n)) / variance_;
 }
 
 }  // namespace upright

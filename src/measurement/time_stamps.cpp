@@ -1,10 +1,11 @@
 #include "time_stamps.hpp"
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 
 #include "base/median.hpp"
+#include "model/dense_algebra.hpp"
 
 namespace upright {
 
@@ -25,14 +26,14 @@ using Window = Eigen::Matrix<double, rows, 1>;
 
 /// Sum of squares that a polynomial of time leaves.
 double left_of(const Window& time, const Window& values) {
-  Eigen::Matrix<double, rows, coefficients> basis;
+  Eigen::MatrixXd basis(rows, coefficients);
   const double middle = 0.5 * (time[0] + time[rows - 1]), half = 0.5 * (time[rows - 1] - time[0]);
   for (Eigen::Index i = 0; i < rows; ++i) {
     const double u = (time[i] - middle) / half;
     for (Eigen::Index j = 0; j < coefficients; ++j) basis(i, j) = j == 0 ? 1.0 : basis(i, j - 1) * u;
   }
-  const Window centred = values.array() - values.mean();
-  return (centred - basis * basis.householderQr().solve(centred).eval()).squaredNorm();
+  const Eigen::VectorXd centred = values.array() - values.mean();
+  return (centred - basis * least_squares(basis, centred)).squaredNorm();
 }
 
 /// First rows of windows without a gap in them.

@@ -25,17 +25,17 @@ std::optional<SchurForm> schur_form(const MatrixXd& matrix) {
 }
 
 MatrixXd inverse(const MatrixXd& matrix) {
-  return matrix.inverse();
+  return solve(matrix, MatrixXd(MatrixXd::Identity(matrix.rows(), matrix.rows())));
 }
 
 std::optional<MatrixXd> inverse_if_regular(const MatrixXd& matrix, double min_rcond) {
-  const Eigen::FullPivLU<MatrixXd> factored(matrix);
-  if (!factored.isInvertible() || factored.rcond() < min_rcond) return std::nullopt;
-  return factored.inverse();
+  const Eigen::PartialPivLU<MatrixXd> factored(matrix);
+  if (!(factored.rcond() >= min_rcond)) return std::nullopt;
+  return factored.solve(MatrixXd(MatrixXd::Identity(matrix.rows(), matrix.rows())));
 }
 
 MatrixXd pseudo_inverse(const MatrixXd& matrix) {
-  return matrix.completeOrthogonalDecomposition().pseudoInverse();
+  return least_squares(matrix, MatrixXd::Identity(matrix.rows(), matrix.rows()));
 }
 
 Eigen::VectorXcd solve(const MatrixXcd& a, const Eigen::VectorXcd& b) {
@@ -46,18 +46,16 @@ VectorXd solve(const MatrixXd& a, const VectorXd& b) {
   return a.partialPivLu().solve(b);
 }
 
+MatrixXd solve(const MatrixXd& a, const MatrixXd& b) {
+  return a.partialPivLu().solve(b);
+}
+
 MatrixXcd solve_from_right(const MatrixXcd& a, const MatrixXcd& b) {
   return a.transpose().partialPivLu().solve(b.transpose()).transpose();
 }
 
-std::pair<MatrixXd, MatrixXd> solve_both(const MatrixXd& a, const MatrixXd& b, const MatrixXd& c) {
-  const Eigen::PartialPivLU<MatrixXd> factored(a);
-  return {factored.solve(b), factored.solve(c)};
-}
-
-std::pair<MatrixXd, VectorXd> least_squares(const MatrixXd& a, const MatrixXd& b, const VectorXd& c) {
-  const Eigen::CompleteOrthogonalDecomposition<MatrixXd> factored(a);
-  return {factored.solve(b), factored.solve(c)};
+MatrixXd least_squares(const MatrixXd& a, const MatrixXd& b) {
+  return a.completeOrthogonalDecomposition().solve(b);
 }
 
 MatrixXd solve_symmetric(const MatrixXd& a, const MatrixXd& b) {
@@ -69,7 +67,7 @@ VectorXd symmetric_pivots(const MatrixXd& matrix) {
 }
 
 MatrixXd completed_basis(const MatrixXd& columns) {
-  return columns.householderQr().householderQ();
+  return columns.completeOrthogonalDecomposition().householderQ();
 }
 
 }  // namespace upright

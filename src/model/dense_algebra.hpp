@@ -28,8 +28,8 @@ std::optional<SchurForm> schur_form(const Eigen::MatrixXd& matrix);
 /// Inverse of a regular n x n matrix.
 Eigen::MatrixXd inverse(const Eigen::MatrixXd& matrix);
 
-/// Inverse of an n x n matrix by complete pivoting; absent where it is singular, or its reciprocal condition
-/// number below `min_rcond`.
+/// Inverse of an n x n matrix; absent where it is singular, or its reciprocal condition number below
+/// `min_rcond`.
 std::optional<Eigen::MatrixXd> inverse_if_regular(const Eigen::MatrixXd& matrix, double min_rcond);
 
 /// The inverse of Moore and Penrose of an n x n matrix, by complete orthogonal decomposition.
@@ -38,15 +38,13 @@ Eigen::MatrixXd pseudo_inverse(const Eigen::MatrixXd& matrix);
 /// Solution x of a x = b for a regular n x n matrix.
 Eigen::VectorXcd solve(const Eigen::MatrixXcd& a, const Eigen::VectorXcd& b);
 Eigen::VectorXd solve(const Eigen::MatrixXd& a, const Eigen::VectorXd& b);
+/// The same with a right side in each column of b.
+Eigen::MatrixXd solve(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b);
 /// Solution x of x a = b for a regular n x n matrix.
 Eigen::MatrixXcd solve_from_right(const Eigen::MatrixXcd& a, const Eigen::MatrixXcd& b);
-/// Solutions x of a x = b and y of a y = c, with one factorisation.
-std::pair<Eigen::MatrixXd, Eigen::MatrixXd> solve_both(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b,
-                                                       const Eigen::MatrixXd& c);
 
-/// The shortest x and y that minimise |a x - b| and |a y - c|, with one complete orthogonal decomposition.
-std::pair<Eigen::MatrixXd, Eigen::VectorXd> least_squares(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b,
-                                                          const Eigen::VectorXd& c);
+/// The shortest x that minimises |a x - b|, for each column of b.
+Eigen::MatrixXd least_squares(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b);
 
 /// Solution x of a x = b for a symmetric n x n matrix that is positive or negative semidefinite.
 Eigen::MatrixXd solve_symmetric(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b);

@@ -120,8 +120,11 @@ DiscreteRiccatiSolution solve_discrete_riccati(const MatrixXd& a, const MatrixXd
   constexpr int max_doublings = 60;
   constexpr double converged = 1e-15;
   bool done = false;
+  MatrixXd right(n, 2 * n);
   for (int i = 0; i < max_doublings && !done; ++i) {
-    const auto [w_f, w_g] = solve_both(MatrixXd::Identity(n, n) + g * h, f, g);
+    right << f, g;
+    const MatrixXd both = solve(MatrixXd(MatrixXd::Identity(n, n) + g * h), right);
+    const MatrixXd w_f = both.leftCols(n), w_g = both.rightCols(n);
     const MatrixXd grown = f.transpose() * h * w_f;
     done = grown.cwiseAbs().maxCoeff() <= converged * h.cwiseAbs().maxCoeff();
     g = symmetric_part(g + f * w_g * f.transpose());
