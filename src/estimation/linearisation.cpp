@@ -2,8 +2,6 @@
 // are therefore alone in this file.
 #include "linearisation.hpp"
 
-#include <ceres/jet.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -12,6 +10,7 @@
 #include "model/rigid_body.hpp"
 #include "segment_start.hpp"
 #include "state_vector.hpp"
+#include "upright/model/dual_number.hpp"
 #include "upright/model/elementary.hpp"
 #include "upright/sim/simulator.hpp"
 
@@ -67,12 +66,10 @@ double shown_of_cart_speed_s(const Dynamics<S>& dynamics) {
   return value_of(dynamics.measure(unit).cart_m) - value_of(dynamics.measure(PlantState<S>{}).cart_m);
 }
 
-/// Adds weight * row * row', of which the lower triangle counts: whole columns are of a length that SIMD
-/// likes.
+/// Adds weight * row * row' to the columns of a matrix, of which the lower triangle counts.
 template <int N>
-void add_square(const Eigen::Matrix<double, N, 1>& row, double weight, int columns,
-                Eigen::Matrix<double, N, N>& sum) {
-  for (int j = 0; j < columns; ++j) sum.col(j) += (weight * row[j]) * row;
+void add_square(const Derivatives<N>& row, double weight, int columns, std::array<Derivatives<N>, N>& sum) {
+  for (int j = 0; j < columns; ++j) sum[static_cast<std::size_t>(j)].add_from(j, weight * row[j], row);
 }
 
 /// How a white force and torque enter the velocities. They are pushed through the plant file's own masses:
@@ -131,8 +128,8 @@ class SegmentLineariser {
         shown_of_speed_s_(shown_of_cart_speed_s(dynamics())),
         noise_input_(point.plant, run.cart_locked),
         covariance_(run, point.plant, noise_of_filter(point.noise)) {
-    PlantState<Jet> state = without_bristles(start);
-    state.bristle_m = Jet(start.bristle_m);
+    PlantState<Dual> state = without_bristles(start);
+    state.bristle_m = Dual(start.bristle_m);
     start_segment(simulator_, run, segment, state);
     // A correction is in the sensors' units: to a state it is worth as much less as they show more of it.
     for (std::size_t channel = 0; channel < 2; ++channel)
@@ -151,7 +148,7 @@ class SegmentLineariser {
     BlockSums blocks(sums.blocks);
     for (std::size_t k = segment_.first; k <= segment_.last; ++k) {
       LinearStep& step = steps[k - segment_.first];
-      const Outputs<Jet> outputs = simulate_to(k, step);
+      const Outputs<Dual> outputs = simulate_to(k, step);
       if (k != segment_.first) {
         set_impulse(step, steps[k - 1 - segment_.first]);
         covariance_.predict(step);
@@ -163,48 +160,50 @@ class SegmentLineariser {
       if (normal != nullptr) blocks.reach(run_.time_s[k], sums.likelihood.objective());
     }
     if (normal == nullptr) return;
-    const Eigen::Matrix<double, N, N> whole = information_.template selfadjointView<Eigen::Lower>();
-    sums.information = whole.topLeftCorner(columns_, columns_);
-    sums.score = score_.head(columns_);
+    for (int j = 0; j < columns_; ++j) {
+      for (int i = j; i < columns_; ++i)
+        sums.information(i, j) = sums.information(j, i) = information_[static_cast<std::size_t>(j)][i];
+      sums.score[j] = score_[j];
+    }
   }
 
  private:
-  using Jet = ceres::Jet<double, N>;
-  using Row = Eigen::Matrix<double, N, 1>;
+  using Dual = DualNumber<N>;
+  using Row = Derivatives<N>;
 
-  static PlantModel<Jet> model_of(const Measurement& run, const Plant& plant,
-                                  const std::vector<FreeParameter>& free) {
-    PlantModel<Jet> model = make_model_of_run<Jet>(plant, run);
+  static PlantModel<Dual> model_of(const Measurement& run, const Plant& plant,
+                                   const std::vector<FreeParameter>& free) {
+    PlantModel<Dual> model = make_model_of_run<Dual>(plant, run);
     for (std::size_t j = 0; j < free.size(); ++j)
-      model.parameters[effect_parameter_offset(free[j].effect) + free[j].index]
-          .v[state_count + static_cast<int>(j)] = 1.0;
+      model.parameters[effect_parameter_offset(free[j].effect) + free[j].index].v.set(
+          state_count + static_cast<int>(j), 1.0);
     return model;
   }
 
-  static std::array<Jet, 2> sensor_gains(const PlantModel<Jet>& model) {
-    const SensorLine<Jet> line(model);
+  static std::array<Dual, 2> sensor_gains(const PlantModel<Dual>& model) {
+    const SensorLine<Dual> line(model);
     return {line.cart_gain, line.theta_gain};
   }
 
-  static PlantState<Jet> without_bristles(const PlantState<double>& state) {
-    return {Jet(state.cart_m), Jet(state.theta_rad), Jet(state.cart_mps), Jet(state.theta_radps)};
+  static PlantState<Dual> without_bristles(const PlantState<double>& state) {
+    return {Dual(state.cart_m), Dual(state.theta_rad), Dual(state.cart_mps), Dual(state.theta_radps)};
   }
 
-  const Dynamics<Jet>& dynamics() const { return simulator_.engine().dynamics(); }
+  const Dynamics<Dual>& dynamics() const { return simulator_.engine().dynamics(); }
 
-  std::array<const Jet*, state_count> reached_state() const {
-    const PlantState<Jet>& reached = simulator_.engine().state();
+  std::array<const Dual*, state_count> reached_state() const {
+    const PlantState<Dual>& reached = simulator_.engine().state();
     return {&reached.cart_m, &reached.theta_rad, &reached.cart_mps, &reached.theta_radps, &reached.bristle_m};
   }
 
   void start_sensitivity(const PlantState<double>& start) {
-    for (int i = 0; i < state_count; ++i) sensitivity_[static_cast<std::size_t>(i)] = Row::Unit(i);
+    for (int i = 0; i < state_count; ++i) sensitivity_[static_cast<std::size_t>(i)] = Row::unit(i);
     // Parameters of the sensors change what is meant by what they show at the start, not what they show.
-    PlantState<Jet> at_start = without_bristles(start);
-    at_start.cart_m.v[0] = 1.0;
-    const Outputs<Jet> shown = dynamics().measure(at_start);
+    PlantState<Dual> at_start = without_bristles(start);
+    at_start.cart_m.v.set(0, 1.0);
+    const Outputs<Dual> shown = dynamics().measure(at_start);
     Row by_parameters = shown.cart_m.v;
-    by_parameters[0] = 0.0;
+    by_parameters.set(0, 0.0);
     sensitivity_[0] -= by_parameters / shown.cart_m.v[0];
     sensitivity_[1] -= shown.theta_rad.v / sensors_[1].a;
     sensitivity_[2] -= start.cart_mps * worth_less_[0];
@@ -212,7 +211,7 @@ class SegmentLineariser {
   }
 
   /// Simulates to sample k, and fills what of its step does not depend on the filter.
-  Outputs<Jet> simulate_to(std::size_t k, LinearStep& step) {
+  Outputs<Dual> simulate_to(std::size_t k, LinearStep& step) {
     const bool first = k == segment_.first;
     step.period_s = first ? 0.0 : run_.time_s[k] - run_.time_s[k - 1];
     if (first) {
@@ -225,13 +224,13 @@ class SegmentLineariser {
       command_from(k - 1, run_, simulator_);
       simulator_.advance_to(run_.time_s[k]);
     }
-    const PlantState<Jet>& reached = simulator_.engine().state();
-    const std::array<const Jet*, state_count> end = reached_state();
+    const PlantState<Dual>& reached = simulator_.engine().state();
+    const std::array<const Dual*, state_count> end = reached_state();
     for (int i = 0; i < state_count; ++i)
       for (int j = 0; j < state_count; ++j)
         step.transition[i][j] = first ? (i == j ? 1.0 : 0.0) : end[static_cast<std::size_t>(i)]->v[j];
     set_holds(step);
-    const Outputs<Jet> outputs = simulator_.engine().outputs();
+    const Outputs<Dual> outputs = simulator_.engine().outputs();
     const double simulated[2] = {value_of(outputs.cart_m), value_of(outputs.theta_rad)};
     for (int channel = 0; channel < 2; ++channel) {
       step.gain[channel] = value_of(sensors_[static_cast<std::size_t>(channel)]);
@@ -268,7 +267,7 @@ class SegmentLineariser {
   }
 
   void set_holds(LinearStep& step) const {
-    const EventEngine<Jet>& engine = simulator_.engine();
+    const EventEngine<Dual>& engine = simulator_.engine();
     step.holds[0] = step.holds[1] = 0.0;
     if (!run_.cart_locked && !dynamics().has_bristle_state() && engine.cart_at_rest())
       step.holds[0] = min_dry_level(dynamics(), engine.state());
@@ -277,7 +276,7 @@ class SegmentLineariser {
   }
 
   void carry_sensitivity(const LinearStep& step) {
-    const std::array<const Jet*, state_count> end = reached_state();
+    const std::array<const Dual*, state_count> end = reached_state();
     if (covariance_.disturbed()) {
       for (std::size_t d = 0; d < disturbance_sensitivity_.size(); ++d) {
         for (std::size_t i = 0; i < 2; ++i)
@@ -289,7 +288,7 @@ class SegmentLineariser {
     const std::array<Row, state_count> former = sensitivity_;
     for (std::size_t i = 0; i < state_count; ++i) {
       Row moved = end[i]->v;
-      moved.template head<state_count>().setZero();
+      moved.clear_first(state_count);
       for (std::size_t j = 0; j < state_count; ++j)
         if (step.transition[i][j] != 0.0) moved += step.transition[i][j] * former[j];
       sensitivity_[i] = moved;
@@ -297,7 +296,7 @@ class SegmentLineariser {
   }
 
   /// Updates the filter with each channel in turn. False for a value that is not finite.
-  bool update(LinearStep& step, const Outputs<Jet>& outputs, NormalEquations* normal) {
+  bool update(LinearStep& step, const Outputs<Dual>& outputs, NormalEquations* normal) {
     std::fill(step.correction, step.correction + state_count, 0.0);
     for (double& d : disturbance_) d *= step.keeps;
     for (int channel = 0; channel < 2; ++channel) {
@@ -323,18 +322,18 @@ class SegmentLineariser {
   }
 
   /// Adds an innovation to the normal equations, and corrects the sensitivities as the filter does the state.
-  void add_innovation(const LinearStep& step, int channel, const Outputs<Jet>& outputs) {
-    const PlantState<Jet>& reached = simulator_.engine().state();
+  void add_innovation(const LinearStep& step, int channel, const Outputs<Dual>& outputs) {
+    const PlantState<Dual>& reached = simulator_.engine().state();
     const double e = step.innovation[channel];
     // Of what the sensor shows, what is its own, and what comes with the state.
     Row row = channel == 0 ? outputs.cart_m.v : outputs.theta_rad.v;
     row -= step.gain[channel] * reached_state()[static_cast<std::size_t>(channel)]->v;
     if (channel == 0) row -= shown_of_speed_s_ * reached.cart_mps.v;
-    row.template head<state_count>().setZero();
+    row.clear_first(state_count);
     row += step.gain[channel] * sensitivity_[static_cast<std::size_t>(channel)];
     if (channel == 0) row += shown_of_speed_s_ * sensitivity_[2];
     const double weight = step.weight[channel] / covariance_.variance();
-    add_square(row, weight, columns_, information_);
+    add_square<N>(row, weight, columns_, information_);
     score_ += (weight * e) * row;
     for (std::size_t i = 0; i < state_count; ++i) {
       if (covariance_.gain()[i] == 0.0) continue;
@@ -350,17 +349,17 @@ class SegmentLineariser {
   const Measurement& run_;
   const Segment& segment_;
   int columns_;
-  Simulator<Jet> simulator_;
-  std::array<Jet, 2> sensors_;
+  Simulator<Dual> simulator_;
+  std::array<Dual, 2> sensors_;
   std::array<Row, 2> worth_less_;
   double shown_of_speed_s_;
   NoiseInput noise_input_;
   EkfCovariance<double> covariance_;
   std::array<Row, state_count> sensitivity_;                    ///< of the state that the filter estimates
   std::array<double, LinearStep::disturbances> disturbance_{};  ///< estimated force and torque
-  std::array<Row, LinearStep::disturbances> disturbance_sensitivity_{Row::Zero(), Row::Zero()};
-  Eigen::Matrix<double, N, N> information_ = Eigen::Matrix<double, N, N>::Zero();
-  Row score_ = Row::Zero();
+  std::array<Row, LinearStep::disturbances> disturbance_sensitivity_{};
+  std::array<Row, N> information_{};  ///< columns, of which the lower triangle counts
+  Row score_;
 };
 
 }  // namespace

@@ -1,7 +1,5 @@
 #include "linear_plant.hpp"
 
-#include <ceres/jet.h>
-
 #include <Eigen/Dense>
 #include <cmath>
 #include <cstdio>
@@ -10,6 +8,7 @@
 #include <utility>
 
 #include "upright/base/error.hpp"
+#include "upright/model/dual_number.hpp"
 #include "upright/model/dynamics.hpp"
 
 namespace upright {
@@ -19,7 +18,7 @@ namespace {
 constexpr int bristle_place = 4;
 constexpr int motor_place = 5;
 constexpr int state_places = 6;
-using Dual = ceres::Jet<double, state_places>;
+using Dual = DualNumber<state_places>;
 using Slopes = Eigen::Matrix<double, state_places, state_places>;
 
 /// Small enough to change no slope, and not zero, so that a kink shows the slope of its side.
@@ -48,7 +47,8 @@ Line line_of(const Dynamics<Dual>& dynamics) {
     const std::array<const Dual*, 5> rows = {&rate.cart_m, &rate.theta_rad, &rate.cart_mps, &rate.theta_radps,
                                              &rate.bristle_m};
     for (std::size_t row = 0; row < rows.size(); ++row) {
-      line.slopes.row(static_cast<Eigen::Index>(row)) += 0.5 * rows[row]->v.transpose();
+      for (int place = 0; place < state_places; ++place)
+        line.slopes(static_cast<Eigen::Index>(row), place) += 0.5 * rows[row]->v[place];
       line.rate(static_cast<Eigen::Index>(row)) += 0.5 * rows[row]->a;
     }
   }
@@ -72,8 +72,8 @@ std::vector<Place> places_of(const Dynamics<Dual>& dynamics) {
 
 void read_sensors(const Dynamics<Dual>& dynamics, LinearPlant& linear) {
   const Outputs<Dual> outputs = outputs_of_true_encoder(dynamics.model(), Dual(0.0, 0), Dual(0.0, 1));
-  const Eigen::Vector4d scale(outputs.cart_m.v(0), outputs.theta_rad.v(1), outputs.cart_m.v(0),
-                              outputs.theta_rad.v(1));
+  const Eigen::Vector4d scale(outputs.cart_m.v[0], outputs.theta_rad.v[1], outputs.cart_m.v[0],
+                              outputs.theta_rad.v[1]);
   const Eigen::Vector4d offset(outputs.cart_m.a, outputs.theta_rad.a, 0.0, 0.0);
   const auto count = static_cast<Eigen::Index>(linear.fed_back.size());
   linear.sensor_scale.resize(count);
@@ -166,7 +166,7 @@ LinearPlant linearize(const Plant& plant, double smoothing) {
     linear.a(n - 1, n - 1) = -rate;
     linear.b(n - 1) = rate;
   }
-  linear.actuator_slope = dynamics.actuate(Dual(0.0, 0)).v(0);
+  linear.actuator_slope = dynamics.actuate(Dual(0.0, 0)).v[0];
   linear.input_delay_s = dynamics.input_delay_s().a;
   read_sensors(dynamics, linear);
   record_ideal_sensors(plant, linear);

@@ -1,13 +1,14 @@
 // Elementary functions against those of libm in extended precision, and that they are nobody else's.
 #include "upright/model/elementary.hpp"
 
-#include <ceres/jet.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <limits>
 #include <numbers>
 #include <random>
+
+#include "upright/model/dual_number.hpp"
 
 namespace upright {
 namespace {
@@ -148,8 +149,8 @@ TEST(Elementary, NotANumberStaysOne) {
 }
 
 TEST(Elementary, DualNumbersCarryTheDerivative) {
-  using Jet = ceres::Jet<double, 1>;
-  const Jet x(0.7, 0);
+  using Dual = DualNumber<1>;
+  const Dual x(0.7, 0);
   EXPECT_EQ(elementary::sin(x).a, elementary::sin(0.7));
   EXPECT_DOUBLE_EQ(elementary::sin(x).v[0], std::cos(0.7));
   EXPECT_DOUBLE_EQ(elementary::sine_and_cosine(x).cosine.v[0], -std::sin(0.7));

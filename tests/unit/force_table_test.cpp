@@ -1,5 +1,4 @@
 // The force table: what its curve reproduces, what it conserves, and that all engines follow the same one.
-#include <ceres/jet.h>
 #include <gtest/gtest.h>
 
 #include <array>
@@ -10,6 +9,7 @@
 #include "plants.hpp"
 #include "sim/cvode_engine.hpp"
 #include "upright/base/error.hpp"
+#include "upright/model/dual_number.hpp"
 #include "upright/sim/simulator.hpp"
 
 namespace upright {
@@ -60,7 +60,7 @@ TEST(ForceTable, PassesThroughItsNodesWithAContinuousSlope) {
   std::mt19937_64 random(1);
   std::uniform_real_distribution<double> any(-1.0, 1.0);
   const Values p = table_of(ForceTable::position, -0.3, 0.5, [&](double) { return any(random); });
-  using Dual = ceres::Jet<double, 1>;
+  using Dual = DualNumber<1>;
   std::array<Dual, std::tuple_size_v<Values>> dual;
   for (std::size_t i = 0; i < p.size(); ++i) dual[i] = Dual(p[i]);
   for (std::size_t k = 0; k < ForceTable::node_count; ++k) {

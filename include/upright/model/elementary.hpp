@@ -37,7 +37,7 @@ struct SineAndCosine {
 /// Both, at little more than the cost of one.
 SineAndCosine<double> sine_and_cosine(double angle);
 
-/// A dual number (ceres::Jet): `a` is its value, `v` are its derivatives.
+/// A dual number, as DualNumber: `a` is its value, `v` are its derivatives.
 template <class S>
 concept Dual = requires(const S& x) {
   x.a;

@@ -1,5 +1,5 @@
 // Requirements of the physics on a scalar, so that the same code works with double, dual numbers
-// (ceres::Jet) and SIMD lanes. A SIMD type adds an overload of `select` for its comparison result;
+// (dual_number.hpp) and SIMD lanes. A SIMD type adds an overload of `select` for its comparison result;
 // everything else follows.
 #pragma once
 

@@ -207,8 +207,8 @@ class EventEngine {
   void seed() requires(!std::is_same_v<S, double>) {
     const bool cart = !dynamics_.cart_locked(), pendulum = dynamics_.has_pendulum();
     const auto set = [](S& number, int place, bool moves) {
-      number.v.setZero();
-      if (moves) number.v[place] = 1.0;
+      number.v = {};
+      if (moves) number.v.set(place, 1.0);
     };
     set(state_.cart_m, 0, cart);
     set(state_.theta_rad, 1, pendulum);

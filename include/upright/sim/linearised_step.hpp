@@ -93,7 +93,7 @@ class LinearisedStep {
     };
     // The step length may have derivatives too.
     PlantState<double> late = plain_rate;
-    Slope moved_x = Slope::Zero(), moved_theta = Slope::Zero();
+    Slope moved_x{}, moved_theta{};
     if (const double rise_v = value_of(voltage.end_v - voltage.mean_v); rise_v != 0.0) {
       late = plain_.derivative(middle, value_of(voltage.end_v), contacts_);
       moved_x = (late.cart_mps - plain_rate.cart_mps) / rise_v * voltage.moment_vs2.v;
