@@ -1,7 +1,7 @@
-// Dual numbers: a value with N derivatives, which arithmetic carries along (forward-mode automatic
-// differentiation; Griewank and Walther, Evaluating Derivatives, 2nd ed., section 3.1). The derivatives are
-// SIMD vectors of the compiler. ceres::Jet gives the same numbers with expressions of Eigen; with it the fits
-// are as fast, and took twice as long to compile.
+// Dual numbers: a value with N derivatives, which arithmetic carries along. This is forward-mode automatic
+// differentiation (Griewank and Walther, Evaluating Derivatives, 2nd ed., section 3.1). The derivatives are
+// SIMD vectors of the compiler. Fits with ceres::Jet, which uses expressions of Eigen, are as fast, but took
+// twice as long to compile.
 //
 // Comparisons are of the values. Functions other than the square root are in elementary.hpp.
 #pragma once
@@ -20,6 +20,7 @@ class Derivatives {
  public:
   /// As many as a SIMD register of x86-64-v3 holds.
   static constexpr int lanes = 4;
+  /// SIMD vectors that hold the derivatives.
   static constexpr int vectors = (N + lanes - 1) / lanes;
 
   /// All 0.
@@ -31,7 +32,9 @@ class Derivatives {
     return result;
   }
 
+  /// The derivative at a place.
   UPRIGHT_DUAL_INLINE double operator[](int place) const { return vector_[place / lanes][place % lanes]; }
+  /// Sets the derivative at a place.
   UPRIGHT_DUAL_INLINE void set(int place, double value) { vector_[place / lanes][place % lanes] = value; }
 
   /// Sets the first `count` to 0.
@@ -43,23 +46,32 @@ class Derivatives {
     for (int i = first / lanes; i < vectors; ++i) vector_[i] += factor * b.vector_[i];
   }
 
+  /// Adds.
   UPRIGHT_DUAL_INLINE Derivatives& operator+=(const Derivatives& b) { return *this = *this + b; }
+  /// Subtracts.
   UPRIGHT_DUAL_INLINE Derivatives& operator-=(const Derivatives& b) { return *this = *this - b; }
+  /// Multiplies.
   UPRIGHT_DUAL_INLINE Derivatives& operator*=(double factor) { return *this = factor * *this; }
 
+  /// Sum.
   UPRIGHT_DUAL_INLINE friend Derivatives operator+(const Derivatives& a, const Derivatives& b) {
     return of([&](int i) { return a.vector_[i] + b.vector_[i]; });
   }
+  /// Difference.
   UPRIGHT_DUAL_INLINE friend Derivatives operator-(const Derivatives& a, const Derivatives& b) {
     return of([&](int i) { return a.vector_[i] - b.vector_[i]; });
   }
+  /// Negative.
   UPRIGHT_DUAL_INLINE friend Derivatives operator-(const Derivatives& a) {
     return of([&](int i) { return -a.vector_[i]; });
   }
+  /// Product.
   UPRIGHT_DUAL_INLINE friend Derivatives operator*(double factor, const Derivatives& a) {
     return of([&](int i) { return factor * a.vector_[i]; });
   }
+  /// Product.
   UPRIGHT_DUAL_INLINE friend Derivatives operator*(const Derivatives& a, double factor) { return factor * a; }
+  /// Quotient.
   UPRIGHT_DUAL_INLINE friend Derivatives operator/(const Derivatives& a, double divisor) {
     return (1.0 / divisor) * a;
   }
@@ -89,6 +101,7 @@ struct DualNumber {
   double a = 0.0;    ///< the value
   Derivatives<N> v;  ///< the derivatives
 
+  /// 0, a constant.
   DualNumber() = default;
   /// A constant: all derivatives are 0.
   UPRIGHT_DUAL_INLINE explicit DualNumber(double value) : a(value) {}
@@ -98,56 +111,82 @@ struct DualNumber {
   UPRIGHT_DUAL_INLINE DualNumber(double value, const Derivatives<N>& derivatives)
       : a(value), v(derivatives) {}
 
+  /// Adds.
   UPRIGHT_DUAL_INLINE DualNumber& operator+=(const DualNumber& y) { return *this = *this + y; }
+  /// Subtracts.
   UPRIGHT_DUAL_INLINE DualNumber& operator-=(const DualNumber& y) { return *this = *this - y; }
+  /// Multiplies.
   UPRIGHT_DUAL_INLINE DualNumber& operator*=(const DualNumber& y) { return *this = *this * y; }
+  /// Divides.
   UPRIGHT_DUAL_INLINE DualNumber& operator/=(const DualNumber& y) { return *this = *this / y; }
+  /// Adds.
   UPRIGHT_DUAL_INLINE DualNumber& operator+=(double y) { return *this = *this + y; }
+  /// Subtracts.
   UPRIGHT_DUAL_INLINE DualNumber& operator-=(double y) { return *this = *this - y; }
+  /// Multiplies.
   UPRIGHT_DUAL_INLINE DualNumber& operator*=(double y) { return *this = *this * y; }
+  /// Divides.
   UPRIGHT_DUAL_INLINE DualNumber& operator/=(double y) { return *this = *this / y; }
 
+  /// Negative.
   UPRIGHT_DUAL_INLINE friend DualNumber operator-(const DualNumber& x) { return {-x.a, -x.v}; }
 
+  /// Sum.
   UPRIGHT_DUAL_INLINE friend DualNumber operator+(const DualNumber& x, const DualNumber& y) {
     return {x.a + y.a, x.v + y.v};
   }
+  /// Sum.
   UPRIGHT_DUAL_INLINE friend DualNumber operator+(const DualNumber& x, double y) { return {x.a + y, x.v}; }
+  /// Sum.
   UPRIGHT_DUAL_INLINE friend DualNumber operator+(double x, const DualNumber& y) { return {x + y.a, y.v}; }
 
+  /// Difference.
   UPRIGHT_DUAL_INLINE friend DualNumber operator-(const DualNumber& x, const DualNumber& y) {
     return {x.a - y.a, x.v - y.v};
   }
+  /// Difference.
   UPRIGHT_DUAL_INLINE friend DualNumber operator-(const DualNumber& x, double y) { return {x.a - y, x.v}; }
+  /// Difference.
   UPRIGHT_DUAL_INLINE friend DualNumber operator-(double x, const DualNumber& y) { return {x - y.a, -y.v}; }
 
+  /// Product.
   UPRIGHT_DUAL_INLINE friend DualNumber operator*(const DualNumber& x, const DualNumber& y) {
     return {x.a * y.a, x.a * y.v + y.a * x.v};
   }
+  /// Product.
   UPRIGHT_DUAL_INLINE friend DualNumber operator*(const DualNumber& x, double y) {
     return {x.a * y, x.v * y};
   }
+  /// Product.
   UPRIGHT_DUAL_INLINE friend DualNumber operator*(double x, const DualNumber& y) {
     return {x * y.a, x * y.v};
   }
 
+  /// Quotient.
   UPRIGHT_DUAL_INLINE friend DualNumber operator/(const DualNumber& x, const DualNumber& y) {
     const double inverse = 1.0 / y.a;
     const double quotient = x.a * inverse;
     return {quotient, (x.v - quotient * y.v) * inverse};
   }
+  /// Quotient.
   UPRIGHT_DUAL_INLINE friend DualNumber operator/(const DualNumber& x, double y) {
     const double inverse = 1.0 / y;
     return {x.a * inverse, x.v * inverse};
   }
+  /// Quotient.
   UPRIGHT_DUAL_INLINE friend DualNumber operator/(double x, const DualNumber& y) {
     return {x / y.a, y.v * (-x / (y.a * y.a))};
   }
 
+  /// Compares the values.
   UPRIGHT_DUAL_INLINE friend bool operator<(const DualNumber& x, const DualNumber& y) { return x.a < y.a; }
+  /// Compares the values.
   UPRIGHT_DUAL_INLINE friend bool operator<=(const DualNumber& x, const DualNumber& y) { return x.a <= y.a; }
+  /// Compares the values.
   UPRIGHT_DUAL_INLINE friend bool operator>(const DualNumber& x, const DualNumber& y) { return x.a > y.a; }
+  /// Compares the values.
   UPRIGHT_DUAL_INLINE friend bool operator>=(const DualNumber& x, const DualNumber& y) { return x.a >= y.a; }
+  /// Compares the values.
   UPRIGHT_DUAL_INLINE friend bool operator==(const DualNumber& x, const DualNumber& y) { return x.a == y.a; }
 };
 
