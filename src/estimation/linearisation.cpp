@@ -1,5 +1,5 @@
-// The dual-number instantiations of plant and engine. They take longer to compile than all else together and
-// are therefore alone in this file.
+// The dual-number instantiations of plant and engine. They take longer to compile than any other file of the
+// fit and are therefore alone in this one.
 #include "linearisation.hpp"
 
 #include <algorithm>

@@ -4,7 +4,6 @@
 
 #include <Eigen/Core>
 #include <optional>
-#include <utility>
 
 namespace upright {
 
