@@ -306,7 +306,7 @@ void GaussNewton::move_initial_states(const ReducedEquations& reduced, const Eig
   way.tail(delta.size()) = delta;
   for (std::size_t s = 0; s < linearised_.size(); ++s) {
     const auto values = as_array(result.point.starts[s]);
-    way.head(state_count) = reduced.base[s] - reduced.back[s] * delta;
+    way.head<state_count>() = reduced.base[s] - reduced.back[s] * delta;
     for (int i = 0; i < state_count; ++i) {
       result.cut_short = result.cut_short || std::abs(way[i]) > longest[i];
       way[i] = std::clamp(way[i], -longest[i], longest[i]);
