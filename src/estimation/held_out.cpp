@@ -24,17 +24,18 @@ double excitation_of(const Measurement& run, const Segment& stretch, double arm_
 }
 
 /// Which stretches to hold out, a third of them: by default the middle one of each three in the order of
-/// their excitation, so that the fit need not answer for motions beyond those it saw, in whatever order they
-/// come.
+/// their excitation, in whatever order they come. The fit need not answer for motions beyond those it saw, so
+/// the most excited one is not held out: where three are not complete, it is the one before.
 std::vector<std::size_t> choose_held_out(const std::vector<double>& excitation, HeldOut which) {
   std::vector<std::size_t> order(excitation.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
   std::stable_sort(order.begin(), order.end(),
                    [&](std::size_t a, std::size_t b) { return excitation[a] < excitation[b]; });
+  const std::size_t count = order.size(), place = which == HeldOut::other ? 0 : 1;
+  if (count == 2) return {order[1 - place]};
   std::vector<std::size_t> held;
-  const bool middle = which != HeldOut::other;
-  if (order.size() == 2) held = {order[middle ? 0 : 1]};
-  for (std::size_t i = middle ? 1 : 0; i < order.size() && order.size() > 2; i += 3) held.push_back(order[i]);
+  for (std::size_t first = 0; first + place < count && count > 2; first += 3)
+    held.push_back(order[first + 3 > count ? first + place - 1 : first + place]);
   std::sort(held.begin(), held.end());
   return held;
 }

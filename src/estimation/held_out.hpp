@@ -19,7 +19,8 @@ double sample_count(const FitData& data);
 
 /// Which of each three runs, sorted by excitation, is held out: the middle one, which is similar to the
 /// others, or another one if the fit needs what only the middle one shows. (Of two runs the less excited one,
-/// or the other.) `end` is `middle` for several runs, and the last third of a single run.
+/// or the other.) Of three or more the most excited one is never held out. `end` is `middle` for several
+/// runs, and the last third of a single run.
 enum class HeldOut { middle, other, end };
 
 /// Holds out a third. The excitation is the RMS of the speeds of the cart and of the tip of a pendulum of
