@@ -239,18 +239,20 @@ class Diagnostician {
     return left;
   }
 
-  /// The noise of the search is white. A disturbance that lasts looks like something missing beside it: the
-  /// last word has noise with a coloured part, where that accounts for the residual better.
+  /// The noise of the search is white. A disturbance that lasts looks like something missing beside it, and
+  /// moves a simulation further than such noise does: the last word has noise with a coloured part, where that
+  /// accounts for the residual better. What passes the tests beside white noise has passed them.
   ResidualTests beside_coloured_noise(const ResidualTests& left) {
     noise_ = fits_.known().train.point.noise;
-    if (!left.structured) return left;
     options_.report_progress(0.945, "estimating a coloured disturbance");
     const FitResult coloured = search_.with_coloured_noise(fits_.known());
     if (!(minus_log_likelihood(fits_.known().train) - minus_log_likelihood(coloured) >
           policy_.acceptance.min_evidence))
       return left;
+    const ResidualTests beside = tests_of(coloured.point, coloured.point.noise);
+    if (beside.structured && !left.structured) return left;
     noise_ = coloured.point.noise;
-    return tests_of(coloured.point, noise_);
+    return beside;
   }
 
   /// What is left once all effects are gone that are not to be named.
