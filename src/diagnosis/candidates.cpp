@@ -19,7 +19,8 @@ bool is_table(std::size_t effect) {
   return effect == effect_index<effects::ForceTable>();
 }
 
-/// Of the forces at work in these runs, whatever the size of the rig: a few percent of the motor's.
+/// Of the forces at work in these runs, whatever the size of the rig: a few percent of the motor's. In the
+/// pivot, a share of gravity's torque.
 double order_of_magnitude(const ParameterInfo& info, const DataRange& range, const PriorPolicy& prior) {
   const double force = prior.share_of_motor_force * range.largest_force_n;
   const double speed = range.largest_speed_mps, travel = range.longest_travel_m;
@@ -28,6 +29,11 @@ double order_of_magnitude(const ParameterInfo& info, const DataRange& range, con
   if (info.unit == "N/m" && travel > 0.0) order = force / travel;
   if (info.unit == "N/(m/s)" && speed > 0.0) order = force / speed;
   if (info.unit == "N s^2/m^2" && speed > 0.0) order = force / (speed * speed);
+  const double torque = prior.share_of_gravity_torque * range.gravity_torque_nm;
+  const double rate = range.pendulum_rate_radps;
+  if (info.unit == "N m") order = torque;
+  if (info.unit == "N m s/rad" && rate > 0.0) order = torque / rate;
+  if (info.unit == "N m s^2/rad^2" && rate > 0.0) order = torque / (rate * rate);
   return std::max(info.typical, order);
 }
 
@@ -77,6 +83,11 @@ DataRange range_of(const std::vector<Measurement>& runs, const Plant& plant, con
   }
   range.cart_mean_m = count > 0.0 ? sum / count : 0.0;
   range.largest_force_n = plant.motor.force_per_volt_n * range.largest_voltage_v;
+  if (plant.pendulum) {
+    const Pendulum& pendulum = *plant.pendulum;
+    range.gravity_torque_nm = pendulum.mass_kg * plant.gravity_mps2 * pendulum.length_to_com_m;
+    range.pendulum_rate_radps = std::sqrt(range.gravity_torque_nm / pendulum.inertia_about_pivot_kgm2());
+  }
   return range;
 }
 
@@ -248,10 +259,15 @@ std::vector<std::vector<double>> search_starts(std::size_t effect, const DataRan
   if (is_periodic(effect)) return periodic_starts(effect, {}, range, prior, budget);
   if (is_named(effect, "voltage_saturation"))
     return {{0.9 * volts}, {0.7 * volts}, {0.5 * volts}, {0.3 * volts}};
-  if (is_named(effect, "voltage_dead_zone")) return {{0.1}, {0.4}};
-  if (is_named(effect, "stribeck_friction"))
-    return {{0.2, std::max(0.005, std::min(0.1, 0.2 * speed)), 2.0},
-            {0.2, std::max(0.003, 0.03 * speed), 2.0}};
+  if (is_named(effect, "voltage_dead_zone")) {
+    const double usual_v = std::max(info.parameters[0].typical, prior.share_of_motor_force * volts);
+    return {{usual_v / 3.0}, {4.0 * usual_v / 3.0}};
+  }
+  if (is_named(effect, "stribeck_friction")) {
+    const double extra_n = 0.4 * order_of_magnitude(info.parameters[0], range, prior);
+    return {{extra_n, std::max(0.005, std::min(0.1, 0.2 * speed)), 2.0},
+            {extra_n, std::max(0.003, 0.03 * speed), 2.0}};
+  }
   if (is_named(effect, "cable_spring"))
     return {{0.25 * order_of_magnitude(info.parameters[0], range, prior), range.cart_mean_m}};
   if (is_named(effect, "bristle_friction")) return {{120.0, 20.0}, {2000.0, 20.0}};

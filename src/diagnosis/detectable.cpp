@@ -24,19 +24,9 @@ double standard_error(const Hypothesis& fit, std::size_t effect) {
   return 0.0;
 }
 
-/// The size that an effect has on such a rig: of friction in the pivot a share of gravity's torque.
+/// The size that an effect has on such a rig.
 double usual_size(std::size_t effect, const Search& search) {
-  const double usual = free_parameters(effect, search.range(), search.policy().prior).front().scale;
-  const Plant& plant = search.given();
-  if (effect_registry()[effect].enters != Enters::pendulum || !plant.pendulum) return usual;
-  const Pendulum& pendulum = *plant.pendulum;
-  const double gravity_nm = pendulum.mass_kg * plant.gravity_mps2 * pendulum.length_to_com_m;
-  const double torque_nm = search.policy().power.share_of_gravity_torque * gravity_nm;
-  const std::string_view unit = effect_registry()[effect].parameters[0].unit;
-  if (unit == "N m") return std::max(usual, torque_nm);
-  if (unit == "N m s/rad")
-    return std::max(usual, torque_nm / std::sqrt(gravity_nm / pendulum.inertia_about_pivot_kgm2()));
-  return usual;
+  return free_parameters(effect, search.range(), search.policy().prior).front().scale;
 }
 
 }  // namespace

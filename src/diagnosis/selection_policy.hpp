@@ -142,9 +142,6 @@ struct PowerPolicy {
   /// [standard errors] An effect of the size that is stated would be accepted with a probability of 95 %: so
   /// far above the least accepted size.
   double power_z = 1.645;
-  /// [1] The usual friction of a pivot, as a share of gravity's largest torque (at the natural rate, of what
-  /// grows with the rate). Chosen.
-  double share_of_gravity_torque = 0.01;
   /// [noise floors] A larger gap is clearly above the floor: "no discrepancy" would be wrong, and what was
   /// found explains the data only if it closes most of the excess. An effect stays, even if a force of the
   /// place accounts for it, if the held-out error is so many times larger without it and with a constant
@@ -277,6 +274,9 @@ struct PriorPolicy {
   double min_share_of_typical = 0.2;
   /// [1] The typical size of forces in a run, as a share of the motor's largest force. Chosen.
   double share_of_motor_force = 0.03;
+  /// [1] The typical friction of a pivot, as a share of gravity's largest torque (at the natural rate, of
+  /// what grows with the rate). Chosen.
+  double share_of_gravity_torque = 0.01;
   /// [1] The most dry friction, as a multiple of the motor's largest force, since the motor must be able to
   /// overcome it. Without this limit a fit with 1430 N took minutes.
   double max_share_of_motor_force = 2.0;
