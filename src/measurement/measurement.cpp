@@ -329,6 +329,10 @@ double find_resolution(const std::vector<double>& values) {
   // Values printed in decimals differ in their last digit; steps below a millionth of the range are that.
   const auto real = std::lower_bound(steps.begin(), steps.end(), 1e-7 * range);
   if (real == steps.end()) return 0.0;
+  // Steps of nothing, and of a few quanta, show that a signal is quantised. One step that is small by chance
+  // does not: two of five others are multiples of it, as closely as below.
+  constexpr std::ptrdiff_t min_shown = 8;
+  const auto repeated = static_cast<std::ptrdiff_t>(values.size() - 1 - steps.size());
   double quantum = *real;
   for (int pass = 0; pass < 3; ++pass) {
     double sum = 0.0, count = 0.0, off = 0.0;
@@ -339,8 +343,8 @@ double find_resolution(const std::vector<double>& values) {
       count += multiple * multiple;
       if (std::abs(*at / quantum - multiple) > 0.2) off += 1.0;
     }
-    const auto examined = static_cast<double>(std::upper_bound(real, steps.end(), largest) - real);
-    if (off > 0.05 * examined) return 0.0;
+    const std::ptrdiff_t examined = std::upper_bound(real, steps.end(), largest) - real;
+    if (examined + repeated < min_shown || off > 0.05 * static_cast<double>(examined)) return 0.0;
     quantum = sum / count;
   }
   return quantum;

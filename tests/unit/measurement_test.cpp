@@ -135,5 +135,23 @@ TEST(Resolution, IsFoundWhereThereAreStepsAndNowhereElse) {
   EXPECT_NEAR(find_noise(smooth), 1e-4, 1e-5);
 }
 
+TEST(Resolution, IsNoStepThatIsSmallByChance) {
+  std::mt19937_64 random(2);
+  std::normal_distribution<double> noise(0.0, 1.0);
+  int found = 0;
+  for (int draw = 0; draw < 1000; ++draw) {
+    std::vector<double> values;
+    for (int k = 0; k < 500; ++k) values.push_back(0.1 * std::sin(0.01 * k) + 1e-4 * noise(random));
+    if (find_resolution(values) > 0.0) ++found;
+  }
+  EXPECT_LE(found, 5) << "of 1000 signals that are not quantised";
+}
+
+TEST(Resolution, IsThatOfFewStepsOfARestingCart) {
+  std::vector<double> values(400, 0.0);
+  for (std::size_t k = 100; k < values.size(); ++k) values[k] = (k < 200 ? 1.0 : 2.0) * 2.3e-5;
+  EXPECT_NEAR(find_resolution(values), 2.3e-5, 1e-12);
+}
+
 }  // namespace
 }  // namespace upright
