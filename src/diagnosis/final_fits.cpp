@@ -88,6 +88,7 @@ void FinalFits::fit_all_samples() {
   options_.report_progress(0.94, "fitting all samples");
   const FitData data = search_.data_of(known_.train.point);
   reported_ = all_samples_ == nullptr ? known_ : fitted_to_all_samples(known_, data, *all_samples_);
+  reported_.train.covariance += search_.covariance_from_held_numbers(data, known_);
 }
 
 std::optional<std::size_t> FinalFits::uncertain_effect() const {

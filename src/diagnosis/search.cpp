@@ -498,6 +498,25 @@ Hypothesis Search::fitted_to_all_runs(const Hypothesis& h) const {
   return result;
 }
 
+Eigen::MatrixXd Search::covariance_from_held_numbers(const FitData& data, const Hypothesis& fitted) const {
+  const auto n = static_cast<Eigen::Index>(fitted.free.size());
+  if (held_numbers_.empty()) return Eigen::MatrixXd::Zero(n, n);
+  std::vector<FreeParameter> free = fitted.free;
+  for (const std::size_t number : held_numbers_)
+    for (const FreeParameter& p : correction_parameters(given_, number, range_, policy_.prior))
+      free.push_back(p);
+  FitOptions linearise_only;
+  linearise_only.max_iterations = 0;
+  linearise_only.noise_rounds = 0;
+  const FitResult beside = fit(data, fitted.train.point, free, linearise_only);
+  if (!std::isfinite(beside.objective)) return Eigen::MatrixXd::Zero(n, n);
+  const Eigen::Index held = beside.information.rows() - n;
+  // How the free ones move with the held ones: a block of the inverse of the information.
+  const Eigen::MatrixXd moved =
+      solve_symmetric(beside.information.topLeftCorner(n, n), beside.information.topRightCorner(n, held));
+  return moved * beside.covariance.bottomRightCorner(held, held) * moved.transpose();
+}
+
 Hypothesis Search::with_effect_free(const Hypothesis& h, std::size_t effect, double share_of_typical) const {
   Hypothesis result;
   result.added = h.added;
