@@ -61,17 +61,18 @@ std::optional<std::size_t> raising(const std::vector<std::size_t>& suspects,
   return raises;
 }
 
+bool is_in(const std::vector<std::size_t>& effects, std::size_t effect) {
+  return std::find(effects.begin(), effects.end(), effect) != effects.end();
+}
+
 /// The numbers of the plant file that moved by more than a standard deviation of what is believed of them.
 /// One that moved less stands for nothing else.
 std::vector<std::size_t> moved_far(const Search& search, const Hypothesis& judged, const ListedModel& model) {
   std::vector<std::size_t> numbers;
   for (const FreeParameter& p : judged.free) {
-    const auto listed = [&](const std::vector<std::size_t>& in) {
-      return std::find(in.begin(), in.end(), p.effect) != in.end();
-    };
-    if (!search.can_hold(p.effect) || listed(numbers)) continue;
-    const bool corrected = listed(model.corrections);
-    if (listed(model.effects) && !corrected) continue;
+    if (!search.can_hold(p.effect) || is_in(numbers, p.effect)) continue;
+    const bool corrected = is_in(model.corrections, p.effect);
+    if (is_in(model.effects, p.effect) && !corrected) continue;
     // Of a correction, the fit believed less.
     const double believed = p.prior_sigma / (corrected ? search.policy().correction.prior_widening : 1.0);
     const double moved = judged.train.point.plant.find(p.effect)->values[p.index] - p.prior_mean;
@@ -93,13 +94,17 @@ Listing list_effects(Search& search, const Hypothesis& judged, const ListedModel
   Listing listing;
   listing.before = given.gap;
   if (model.effects.empty()) listing.numbers_moved = simulation.settled({}).gap;
+  const std::vector<std::size_t> far = moved_far(search, judged, model);
+  const auto is_as_believed = [&](std::size_t effect) {
+    return is_in(model.corrections, effect) && search.can_hold(effect) && !is_in(far, effect);
+  };
   std::vector<std::size_t> added, raised;
   double lowest = given.gap;
   for (const std::size_t effect : model.effects) {
     added.push_back(effect);
     const bool last = added.size() == model.effects.size();
     complete = last ? simulation.settled(added) : simulation.as_given(added);
-    if (complete.gap > lowest) raised.push_back(effect);
+    if (complete.gap > lowest && !is_as_believed(effect)) raised.push_back(effect);
     const double before = lowest;
     lowest = std::min(lowest, complete.gap);
     listing.rows.push_back({effect, before, lowest});
@@ -113,9 +118,9 @@ Listing list_effects(Search& search, const Hypothesis& judged, const ListedModel
   }
   if (model.effects.empty()) return listing;
   const double by_chance = search.policy().acceptance.worse_simulation_by_chance;
-  listing.number_raises =
-      raising(moved_far(search, judged, model), complete, by_chance,
-              [&](std::size_t number) { return simulation.settled(without(model.effects, number), number); });
+  listing.number_raises = raising(far, complete, by_chance, [&](std::size_t number) {
+    return simulation.settled(without(model.effects, number), number);
+  });
   if (listing.number_raises || raised.empty()) return listing;
   listing.raises = raising(raised, complete, by_chance, [&](std::size_t effect) {
     return simulation.settled(without(model.effects, effect));

@@ -64,6 +64,10 @@ class Fitted {
   Listing listing() {
     return list_effects(*search_, final_, {.effects = {force}, .corrections = corrections_});
   }
+  /// Of the corrections alone.
+  Listing listing_of_corrections() {
+    return list_effects(*search_, final_, {.effects = corrections_, .corrections = corrections_});
+  }
   double fitted_mass_scale() const { return final_.train.point.plant.find(cart_mass)->values[0]; }
 
  private:
@@ -131,6 +135,14 @@ TEST(Listing, KeepsACorrectionWithinWhatIsBelievedOfTheNumber) {
     EXPECT_NEAR(fitted.fitted_mass_scale(), 1.0 + load_kg / 0.8, 0.005);
     EXPECT_EQ(fitted.listing().number_raises.has_value(), load_kg > 0.1);
   }
+}
+
+/// The cart of the held-out run is lighter than in the file, that of the other run heavier.
+TEST(Listing, BlamesNoCorrectionWithinWhatIsBelievedForARise) {
+  const Listing listing = Fitted({run_with(0.0, 1, 2.0, 0.035), run_with(0.0, 2, 2.0, -0.035)}, {cart_mass})
+                              .listing_of_corrections();
+  EXPECT_FALSE(listing.raises);
+  EXPECT_FALSE(listing.number_raises);
 }
 
 TEST(Halves, TakeEverySecondSegmentOfOneRun) {
