@@ -112,8 +112,8 @@ class Search {
   /// angle cannot: it is known to a count only, whatever else is.
   bool can_hold(std::size_t effect) const;
   const std::set<std::size_t>& held_numbers() const { return held_numbers_; }
-  /// What these add to the covariance of a fit to the data, in the order of its free parameters. A number that
-  /// is held is not certain: it is as uncertain as it was believed to be.
+  /// What these add to the covariance of a fit to the data, in the order of its free parameters. A number
+  /// that is held is not certain: it is as uncertain as it was believed to be.
   Eigen::MatrixXd covariance_from_held_numbers(const FitData& data, const Hypothesis& fitted) const;
   /// The same hypothesis with held numbers as in the plant file.
   Hypothesis with_held_numbers(const Hypothesis& base);
