@@ -240,8 +240,8 @@ class Diagnostician {
   }
 
   /// The noise of the search is white. A disturbance that lasts looks like something missing beside it, and
-  /// moves a simulation further than such noise does: the last word has noise with a coloured part, where that
-  /// accounts for the residual better. What passes the tests beside white noise has passed them.
+  /// moves a simulation further than such noise does: the last word has noise with a coloured part, where
+  /// that accounts for the residual better. What passes the tests beside white noise has passed them.
   ResidualTests beside_coloured_noise(const ResidualTests& left) {
     noise_ = fits_.known().train.point.noise;
     options_.report_progress(0.945, "estimating a coloured disturbance");

@@ -329,8 +329,8 @@ double find_resolution(const std::vector<double>& values) {
   // Values printed in decimals differ in their last digit; steps below a millionth of the range are that.
   const auto real = std::lower_bound(steps.begin(), steps.end(), 1e-7 * range);
   if (real == steps.end()) return 0.0;
-  // Steps of nothing, and of a few quanta, show that a signal is quantised. One step that is small by chance
-  // does not: two of five others are multiples of it, as closely as below.
+  // Repeated values, and steps of a few quanta, show that a signal is quantised. One step that is small by
+  // chance does not. Two of five other steps are as close to a multiple of it as is allowed below.
   constexpr std::ptrdiff_t min_shown = 8;
   const auto repeated = static_cast<std::ptrdiff_t>(values.size() - 1 - steps.size());
   double quantum = *real;
