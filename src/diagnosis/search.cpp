@@ -42,6 +42,14 @@ double log_determinant(const Eigen::MatrixXd& information) {
   return symmetric_pivots(information).array().abs().max(1e-300).log().sum();
 }
 
+/// Of a fit that stays where it is: how its data depend on the parameters.
+FitOptions linearisation() {
+  FitOptions options;
+  options.max_iterations = 0;
+  options.noise_rounds = 0;
+  return options;
+}
+
 }  // namespace
 
 std::vector<ParameterEstimate> estimates_of(std::size_t effect, const Hypothesis& h) {
@@ -305,9 +313,7 @@ std::vector<FitPoint> Search::points_with(const FitPoint& from, std::size_t effe
 
 std::vector<double> Search::predicted_gains(const Hypothesis& base,
                                             const std::vector<std::size_t>& effects) const {
-  FitOptions linearise_only;
-  linearise_only.max_iterations = 0;
-  linearise_only.noise_rounds = 0;
+  const FitOptions linearise_only = linearisation();
   const auto predicted_objective = [&](const FitPoint& point, const std::vector<FreeParameter>& free) {
     const FitResult seen = fit(screening_subset_, point, free, linearise_only);
     return seen.predicted_reduction ? seen.objective - *seen.predicted_reduction : -infinity;
@@ -505,9 +511,7 @@ Eigen::MatrixXd Search::covariance_from_held_numbers(const FitData& data, const 
   for (const std::size_t number : held_numbers_)
     for (const FreeParameter& p : correction_parameters(given_, number, range_, policy_.prior))
       free.push_back(p);
-  FitOptions linearise_only;
-  linearise_only.max_iterations = 0;
-  linearise_only.noise_rounds = 0;
+  const FitOptions linearise_only = linearisation();
   const FitResult beside = fit(data, fitted.train.point, free, linearise_only);
   if (!std::isfinite(beside.objective)) return Eigen::MatrixXd::Zero(n, n);
   const Eigen::Index held = beside.information.rows() - n;
@@ -547,9 +551,7 @@ Hypothesis Search::with_effect_free(const Hypothesis& h, std::size_t effect, dou
       result.free.push_back(p);
     }
   }
-  FitOptions linearise_only;
-  linearise_only.max_iterations = 0;
-  linearise_only.noise_rounds = 0;
+  const FitOptions linearise_only = linearisation();
   result.train = fit(train_, point, result.free, linearise_only);
   result.valid = std::isfinite(result.train.objective);
   return result;

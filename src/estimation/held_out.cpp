@@ -32,9 +32,10 @@ std::vector<std::size_t> choose_held_out(const std::vector<double>& excitation, 
   std::stable_sort(order.begin(), order.end(),
                    [&](std::size_t a, std::size_t b) { return excitation[a] < excitation[b]; });
   const std::size_t count = order.size(), place = which == HeldOut::other ? 0 : 1;
+  if (count < 2) return {};
   if (count == 2) return {order[1 - place]};
   std::vector<std::size_t> held;
-  for (std::size_t first = 0; first + place < count && count > 2; first += 3)
+  for (std::size_t first = 0; first + place < count; first += 3)
     held.push_back(order[first + 3 > count ? first + place - 1 : first + place]);
   std::sort(held.begin(), held.end());
   return held;
