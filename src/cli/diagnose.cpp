@@ -363,8 +363,7 @@ void write_results(const Diagnosis& d, const Plant& given, const std::vector<Mea
   const fs::path folder = flags.out;
   write_result(folder / "residuals.csv", [&](std::ostream& out) { write_residuals(d, out); });
   write_result(folder / "traces.csv", [&](std::ostream& out) { write_traces(d, given, runs, out); });
-  write_result(folder / "diagnosis.json",
-               [&](std::ostream& out) { out << diagnosis_json(d).dump(2) << "\n"; });
+  write_result(folder / "diagnosis.json", [&](std::ostream& out) { out << diagnosis_json(d) << "\n"; });
 }
 
 /// Runs that are simulated only. They are read as strictly as the others.
@@ -402,7 +401,7 @@ ExitCode run_diagnose(const DiagnoseFlags& flags) {
   if (!flags.out.empty()) write_results(diagnosis, plant, runs, flags);
   progress.end();
   if (flags.as_json) {
-    std::cout << diagnosis_json(diagnosis).dump(2) << "\n";
+    std::cout << diagnosis_json(diagnosis) << "\n";
   } else {
     if (flags.trials) print_trials(diagnosis);
     print(diagnosis, flags.out);

@@ -1,6 +1,7 @@
 #include "diagnosis_json.hpp"
 
 #include <cmath>
+#include <nlohmann/json.hpp>
 
 #include "described_curve.hpp"
 
@@ -195,7 +196,7 @@ json effect_json(const Diagnosis& diagnosis, const FoundEffect& effect) {
 
 }  // namespace
 
-json diagnosis_json(const Diagnosis& diagnosis) {
+std::string diagnosis_json(const Diagnosis& diagnosis) {
   json effects = json::array();
   for (const FoundEffect& effect : diagnosis.effects) effects.push_back(effect_json(diagnosis, effect));
   json candidates = json::array();
@@ -241,7 +242,7 @@ json diagnosis_json(const Diagnosis& diagnosis) {
     document["quick"] = true;
     document["not_examined"] = diagnosis.not_examined;
   }
-  return document;
+  return document.dump(2);
 }
 
 }  // namespace upright

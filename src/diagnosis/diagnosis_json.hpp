@@ -1,12 +1,12 @@
-// A diagnosis as the JSON document diagnosis.json.
+// A diagnosis as the text of diagnosis.json.
 #pragma once
 
-#include <nlohmann/json.hpp>
+#include <string>
 
 #include "upright/diagnosis/diagnosis.hpp"
 
 namespace upright {
 
-nlohmann::json diagnosis_json(const Diagnosis& diagnosis);
+std::string diagnosis_json(const Diagnosis& diagnosis);
 
 }  // namespace upright

@@ -8,7 +8,7 @@
 #include <chrono>
 #include <cmath>
 #include <map>
-#include <regex>
+#include <string_view>
 
 #include "measurement/dataset_file.hpp"
 
@@ -130,6 +130,18 @@ std::optional<double> chance_of_groups(const std::vector<std::string>& texts, co
   return cdf(complement(boost::math::fisher_f(between_freedom, within_freedom), std::max(f, 0.0)));
 }
 
+/// Whether `text` is a date, or a date and a time with or without seconds, as in "2026-03-07 10:30:00".
+bool is_date_or_time(std::string_view text) {
+  constexpr std::string_view form = "0000-00-00 00:00:00";
+  constexpr std::array<std::size_t, 3> lengths = {10, 16, 19};
+  const auto fits = [](char letter, char wanted) {
+    if (wanted == '0') return letter >= '0' && letter <= '9';
+    return letter == wanted || (wanted == ' ' && letter == 'T');
+  };
+  return std::ranges::count(lengths, text.size()) == 1 &&
+         std::equal(text.begin(), text.end(), form.begin(), fits);
+}
+
 }  // namespace
 
 std::vector<RunDependence> dependences_of(const Eigen::VectorXd& sizes,
@@ -153,21 +165,23 @@ std::vector<RunDependence> dependences_of(const Eigen::VectorXd& sizes,
   return found;
 }
 
-std::optional<double> label_number(const std::string& text) {
+std::optional<double> label_number(std::string_view text) {
   double number = 0.0;
   const char* end = text.data() + text.size();
   if (const auto read = std::from_chars(text.data(), end, number); read.ec == std::errc{} && read.ptr == end)
     return std::isfinite(number) ? std::optional(number) : std::nullopt;
-  static const std::regex date_and_time(
-      "(\\d{4})-(\\d\\d)-(\\d\\d)(?:[ T](\\d\\d):(\\d\\d)(?::(\\d\\d))?)?Z?");
-  std::smatch fields;
-  if (!std::regex_match(text, fields, date_and_time)) return std::nullopt;
-  const auto field = [&fields](std::size_t at) { return fields[at].matched ? std::stoi(fields[at]) : 0; };
-  const std::chrono::year_month_day date =
-      std::chrono::year(field(1)) / static_cast<unsigned>(field(2)) / static_cast<unsigned>(field(3));
-  if (!date.ok() || field(4) > 23 || field(5) > 59 || field(6) > 60) return std::nullopt;
+  const std::string_view time = text.ends_with('Z') ? text.substr(0, text.size() - 1) : text;
+  if (!is_date_or_time(time)) return std::nullopt;
+  const auto field = [&time](std::size_t at, std::size_t digits) {
+    int value = 0;
+    if (at < time.size()) std::from_chars(&time[at], &time[at] + digits, value);
+    return value;
+  };
+  const int hour = field(11, 2), minute = field(14, 2), second = field(17, 2);
+  const std::chrono::year_month_day date = std::chrono::year(field(0, 4)) / field(5, 2) / field(8, 2);
+  if (!date.ok() || hour > 23 || minute > 59 || second > 60) return std::nullopt;
   const double days = std::chrono::sys_days(date).time_since_epoch().count();
-  return 24.0 * days + field(4) + field(5) / 60.0 + field(6) / 3600.0;
+  return 24.0 * days + hour + minute / 60.0 + second / 3600.0;
 }
 
 }  // namespace upright

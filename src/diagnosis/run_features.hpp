@@ -5,6 +5,7 @@
 #include <Eigen/Core>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "upright/measurement/measurement.hpp"
@@ -27,6 +28,6 @@ std::vector<RunDependence> dependences_of(const Eigen::VectorXd& sizes,
 
 /// A number, or the hours since 1970 of a date: "2019-03-04", "2019-03-04 10:30", "2019-03-04T10:30:05Z".
 /// Empty for anything else.
-std::optional<double> label_number(const std::string& text);
+std::optional<double> label_number(std::string_view text);
 
 }  // namespace upright

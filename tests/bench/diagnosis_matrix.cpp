@@ -164,7 +164,7 @@ json values_json(std::size_t effect, const std::vector<double>& values) {
 /// From the document that the program writes, so that it counts what a user reads: an effect that is listed
 /// as helping at some places only is not named.
 void describe_diagnosis(const Diagnosis& d, json& record) {
-  const json document = diagnosis_json(d);
+  const json document = json::parse(diagnosis_json(d));
   record["verdict"] = document.at("verdict");
   record["gap_before"] = document.at("gap").at("before");
   record["gap_after"] = document.at("gap").at("after");
