@@ -132,10 +132,6 @@ std::vector<FreeParameter> free_parameters(std::size_t effect, const DataRange& 
     } else if (name == "center_m") {
       p.prior_mean = range.cart_mean_m;
       p.prior_sigma = prior.spring_center_m;
-    } else if (name == "stiffness_n_per_m" && is_named(effect, "cable_spring")) {
-      // From a stiffer spring the motor could not take the cart along the track.
-      const double stiffest = prior.max_share_of_motor_force * range.largest_force_n / prior.spring_center_m;
-      if (stiffest > 0.0) p.high = std::min(p.high, stiffest);
     } else if (name == "stiffness_n_per_m" && is_named(effect, "bristle_friction")) {
       p.low = prior.min_bristle_stiffness_n_per_m;
       p.high = prior.max_bristle_stiffness_n_per_m;

@@ -277,9 +277,8 @@ struct PriorPolicy {
   /// [1] The typical friction of a pivot, as a share of gravity's largest torque (at the natural rate, of
   /// what grows with the rate). Chosen.
   double share_of_gravity_torque = 0.01;
-  /// [1] The most dry friction, and the most force of a spring half a track away from its centre, as a
-  /// multiple of the motor's largest force, since the motor must be able to overcome them. Without this limit
-  /// a fit with 1430 N of friction took minutes, and strokes of 30 mm showed springs of 98 and 247 N/m.
+  /// [1] The most dry friction, as a multiple of the motor's largest force, since the motor must be able to
+  /// overcome it. Without this limit a fit with 1430 N took minutes.
   double max_share_of_motor_force = 2.0;
 
   /// [1] The mean of the exponent of a Stribeck curve: 2 is a Gaussian, 1 an exponential. Chosen.
@@ -303,8 +302,8 @@ struct PriorPolicy {
   double crests_of_pitch = 3.0;
   /// [m] Pitches up to this are always searched. Chosen.
   double min_longest_pitch_m = 0.002;
-  /// [m] Half the track: the standard deviation of the centre of a spring about the mean position of the
-  /// cart. For the track of a small cart, a metre, and scaled to other plants. Chosen.
+  /// [m] The standard deviation of the centre of a spring about the mean position of the cart. For the track
+  /// of a small cart, a metre, and scaled to other plants. Chosen.
   double spring_center_m = 0.5;
   /// [N/m] The softest bristles. Softer ones act as a spring. For a small cart, and scaled to other plants.
   /// Chosen.
