@@ -51,7 +51,7 @@ Decision decide_shown(const Evidence& e, const Improvement& improvement, const A
   if (is_borne_out(saving, improvement, p) && t > p.min_t) return accepted(Rule::borne_out);
   if (saving < p.min_evidence) return rejected(Rule::too_little_evidence);
   // Held-out data that do not excite the effect say nothing.
-  if (!(improvement.held > -p.held_out_indifference)) return rejected(Rule::held_out_against);
+  if (!(improvement.held > -p.equally_good_evidence)) return rejected(Rule::held_out_against);
   if (t > p.min_t) return accepted(Rule::shown_throughout);
   if (saving > p.overwhelming_evidence) return accepted(Rule::overwhelming);
   // Numbers of the plant that need not be so far off are no matter of noise.

@@ -82,7 +82,7 @@ class Diagnostician {
     if (!beyond_sensors_) return;
     options_.report_progress(0.98, "describing what is left");
     try {
-      const auto force = describe_force(search_, fits_.judged(), fits_.known());
+      const auto force = describe_force(search_, fits_.judged(), fits_.known(), without_trend_);
       const double named = std::min(listing_.numbers_moved.value_or(listing_.after), listing_.after);
       const double lower = force ? named / force->held_out_error : 1.0;
       if (lower > policy_.power.clear_gap) {
@@ -269,6 +269,20 @@ class Diagnostician {
   bool withdraw_next() {
     options_.report_progress(0.93, "comparing parts of the data");
     reproductions_ = reproduce(search_, fits_.known(), fits_.effects());
+    if (without_trend_)
+      list();
+    else if (withdraw_unsupported())
+      return true;
+    return withdraw_uncertain();
+  }
+
+  void list() {
+    options_.report_progress(0.94, "measuring the gap");
+    listing_ = list_effects(search_, fits_.judged(), {fits_.effects(), fits_.corrections()});
+  }
+
+  /// One of those that other data, or a disturbance, speak against.
+  bool withdraw_unsupported() {
     if (options_.quick && withdraw_doubtful()) return true;
     const Reproduction* worst = nullptr;
     for (const Reproduction& r : reproductions_)
@@ -291,8 +305,7 @@ class Diagnostician {
         selection_.find_again();
       return true;
     }
-    options_.report_progress(0.94, "measuring the gap");
-    listing_ = list_effects(search_, fits_.judged(), {fits_.effects(), fits_.corrections()});
+    list();
     if (listing_.number_raises) {
       put_back(*listing_.number_raises);
       return true;
@@ -302,19 +315,20 @@ class Diagnostician {
                "it helps the runs that were fitted, but held-out data are simulated better without it");
       return true;
     }
+    return false;
+  }
+
+  /// One of those whose values are too uncertain. A trend of the place goes last, because the others are
+  /// judged beside it: without it, each would have to supply the average force.
+  bool withdraw_uncertain() {
     fits_.fit_all_samples();
     if (const auto uncertain = fits_.uncertain_effect()) {
-      withdraw(*uncertain, "its size is not certain once all samples are fitted");
+      withdraw(uncertain->effect, uncertain->where);
       return true;
     }
-    if (const auto open = fits_.effect_with_open_phase()) {
-      withdraw(*open,
-               "its phase at the zero of the cart is open, so its force is known only where it was measured");
-      return true;
-    }
-    if (const auto open = fits_.effect_with_open_pitch()) {
-      withdraw(*open,
-               "its pitch may be as long as a third of the travel, so the data do not show that it repeats");
+    if (const auto trend = trend_of_place(search_, fits_.known())) {
+      withdraw(trend->effect, trend->where);
+      without_trend_ = true;
       return true;
     }
     return false;
@@ -515,6 +529,7 @@ class Diagnostician {
   FinalFits fits_;
   Noise noise_;                      ///< of all runs beside the model of `fits_`
   std::set<std::size_t> withdrawn_;  ///< found, and not named
+  bool without_trend_ = false;       ///< the last of these was a trend of the place
   std::vector<Reproduction> reproductions_;
   std::vector<RunDifference> differences_;
   Listing listing_;

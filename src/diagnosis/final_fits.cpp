@@ -91,7 +91,19 @@ void FinalFits::fit_all_samples() {
   reported_.train.covariance += search_.covariance_from_held_numbers(data, known_);
 }
 
-std::optional<std::size_t> FinalFits::uncertain_effect() const {
+std::optional<UncertainEffect> FinalFits::uncertain_effect() const {
+  if (const auto open = effect_with_open_size())
+    return UncertainEffect{*open, "its size is not certain once all samples are fitted"};
+  if (const auto open = effect_with_open_phase())
+    return UncertainEffect{
+        *open, "its phase at the zero of the cart is open, so its force is known only where it was measured"};
+  if (const auto open = effect_with_open_pitch())
+    return UncertainEffect{
+        *open, "its pitch may be as long as a third of the travel, so the data do not show that it repeats"};
+  return std::nullopt;
+}
+
+std::optional<std::size_t> FinalFits::effect_with_open_size() const {
   const auto certainty_of = [&](std::size_t effect) {
     const bool is_new = search_.given().find(effect) == nullptr;
     return is_new && !search_.is_plausible(reported_, effect) ? 0.0 : search_.certainty(reported_, effect);

@@ -4,12 +4,19 @@
 
 #include <optional>
 #include <set>
+#include <string>
 #include <vector>
 
 #include "search.hpp"
 #include "stepwise_selection.hpp"
 
 namespace upright {
+
+/// An effect whose values are too uncertain.
+struct UncertainEffect {
+  std::size_t effect = 0;  ///< number in the registry
+  std::string where;       ///< a sentence for the listing of effects that help here only
+};
 
 class FinalFits {
  public:
@@ -22,13 +29,8 @@ class FinalFits {
   void settle(const std::set<std::size_t>& withdrawn);
   /// Fits `known()` to all samples.
   void fit_all_samples();
-  /// Of the effects that do nothing in that fit, or whose 95 % interval includes nothing, the least certain
-  /// one.
-  std::optional<std::size_t> uncertain_effect() const;
-  /// An effect whose phase that fit leaves open.
-  std::optional<std::size_t> effect_with_open_phase() const;
-  /// Not of the plant file.
-  std::optional<std::size_t> effect_with_open_pitch() const;
+  /// An effect that this fit leaves too uncertain: its size, its phase or its pitch.
+  std::optional<UncertainEffect> uncertain_effect() const;
 
   /// Fitted to the training runs, judged on the others.
   const Hypothesis& judged() const { return judged_; }
@@ -43,6 +45,13 @@ class FinalFits {
  private:
   /// The last fits, of training runs and of all. A correction that these leave uncertain is none: it goes.
   void fit_last(std::vector<std::size_t>& corrections);
+  /// Of the effects that do nothing in that fit, or whose 95 % interval includes nothing, the least certain
+  /// one.
+  std::optional<std::size_t> effect_with_open_size() const;
+  /// An effect whose phase that fit leaves open.
+  std::optional<std::size_t> effect_with_open_phase() const;
+  /// Not of the plant file.
+  std::optional<std::size_t> effect_with_open_pitch() const;
   /// A coefficient of the plant file that moved within what is believed of it.
   bool keeps_prior(const Hypothesis& h, std::size_t j) const;
   /// Corrections in the order of how much each closes: of sensors first, then of the plant's numbers, which

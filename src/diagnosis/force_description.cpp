@@ -58,16 +58,25 @@ CurveNodes nodes_along(const std::vector<CurveArgument>& arguments, std::size_t 
   return {low, (high - low) / static_cast<double>(count - 1), count};
 }
 
+/// Whether a table of this kind ends at zero on both sides. A force of the place is expected to be none where
+/// it was not measured, and a table is constant beyond its ends. Friction is everywhere.
+bool ends_at_zero(Table::Over over) {
+  return over == Table::position;
+}
+
 /// The nodes of a table. A table is constant beyond its ends. A curve over the position would push with the
 /// force of the last place everywhere else, so its table goes on until the curve is forgotten, where it is
-/// near its level. A smooth curve is not forgotten soon; the margin stays a small part of the table.
+/// near its level. A smooth curve is not forgotten soon; the margin stays a small part of the table. An end
+/// that is held is no place of the data.
 CurveNodes table_nodes(const std::vector<CurveArgument>& along, Table::Over over, double length,
                        const CurvePolicy& policy) {
   CurveNodes nodes = nodes_along(along, Table::node_count);
   if (over == Table::velocity || nodes.count == 0) return nodes;
   const auto intervals = static_cast<double>(nodes.count - 1);
   const double travel = nodes.spacing * intervals;
-  const double margin = std::min(policy.forgotten_lengths * length, policy.largest_margin * travel);
+  const double least = ends_at_zero(over) ? travel / (intervals - 2.0) : 0.0;
+  const double margin =
+      std::max(std::min(policy.forgotten_lengths * length, policy.largest_margin * travel), least);
   return {nodes.first - margin, (travel + 2.0 * margin) / intervals, nodes.count};
 }
 
@@ -100,9 +109,13 @@ struct Followed {
   const FitData& data;
   std::vector<ResidualTrace> traces;
   std::vector<std::vector<LinearStep>> steps;
+  bool trend_belongs;  ///< a trend of the place belongs to the curve over the position
 
-  Followed(const FitData& all, const FitPoint& point, const ResidualWalk& walk)
-      : data(all), traces(smooth_residuals(all, point, walk)), steps(linearise(all, point)) {}
+  Followed(const FitData& all, const FitPoint& point, const ResidualWalk& walk, bool with_trend)
+      : data(all),
+        traces(smooth_residuals(all, point, walk)),
+        steps(linearise(all, point)),
+        trend_belongs(with_trend) {}
 
   std::vector<CurveArgument> arguments(Table::Over over) const {
     std::vector<CurveArgument> all;
@@ -116,7 +129,8 @@ struct Followed {
 
   CurveEquations equations(const CurveNodes& nodes, Table::Over over,
                            const std::vector<CurveArgument>& along) const {
-    return beyond_known(curve_equations(steps, nodes, along), nodes, over);
+    const CurveEquations all = curve_equations(steps, nodes, along);
+    return over == Table::position && trend_belongs ? all : beyond_known(all, nodes, over);
   }
 };
 
@@ -130,6 +144,17 @@ struct Curve {
   double deviation = 0.0;             ///< of these forces from their level
   Eigen::VectorXd force_n;            ///< expected at these nodes
 };
+
+/// The prior information of a curve at the nodes of its table. Ends that are held at zero do not depend on
+/// the others.
+Eigen::MatrixXd table_prior(const RandomCurve& curve, const CurveNodes& nodes, Table::Over over) {
+  if (!ends_at_zero(over)) return curve.prior_information(nodes);
+  const CurveNodes inner{nodes.first + nodes.spacing, nodes.spacing, nodes.count - 2};
+  const auto count = static_cast<Eigen::Index>(nodes.count);
+  Eigen::MatrixXd information = Eigen::MatrixXd::Zero(count, count);
+  information.block(1, 1, count - 2, count - 2) = curve.prior_information(inner);
+  return information;
+}
 
 /// Curves over each quantity, the one with the most evidence first.
 std::vector<Curve> curves_of(const Followed& train, const Followed& held, std::size_t many,
@@ -148,7 +173,7 @@ std::vector<Curve> curves_of(const Followed& train, const Followed& held, std::s
     const double held_evidence = 2.0 * force_n.dot(unseen.score) - force_n.dot(unseen.information * force_n);
     const CurveNodes few = table_nodes(along, over, curve.length(), policy);
     curves.push_back(
-        {over, -curve.change(), held_evidence, few, curve.prior_information(few), curve.deviation(), {}});
+        {over, -curve.change(), held_evidence, few, table_prior(curve, few, over), curve.deviation(), {}});
   }
   std::stable_sort(curves.begin(), curves.end(),
                    [](const Curve& a, const Curve& b) { return a.evidence > b.evidence; });
@@ -182,6 +207,14 @@ void free_level(Curve& curve, const std::vector<FreeParameter>& free) {
   const Eigen::VectorXd pull = curve.prior_information.rowwise().sum();
   const double of_level = 1.0 / (curve.deviation * curve.deviation);
   curve.prior_information -= pull * pull.transpose() / (of_level + pull.sum());
+}
+
+/// Holds the ends of a table at zero, as far as its forces are told from zero.
+void hold_ends(Curve& curve) {
+  if (!ends_at_zero(curve.over)) return;
+  const double told_n = 1e-3 * curve.deviation;
+  const Eigen::Index last = curve.prior_information.rows() - 1;
+  curve.prior_information(0, 0) = curve.prior_information(last, last) = 1.0 / (told_n * told_n);
 }
 
 /// The expected values of a curve at the few nodes of its table. Where no data are, they are near the
@@ -306,19 +339,20 @@ FoundEffect ForceDescription::as_effect(double gap_before, double gap_after) con
 }
 
 std::optional<ForceDescription> describe_force(const Search& search, const Hypothesis& judged,
-                                               const Hypothesis& known) {
+                                               const Hypothesis& known, bool with_trend) {
   const FitData& train = search.train_data();
   const FitData& held = search.held_data();
   if (!search.range().cart_moves || held.segments.empty()) return std::nullopt;
   if (search.given().find(effect_index<Table>()) != nullptr) return std::nullopt;
   if (!search.is_of_all_data(known.train.point)) return std::nullopt;
   const ResidualWalk& walk = search.policy().location.walk;
-  const Followed fitted(train, judged.train.point, walk);
-  std::vector<Curve> curves = curves_of(fitted, Followed(held, judged.held.point, walk),
+  const Followed fitted(train, judged.train.point, walk, with_trend);
+  std::vector<Curve> curves = curves_of(fitted, Followed(held, judged.held.point, walk, with_trend),
                                         search.budget().track_nodes, search.policy().curve);
   if (curves.empty() || !(curves.front().evidence > search.policy().acceptance.min_evidence))
     return std::nullopt;
   free_level(curves.front(), known.free);
+  hold_ends(curves.front());
   draw_table(fitted, curves.front());
   const Curve& curve = curves.front();
   ForceDescription force{

@@ -31,9 +31,10 @@ struct ForceDescription {
 
 /// Empty if the cart does not move, if no data are held out, if the plant file has a table already, or if the
 /// training data show no such force beyond what known effects have. `judged`: a fit to the training data,
-/// `known`: to all data. Whether the curve helps on held-out data is for the caller to judge. Throws
+/// `known`: to all data. `with_trend`: a curve over the position may have a trend, because the search gave a
+/// force of this kind up. Whether the curve helps on held-out data is for the caller to judge. Throws
 /// Interrupted and BoundReached.
 std::optional<ForceDescription> describe_force(const Search& search, const Hypothesis& judged,
-                                               const Hypothesis& known);
+                                               const Hypothesis& known, bool with_trend);
 
 }  // namespace upright

@@ -5,6 +5,7 @@
 #include <limits>
 #include <sstream>
 
+#include "candidates.hpp"
 #include "estimation/random_curve.hpp"
 #include "listing.hpp"
 #include "upright/model/effects/all.hpp"
@@ -51,12 +52,32 @@ std::optional<Eigen::VectorXd> force_of_place(const PlantEffect& effect, const C
   return force_n;
 }
 
-/// Whether the force grows in proportion to the place, or not at all.
-bool is_trend(const Eigen::VectorXd& force_n) {
-  const Eigen::Index inner = force_n.size() - 2;
-  const Eigen::VectorXd bend = force_n.head(inner) - 2.0 * force_n.segment(1, inner) + force_n.tail(inner);
+/// The effects that are a constant force while the cart moves.
+bool is_constant_force(std::size_t effect) {
+  const std::size_t constant = effect_number("constant_force");
+  const std::vector<std::size_t> same = same_force_as(constant);
+  return effect == constant || std::find(same.begin(), same.end(), effect) != same.end();
+}
+
+/// What the force of an effect is along the track. A curve bends.
+enum class Shape { not_of_place, curve, slope, steep_slope, constant };
+
+/// A slope is steep if the motor could not overcome its force half a track further. So it is no spring that
+/// the cart takes along, but what the place has.
+Shape shape_of(const PlantEffect& effect, const Search& search) {
+  if (is_constant_force(effect.number)) return Shape::constant;
+  constexpr CurveNodes anywhere{0.0, 0.1, 4};
+  const auto force_n = force_of_place(effect, anywhere);
+  if (!force_n) return Shape::not_of_place;
+  const Eigen::Index inner = force_n->size() - 2;
+  const Eigen::VectorXd bend = force_n->head(inner) - 2.0 * force_n->segment(1, inner) + force_n->tail(inner);
   constexpr double rounding = 1e-9;
-  return bend.cwiseAbs().maxCoeff() <= rounding * force_n.cwiseAbs().maxCoeff();
+  if (bend.cwiseAbs().maxCoeff() > rounding * force_n->cwiseAbs().maxCoeff()) return Shape::curve;
+  const PriorPolicy& prior = search.policy().prior;
+  const double half_a_track_n =
+      std::abs((*force_n)[1] - (*force_n)[0]) / anywhere.spacing * prior.spring_center_m;
+  const bool steep = half_a_track_n > prior.max_share_of_motor_force * search.range().largest_force_n;
+  return steep ? Shape::steep_slope : Shape::slope;
 }
 
 class PlaceNull {
@@ -75,31 +96,44 @@ class PlaceNull {
   /// Null if there is none.
   const RandomCurve* track_force() const { return track_ && track_->is_there() ? &*track_ : nullptr; }
 
-  /// Of an effect: its force at the nodes, if the place alone determines it.
-  std::optional<Eigen::VectorXd> force_of(std::size_t effect) const {
-    return force_of_place(*known_.train.point.plant.find(effect), nodes_);
-  }
-
   /// What the effect saves beside the force, after the penalty of its parameters.
   double evidence_of(std::size_t effect) const {
     const Plant& plant = known_.train.point.plant;
     if (!is_removable(plant, effect, search_.given())) return std::numeric_limits<double>::infinity();
-    const auto force_n = force_of(effect);
-    return (force_n ? replaced_by_track(*force_n) : fitted_without(effect)) - track_->change() -
-           search_.penalty_of(known_, effect);
+    const auto force_n = force_of_place(*plant.find(effect), nodes_);
+    return (force_n ? replaced(*force_n, shape_of(*plant.find(effect), search_)) : fitted_without(effect)) -
+           track_->change() - search_.penalty_of(known_, effect);
   }
 
  private:
+  /// By how much the objective rises without an effect of this force. The size and the length of the track's
+  /// force are estimated anew then, but not for a trend: a random force as long as the travel would be one
+  /// itself. A constant force may stand in the place of a slope.
+  double replaced(const Eigen::VectorXd& force_n, Shape shape) const {
+    if (shape == Shape::slope) return without_best_constant(force_n);
+    return replaced_by_track(force_n, shape == Shape::constant);
+  }
+
+  /// The rise with the constant force that leaves the least: it is a parabola of this force.
+  double without_best_constant(const Eigen::VectorXd& force_n) const {
+    const double center_n = force_n.mean(), half_n = force_n.cwiseAbs().maxCoeff();
+    const auto rise_at = [&](double constant_n) {
+      return replaced_by_track((force_n.array() - constant_n).matrix(), true);
+    };
+    const double low = rise_at(center_n - half_n), middle = rise_at(center_n),
+                 high = rise_at(center_n + half_n);
+    const double bend = low - 2.0 * middle + high, slope = high - low;
+    return bend > 0.0 ? middle - 0.125 * slope * slope / bend : middle;
+  }
+
   /// By how much the objective rises if the track's force has to supply this one too. The innovations are
-  /// linear in such a force, so nothing is fitted anew. The size and the length of the track's force are
-  /// estimated anew then, but not for a trend: a random force as long as the travel would be one itself.
-  double replaced_by_track(const Eigen::VectorXd& force_n) const {
+  /// linear in such a force, so nothing is fitted anew. `held`: the track's force keeps its size and length.
+  double replaced_by_track(const Eigen::VectorXd& force_n, bool held) const {
     CurveEquations equations = equations_;
     const Eigen::VectorXd shift = equations.information * force_n;
     const double rise = force_n.dot(shift + 2.0 * equations.score);
     equations.score += shift;
-    return rise +
-           (is_trend(force_n) ? track_->change_with(equations) : RandomCurve(equations, nodes_).change());
+    return rise + (held ? track_->change_with(equations) : RandomCurve(equations, nodes_).change());
   }
 
   /// By how much it rises in a fit without the effect, beside a track's force of its own size and length.
@@ -125,6 +159,13 @@ class PlaceNull {
   CurveEquations equations_;  ///< at the fit with all effects
   std::optional<RandomCurve> track_;
 };
+
+/// Whether the other effects are judged beside this one before it may go.
+bool goes_last(Shape shape) {
+  return shape == Shape::constant || shape == Shape::steep_slope;
+}
+
+constexpr const char* as_well = "a random force that belongs to the place accounts for these data as well";
 
 /// What a model would lack without an effect.
 enum class Needed { no, as_average, by_itself };
@@ -159,20 +200,33 @@ std::optional<OutdoneEffect> outdone_by_place(Search& search, const Hypothesis& 
   double least = search.policy().acceptance.min_evidence;
   for (const Reproduction& found : effects) {
     if (search.is_nuisance(found.effect)) continue;
+    const PlantEffect& effect = *known.train.point.plant.find(found.effect);
+    const Shape shape = shape_of(effect, search);
+    if (goes_last(shape)) continue;
     if (!null) null.emplace(search, known);
     if (null->track_force() == nullptr) break;
     const double evidence = null->evidence_of(found.effect);
     if (!(evidence < least)) continue;
-    const auto force_n = null->force_of(found.effect);
-    const bool may_be_average = !force_n || is_trend(*force_n);
+    const bool may_be_average = shape == Shape::slope || shape == Shape::not_of_place;
     const Needed needed = may_be_average ? how_needed(search, judged, effects, found.effect) : Needed::no;
     if (needed == Needed::by_itself) continue;
     least = evidence;
-    worst = OutdoneEffect{found.effect,
-                          "a random force that belongs to the place accounts for these data as well",
-                          needed == Needed::as_average};
+    worst = OutdoneEffect{found.effect, as_well, needed == Needed::as_average};
   }
   return worst;
+}
+
+std::optional<OutdoneEffect> trend_of_place(const Search& search, const Hypothesis& known) {
+  if (!search.is_of_all_data(known.train.point)) return std::nullopt;
+  const double min_t = search.policy().acceptance.min_t;
+  std::optional<PlaceNull> null;
+  for (const PlantEffect& effect : known.train.point.plant.effects) {
+    if (search.is_nuisance(effect.number) || !goes_last(shape_of(effect, search))) continue;
+    if (!null) null.emplace(search, known);
+    if (null->track_force() == nullptr) return std::nullopt;
+    if (null->evidence_of(effect.number) < min_t * min_t) return OutdoneEffect{effect.number, as_well};
+  }
+  return std::nullopt;
 }
 
 std::optional<std::string> place_force_left(const Search& search, const Hypothesis& known) {

@@ -4,8 +4,9 @@
 // The likelihood counts each pass as new evidence, so an effect that resembles the track's force, such as a
 // cogging force of the best pitch, is found with more evidence the longer the record is. So each effect is
 // tested once more beside a random force of the place, whose values are integrated out. Its size and
-// correlation length are estimated with and without the effect. They are not estimated anew for an effect
-// that grows in proportion to the place, because a random force as long as the travel would do the same.
+// correlation length are estimated with and without the effect. They are not estimated anew for a constant
+// force and a spring, because a random force as long as the travel would do the same. A spring that the motor
+// could not overcome half a track from its centre is none, and is treated as any force of the place.
 #pragma once
 
 #include <optional>
@@ -20,10 +21,16 @@ namespace upright {
 /// Of these effects, the one that such a force leaves the least evidence, if that is less than an effect
 /// needs. An effect stays if a simulation of held-out data is far worse without it and with a constant force
 /// in its place, unless its force goes up and down with the place. `known`: a fit to all data, `judged`: to
-/// the training data. Corrections of the plant file's numbers are not tested.
+/// the training data. Corrections of the plant file's numbers are not tested, nor what trend_of_place()
+/// tests.
 std::optional<OutdoneEffect> outdone_by_place(Search& search, const Hypothesis& known,
                                               const Hypothesis& judged,
                                               const std::vector<Reproduction>& effects);
+
+/// A constant force, or a spring too stiff to be one, that such a force leaves too little evidence, whatever
+/// a simulation needs: it may be what the track's force is on average where it was measured. It is not chosen
+/// among many, so the square of the least t value is enough. `known`: a fit to all data.
+std::optional<OutdoneEffect> trend_of_place(const Search& search, const Hypothesis& known);
 
 /// A sentence on the random force of the place that is left, if there is one. `known`: a fit to all data.
 std::optional<std::string> place_force_left(const Search& search, const Hypothesis& known);

@@ -29,7 +29,8 @@ struct AcceptancePolicy {
   /// in a thousand diagnoses. Computed from that number of candidates.
   double min_evidence = 25.0;
   /// [standard errors] The least t value of the saving per quarter of a second. It remains reliable if the
-  /// noise is not white. By chance, three occurs once in 700 times. Chosen.
+  /// noise is not white. By chance, three occurs once in 700 times. The same size of a constant force is
+  /// enough beside a random force of the place. Chosen.
   double min_t = 3.0;
   /// [evidence] Coloured noise cannot produce this much, even if few segments contain it. Chosen.
   double overwhelming_evidence = 1000.0;
@@ -39,13 +40,10 @@ struct AcceptancePolicy {
   /// [evidence] Each parameter beyond the first must save this in addition, so a simpler effect that fits
   /// nearly as well is preferred. Chosen.
   double parameter_penalty = 10.0;
-  /// [evidence] Two effects that differ by less fit equally well; the simpler one is taken. Odds of 7 to 1.
-  /// Chosen.
+  /// [evidence] Two effects that differ by less fit equally well; the simpler one is taken. Held-out runs may
+  /// speak against an effect by this much, since runs that do not excite it carry no information. Odds of 7
+  /// to 1. Chosen.
   double equally_good_evidence = 4.0;
-  /// [evidence] Held-out runs that do not excite the effect carry no information, so they may speak against
-  /// it by this much: odds of 2 to 1. Without it, an effect with an evidence of 448 was rejected at odds of
-  /// 1.05 to 1.
-  double held_out_indifference = 1.4;
   /// [evidence] If training and held-out runs both support an effect, each needs at least this. Without this
   /// rule, weak effects in one short run were missed (new seeds of the matrix).
   double min_evidence_of_each = 8.0;
@@ -278,7 +276,8 @@ struct PriorPolicy {
   /// what grows with the rate). Chosen.
   double share_of_gravity_torque = 0.01;
   /// [1] The most dry friction, as a multiple of the motor's largest force, since the motor must be able to
-  /// overcome it. Without this limit a fit with 1430 N took minutes.
+  /// overcome it. Without this limit a fit with 1430 N took minutes. A spring whose force half a track from
+  /// its centre is larger may be a slope of the track's force (place_null.hpp).
   double max_share_of_motor_force = 2.0;
 
   /// [1] The mean of the exponent of a Stribeck curve: 2 is a Gaussian, 1 an exponential. Chosen.
@@ -302,8 +301,8 @@ struct PriorPolicy {
   double crests_of_pitch = 3.0;
   /// [m] Pitches up to this are always searched. Chosen.
   double min_longest_pitch_m = 0.002;
-  /// [m] The standard deviation of the centre of a spring about the mean position of the cart. For the track
-  /// of a small cart, a metre, and scaled to other plants. Chosen.
+  /// [m] Half a track: the standard deviation of the centre of a spring about the mean position of the cart.
+  /// For the track of a small cart, and scaled to other plants. Chosen.
   double spring_center_m = 0.5;
   /// [N/m] The softest bristles. Softer ones act as a spring. For a small cart, and scaled to other plants.
   /// Chosen.

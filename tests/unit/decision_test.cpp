@@ -72,8 +72,8 @@ TEST(Addition, NeedsEvidenceBeyondItsPrice) {
 }
 
 TEST(Addition, IsRefusedWhereHeldOutRunsSpeakAgainstIt) {
-  EXPECT_EQ(rule_of(addition(500.0, -p.held_out_indifference, 5.0)), Rule::held_out_against);
-  EXPECT_EQ(rule_of(addition(500.0, above(-p.held_out_indifference), 5.0)), Rule::shown_throughout);
+  EXPECT_EQ(rule_of(addition(500.0, -p.equally_good_evidence, 5.0)), Rule::held_out_against);
+  EXPECT_EQ(rule_of(addition(500.0, above(-p.equally_good_evidence), 5.0)), Rule::shown_throughout);
 }
 
 TEST(Addition, MustShowAllAlongTheTrainingRuns) {
