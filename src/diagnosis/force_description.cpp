@@ -58,25 +58,19 @@ CurveNodes nodes_along(const std::vector<CurveArgument>& arguments, std::size_t 
   return {low, (high - low) / static_cast<double>(count - 1), count};
 }
 
-/// Whether a table of this kind ends at zero on both sides. A force of the place is expected to be none where
-/// it was not measured, and a table is constant beyond its ends. Friction is everywhere.
-bool ends_at_zero(Table::Over over) {
-  return over == Table::position;
-}
-
 /// The nodes of a table. A table is constant beyond its ends. A curve over the position would push with the
-/// force of the last place everywhere else, so its table goes on until the curve is forgotten, where it is
-/// near its level. A smooth curve is not forgotten soon; the margin stays a small part of the table. An end
-/// that is held is no place of the data.
+/// force of the last place everywhere else, so its table goes on beside the data, by one node or until the
+/// curve is forgotten, and ends at its level. A smooth curve is not forgotten soon; the margin stays a small
+/// part of the table.
 CurveNodes table_nodes(const std::vector<CurveArgument>& along, Table::Over over, double length,
                        const CurvePolicy& policy) {
   CurveNodes nodes = nodes_along(along, Table::node_count);
   if (over == Table::velocity || nodes.count == 0) return nodes;
   const auto intervals = static_cast<double>(nodes.count - 1);
   const double travel = nodes.spacing * intervals;
-  const double least = ends_at_zero(over) ? travel / (intervals - 2.0) : 0.0;
+  const double one_node = travel / (intervals - 2.0);
   const double margin =
-      std::max(std::min(policy.forgotten_lengths * length, policy.largest_margin * travel), least);
+      std::max(std::min(policy.forgotten_lengths * length, policy.largest_margin * travel), one_node);
   return {nodes.first - margin, (travel + 2.0 * margin) / intervals, nodes.count};
 }
 
@@ -145,14 +139,16 @@ struct Curve {
   Eigen::VectorXd force_n;            ///< expected at these nodes
 };
 
-/// The prior information of a curve at the nodes of its table. Ends that are held at zero do not depend on
-/// the others.
+/// The prior information of a curve at the nodes of its table. Over the position, the ends do not deviate
+/// from its level, as far as its forces are told apart.
 Eigen::MatrixXd table_prior(const RandomCurve& curve, const CurveNodes& nodes, Table::Over over) {
-  if (!ends_at_zero(over)) return curve.prior_information(nodes);
+  if (over == Table::velocity) return curve.prior_information(nodes);
   const CurveNodes inner{nodes.first + nodes.spacing, nodes.spacing, nodes.count - 2};
   const auto count = static_cast<Eigen::Index>(nodes.count);
+  const double told_n = 1e-3 * curve.deviation();
   Eigen::MatrixXd information = Eigen::MatrixXd::Zero(count, count);
   information.block(1, 1, count - 2, count - 2) = curve.prior_information(inner);
+  information(0, 0) = information(count - 1, count - 1) = 1.0 / (told_n * told_n);
   return information;
 }
 
@@ -207,14 +203,6 @@ void free_level(Curve& curve, const std::vector<FreeParameter>& free) {
   const Eigen::VectorXd pull = curve.prior_information.rowwise().sum();
   const double of_level = 1.0 / (curve.deviation * curve.deviation);
   curve.prior_information -= pull * pull.transpose() / (of_level + pull.sum());
-}
-
-/// Holds the ends of a table at zero, as far as its forces are told from zero.
-void hold_ends(Curve& curve) {
-  if (!ends_at_zero(curve.over)) return;
-  const double told_n = 1e-3 * curve.deviation;
-  const Eigen::Index last = curve.prior_information.rows() - 1;
-  curve.prior_information(0, 0) = curve.prior_information(last, last) = 1.0 / (told_n * told_n);
 }
 
 /// The expected values of a curve at the few nodes of its table. Where no data are, they are near the
@@ -352,7 +340,6 @@ std::optional<ForceDescription> describe_force(const Search& search, const Hypot
   if (curves.empty() || !(curves.front().evidence > search.policy().acceptance.min_evidence))
     return std::nullopt;
   free_level(curves.front(), known.free);
-  hold_ends(curves.front());
   draw_table(fitted, curves.front());
   const Curve& curve = curves.front();
   ForceDescription force{

@@ -51,8 +51,8 @@ TEST(ForceDescription, DrawsARippleOverTheVelocity) {
   }
 }
 
-/// A random force of the place is expected to be none where it was not measured.
-TEST(ForceDescription, EndsAtZeroBesideTheMeasuredTrack) {
+/// At other places the force of a rough track is not known, and its level is the best guess.
+TEST(ForceDescription, EndsAtItsLevelBesideTheMeasuredTrack) {
   int drawn = 0;
   for (const unsigned seed : {7, 8, 9}) {
     blind::Rig rig{.plant = cart_with_friction(), .unknown = blind::Unknown::rough_track};
@@ -69,8 +69,10 @@ TEST(ForceDescription, EndsAtZeroBesideTheMeasuredTrack) {
       EXPECT_LT(curve->at.front(), *low) << seed;
       EXPECT_GT(curve->at.back(), *high) << seed;
     }
-    EXPECT_NEAR(curve->force_n.front(), 0.0, 1e-3) << seed;
-    EXPECT_NEAR(curve->force_n.back(), 0.0, 1e-3) << seed;
+    const auto [least, greatest] = std::minmax_element(curve->force_n.begin(), curve->force_n.end());
+    EXPECT_NEAR(curve->force_n.front(), curve->force_n.back(), 1e-2 * (*greatest - *least)) << seed;
+    EXPECT_GT(curve->force_n.front(), *least) << seed;
+    EXPECT_LT(curve->force_n.front(), *greatest) << seed;
   }
   EXPECT_GT(drawn, 0);
 }
