@@ -107,8 +107,9 @@ class PlaceNull {
 
  private:
   /// By how much the objective rises without an effect of this force. The size and the length of the track's
-  /// force are estimated anew then, but not for a trend: a random force as long as the travel would be one
-  /// itself. A constant force may stand in the place of a slope.
+  /// force are estimated anew then, but not for a constant force or a slope that may be a spring: a random
+  /// force as long as the travel would be one itself. A constant force may stand in the place of such a
+  /// slope.
   double replaced(const Eigen::VectorXd& force_n, Shape shape) const {
     if (shape == Shape::slope) return without_best_constant(force_n);
     return replaced_by_track(force_n, shape == Shape::constant);
