@@ -169,7 +169,7 @@ void add_local(HtmlPage& page, const json& d) {
   page.section("Effects that help only on a part of the data");
   HtmlTable table{{"effect", "parameter", "value", "unit", "where"},
                   {},
-                  "These effects did not reproduce, so they are not in model.yaml. The values fit all runs."};
+                  "The last column says why these effects are not in model.yaml. The values fit all runs."};
   for (const json& effect : local)
     for (const auto& [name, p] : effect.at("parameters").items())
       table.rows.push_back(
