@@ -91,14 +91,14 @@ void FinalFits::fit_all_samples() {
   reported_.train.covariance += search_.covariance_from_held_numbers(data, known_);
 }
 
-std::optional<UncertainEffect> FinalFits::uncertain_effect() const {
+std::optional<Withdrawal> FinalFits::uncertain_effect() const {
   if (const auto open = effect_with_open_size())
-    return UncertainEffect{*open, "its size is not certain once all samples are fitted"};
+    return Withdrawal{*open, "its size is not certain once all samples are fitted"};
   if (const auto open = effect_with_open_phase())
-    return UncertainEffect{
+    return Withdrawal{
         *open, "its phase at the zero of the cart is open, so its force is known only where it was measured"};
   if (const auto open = effect_with_open_pitch())
-    return UncertainEffect{
+    return Withdrawal{
         *open, "its pitch may be as long as a third of the travel, so the data do not show that it repeats"};
   return std::nullopt;
 }

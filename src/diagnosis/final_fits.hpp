@@ -4,19 +4,13 @@
 
 #include <optional>
 #include <set>
-#include <string>
 #include <vector>
 
 #include "search.hpp"
 #include "stepwise_selection.hpp"
+#include "withdrawal.hpp"
 
 namespace upright {
-
-/// An effect whose values are too uncertain.
-struct UncertainEffect {
-  std::size_t effect = 0;  ///< number in the registry
-  std::string where;       ///< a sentence for the listing of effects that help here only
-};
 
 class FinalFits {
  public:
@@ -30,7 +24,7 @@ class FinalFits {
   /// Fits `known()` to all samples.
   void fit_all_samples();
   /// An effect that this fit leaves too uncertain: its size, its phase or its pitch.
-  std::optional<UncertainEffect> uncertain_effect() const;
+  std::optional<Withdrawal> uncertain_effect() const;
 
   /// Fitted to the training runs, judged on the others.
   const Hypothesis& judged() const { return judged_; }

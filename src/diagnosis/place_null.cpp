@@ -97,12 +97,12 @@ class PlaceNull {
   const RandomCurve* track_force() const { return track_ && track_->is_there() ? &*track_ : nullptr; }
 
   /// What the effect saves beside the force, after the penalty of its parameters.
-  double evidence_of(std::size_t effect) const {
-    const Plant& plant = known_.train.point.plant;
-    if (!is_removable(plant, effect, search_.given())) return std::numeric_limits<double>::infinity();
-    const auto force_n = force_of_place(*plant.find(effect), nodes_);
-    return (force_n ? replaced(*force_n, shape_of(*plant.find(effect), search_)) : fitted_without(effect)) -
-           track_->change() - search_.penalty_of(known_, effect);
+  double evidence_of(const PlantEffect& effect, Shape shape) const {
+    if (!is_removable(known_.train.point.plant, effect.number, search_.given()))
+      return std::numeric_limits<double>::infinity();
+    const auto force_n = force_of_place(effect, nodes_);
+    return (force_n ? replaced(*force_n, shape) : fitted_without(effect.number)) - track_->change() -
+           search_.penalty_of(known_, effect.number);
   }
 
  private:
@@ -192,10 +192,9 @@ Needed how_needed(Search& search, const Hypothesis& judged, const std::vector<Re
 
 }  // namespace
 
-std::optional<OutdoneEffect> outdone_by_place(Search& search, const Hypothesis& known,
-                                              const Hypothesis& judged,
-                                              const std::vector<Reproduction>& effects) {
-  std::optional<OutdoneEffect> worst;
+std::optional<Withdrawal> outdone_by_place(Search& search, const Hypothesis& known, const Hypothesis& judged,
+                                           const std::vector<Reproduction>& effects) {
+  std::optional<Withdrawal> worst;
   if (!search.is_of_all_data(known.train.point)) return worst;
   std::optional<PlaceNull> null;
   double least = search.policy().acceptance.min_evidence;
@@ -206,26 +205,27 @@ std::optional<OutdoneEffect> outdone_by_place(Search& search, const Hypothesis& 
     if (goes_last(shape)) continue;
     if (!null) null.emplace(search, known);
     if (null->track_force() == nullptr) break;
-    const double evidence = null->evidence_of(found.effect);
+    const double evidence = null->evidence_of(effect, shape);
     if (!(evidence < least)) continue;
     const bool may_be_average = shape == Shape::slope || shape == Shape::not_of_place;
     const Needed needed = may_be_average ? how_needed(search, judged, effects, found.effect) : Needed::no;
     if (needed == Needed::by_itself) continue;
     least = evidence;
-    worst = OutdoneEffect{found.effect, as_well, needed == Needed::as_average};
+    worst = Withdrawal{found.effect, as_well, needed == Needed::as_average};
   }
   return worst;
 }
 
-std::optional<OutdoneEffect> trend_of_place(const Search& search, const Hypothesis& known) {
+std::optional<Withdrawal> trend_of_place(const Search& search, const Hypothesis& known) {
   if (!search.is_of_all_data(known.train.point)) return std::nullopt;
   const double min_t = search.policy().acceptance.min_t;
   std::optional<PlaceNull> null;
   for (const PlantEffect& effect : known.train.point.plant.effects) {
-    if (search.is_nuisance(effect.number) || !goes_last(shape_of(effect, search))) continue;
+    const Shape shape = shape_of(effect, search);
+    if (search.is_nuisance(effect.number) || !goes_last(shape)) continue;
     if (!null) null.emplace(search, known);
     if (null->track_force() == nullptr) return std::nullopt;
-    if (null->evidence_of(effect.number) < min_t * min_t) return OutdoneEffect{effect.number, as_well};
+    if (null->evidence_of(effect, shape) < min_t * min_t) return Withdrawal{effect.number, as_well};
   }
   return std::nullopt;
 }

@@ -5,16 +5,17 @@
 // cogging force of the best pitch, is found with more evidence the longer the record is. So each effect is
 // tested once more beside a random force of the place, whose values are integrated out. Its size and
 // correlation length are estimated with and without the effect. They are not estimated anew for a constant
-// force and a spring, because a random force as long as the travel would do the same. A spring that the motor
-// could not overcome half a track from its centre is none, and is treated as any force of the place.
+// force and a spring, because a random force as long as the travel would do the same. Half a
+// track from its centre, a real spring must leave the motor able to move the cart. A stiffer one is treated
+// as any force of the place.
 #pragma once
 
 #include <optional>
 #include <string>
 #include <vector>
 
-#include "outdone_effect.hpp"
 #include "reproducibility.hpp"
+#include "withdrawal.hpp"
 
 namespace upright {
 
@@ -23,14 +24,13 @@ namespace upright {
 /// in its place, unless its force goes up and down with the place. `known`: a fit to all data, `judged`: to
 /// the training data. Corrections of the plant file's numbers are not tested, nor what trend_of_place()
 /// tests.
-std::optional<OutdoneEffect> outdone_by_place(Search& search, const Hypothesis& known,
-                                              const Hypothesis& judged,
-                                              const std::vector<Reproduction>& effects);
+std::optional<Withdrawal> outdone_by_place(Search& search, const Hypothesis& known, const Hypothesis& judged,
+                                           const std::vector<Reproduction>& effects);
 
 /// A constant force, or a spring too stiff to be one, that such a force leaves too little evidence, whatever
 /// a simulation needs: it may be what the track's force is on average where it was measured. It is not chosen
 /// among many, so the square of the least t value is enough. `known`: a fit to all data.
-std::optional<OutdoneEffect> trend_of_place(const Search& search, const Hypothesis& known);
+std::optional<Withdrawal> trend_of_place(const Search& search, const Hypothesis& known);
 
 /// A sentence on the random force of the place that is left, if there is one. `known`: a fit to all data.
 std::optional<std::string> place_force_left(const Search& search, const Hypothesis& known);
