@@ -22,14 +22,14 @@ bool is_table(std::size_t effect) {
 /// Of the forces at work in these runs, whatever the size of the rig: a few percent of the motor's. In the
 /// pivot, a share of gravity's torque.
 double order_of_magnitude(const ParameterInfo& info, const DataRange& range, const PriorPolicy& prior) {
-  const double force = prior.share_of_motor_force * range.largest_force_n;
+  const double force = usual_force_n(range, prior);
   const double speed = range.largest_speed_mps, travel = range.longest_travel_m;
   double order = 0.0;
   if (info.unit == "N") order = force;
   if (info.unit == "N/m" && travel > 0.0) order = force / travel;
   if (info.unit == "N/(m/s)" && speed > 0.0) order = force / speed;
   if (info.unit == "N s^2/m^2" && speed > 0.0) order = force / (speed * speed);
-  const double torque = prior.share_of_gravity_torque * range.gravity_torque_nm;
+  const double torque = usual_torque_nm(range, prior);
   const double rate = range.pendulum_rate_radps;
   if (info.unit == "N m") order = torque;
   if (info.unit == "N m s/rad" && rate > 0.0) order = torque / rate;
@@ -52,6 +52,14 @@ FreeParameter free_parameter(std::size_t effect, std::size_t index, const DataRa
 }
 
 }  // namespace
+
+double usual_force_n(const DataRange& range, const PriorPolicy& prior) {
+  return prior.share_of_motor_force * range.largest_force_n;
+}
+
+double usual_torque_nm(const DataRange& range, const PriorPolicy& prior) {
+  return prior.share_of_gravity_torque * range.gravity_torque_nm;
+}
 
 DataRange range_of(const std::vector<Measurement>& runs, const Plant& plant, const ExcitationPolicy& policy) {
   DataRange range;

@@ -32,6 +32,10 @@ struct DataRange {
 
 DataRange range_of(const std::vector<Measurement>& runs, const Plant& plant, const ExcitationPolicy& policy);
 
+/// The usual size of a force in these runs [N], and of a torque on the pivot [N m]; 0 without a pendulum.
+double usual_force_n(const DataRange& range, const PriorPolicy& prior);
+double usual_torque_nm(const DataRange& range, const PriorPolicy& prior);
+
 /// Whether anything moved far enough to show an effect: well beyond the sensors' steps.
 bool moves_enough(const std::vector<Measurement>& runs, const ExcitationPolicy& policy);
 

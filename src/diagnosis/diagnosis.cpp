@@ -20,6 +20,7 @@
 #include "final_fits.hpp"
 #include "force_description.hpp"
 #include "indistinguishable.hpp"
+#include "large_disturbance.hpp"
 #include "listing.hpp"
 #include "next_experiment.hpp"
 #include "place_null.hpp"
@@ -106,8 +107,8 @@ class Diagnostician {
     return std::any_of(selection_.found().begin(), selection_.found().end(),
                        [&](std::size_t effect) { return !search_.is_nuisance(effect); });
   }
-  /// Of what is unexplained: whether held-out runs excite what is missing still, and the others do not. They
-  /// alone show it, or spoke to the end against what the others show beyond doubt.
+  bool is_disturbed() const { return disturbed_; }
+  /// Of what is unexplained: whether held-out runs alone show it, or contradict the others to the end.
   bool misses_held_out_excitation() const {
     return selection_.contradicted() ||
            !examine_fit(data_.train, fits_.judged().train.point, policy_, budget_).structured;
@@ -150,8 +151,7 @@ class Diagnostician {
     diagnosis.residual_after = smooth_residuals(data_.held, force.judged.held.point, policy_.location.walk);
   }
 
-  /// After the bound ended the search: what it found is examined as if it had ended by itself, within a bound
-  /// of its own.
+  /// Examines what a search that reached its bound has found, within a bound of its own.
   void examine_at_bound() {
     result_.bound_reached = true;
     if (decided_) return;
@@ -249,9 +249,10 @@ class Diagnostician {
     if (!(minus_log_likelihood(fits_.known().train) - minus_log_likelihood(coloured) >
           policy_.acceptance.min_evidence))
       return left;
-    const ResidualTests beside = tests_of(coloured.point, coloured.point.noise);
+    ResidualTests beside = tests_of(coloured.point, coloured.point.noise);
     if (beside.structured && !left.structured) return left;
     noise_ = coloured.point.noise;
+    disturbed_ = find_large_disturbance(noise_, search_.range(), policy_.prior, beside);
     return beside;
   }
 
@@ -524,6 +525,7 @@ class Diagnostician {
   double floor_ = 1.0;           ///< error of a simulation that noise accounts for [sensor noise]
   bool decided_ = false;         ///< the verdict stands
   bool beyond_sensors_ = false;  ///< more is left than noise of the sensors
+  bool disturbed_ = false;       ///< of this, more than a usual disturbance
   Search search_;
   StepwiseSelection selection_;
   FinalFits fits_;
@@ -540,7 +542,7 @@ class Diagnostician {
 void look_further(const Plant& plant, const Record& record, const DiagnosisOptions& options,
                   Diagnostician& first, std::optional<Diagnostician>& second, Diagnosis& diagnosis) {
   if (diagnosis.verdict == Verdict::not_excited || diagnosis.interrupted || diagnosis.bound_reached) return;
-  const bool unexplained = diagnosis.verdict == Verdict::unexplained;
+  const bool unexplained = diagnosis.verdict == Verdict::unexplained && !first.is_disturbed();
   try {
     // A weak effect may show too little in the runs that are left once one is held out.
     if (unexplained ? first.misses_held_out_excitation() : !first.found_missing_effect()) {

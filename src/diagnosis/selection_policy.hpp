@@ -270,10 +270,12 @@ struct PriorPolicy {
   double rest_rad = 1e-3;
   /// [1] Relative priors refer to at least this share of the typical size of a parameter. Chosen.
   double min_share_of_typical = 0.2;
-  /// [1] The typical size of forces in a run, as a share of the motor's largest force. Chosen.
+  /// [1] The typical size of forces in a run, as a share of the motor's largest force. A random force that
+  /// remains and is larger leaves the data unexplained. Chosen.
   double share_of_motor_force = 0.03;
   /// [1] The typical friction of a pivot, as a share of gravity's largest torque (at the natural rate, of
-  /// what grows with the rate). Chosen.
+  /// what grows with the rate). A random torque that remains and is larger leaves the data unexplained.
+  /// Chosen.
   double share_of_gravity_torque = 0.01;
   /// [1] The most dry friction, as a multiple of the motor's largest force, since the motor must be able to
   /// overcome it. Without this limit a fit with 1430 N took minutes. A spring whose force half a track from

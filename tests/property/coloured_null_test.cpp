@@ -18,11 +18,11 @@ Plant file_plant() {
   return plant;
 }
 
-/// Runs of a cart with a force of 0.15 N that lasts for 0.2 s.
-std::vector<Measurement> disturbed_runs(Plant plant, unsigned seed) {
+/// Runs of a cart with a random force that lasts for 0.2 s.
+std::vector<Measurement> disturbed_runs(Plant plant, unsigned seed, double force_n = 0.15) {
   plant.cart_mass_kg *= 0.99;
   blind::Rig rig{.plant = plant};
-  rig.coloured.force_n = 0.15;
+  rig.coloured.force_n = force_n;
   rig.coloured.force_time_s = 0.2;
   return three_runs(rig, 4.0, seed);
 }
@@ -30,6 +30,14 @@ std::vector<Measurement> disturbed_runs(Plant plant, unsigned seed) {
 TEST(ColouredNull, ALastingDisturbanceIsNoEffect) {
   for (const unsigned seed : {1, 2, 3, 4, 5, 6})
     EXPECT_EQ(named_effects(disturbed_runs(file_plant(), seed), file_plant()), std::set<std::string>{})
+        << seed;
+}
+
+/// A force that the model lacks can always be taken for a random one. If that is large, nothing is explained.
+TEST(ColouredNull, ALargeDisturbanceIsUnexplained) {
+  for (const unsigned seed : {1, 2, 3})
+    EXPECT_EQ(diagnose(file_plant(), disturbed_runs(file_plant(), seed, 1.2), {}).verdict,
+              Verdict::unexplained)
         << seed;
 }
 
