@@ -20,7 +20,6 @@
 #include "final_fits.hpp"
 #include "force_description.hpp"
 #include "indistinguishable.hpp"
-#include "large_disturbance.hpp"
 #include "listing.hpp"
 #include "next_experiment.hpp"
 #include "place_null.hpp"
@@ -32,6 +31,7 @@
 #include "search.hpp"
 #include "stepwise_selection.hpp"
 #include "thinned_record.hpp"
+#include "unusual_disturbance.hpp"
 #include "upright/base/error.hpp"
 #include "verdict.hpp"
 
@@ -252,7 +252,7 @@ class Diagnostician {
     ResidualTests beside = tests_of(coloured.point, coloured.point.noise);
     if (beside.structured && !left.structured) return left;
     noise_ = coloured.point.noise;
-    disturbed_ = find_large_disturbance(noise_, search_.range(), policy_.prior, beside);
+    disturbed_ = find_unusual_disturbance(noise_, search_.range(), policy_.prior, beside);
     return beside;
   }
 
@@ -525,7 +525,7 @@ class Diagnostician {
   double floor_ = 1.0;           ///< error of a simulation that noise accounts for [sensor noise]
   bool decided_ = false;         ///< the verdict stands
   bool beyond_sensors_ = false;  ///< more is left than noise of the sensors
-  bool disturbed_ = false;       ///< of this, more than a usual disturbance
+  bool disturbed_ = false;       ///< and more than a usual disturbance
   Search search_;
   StepwiseSelection selection_;
   FinalFits fits_;

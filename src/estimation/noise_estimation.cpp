@@ -111,7 +111,7 @@ std::array<NoiseParameter, noise_parameter_count> noise_parameters(const FitData
     cart = cart || run.has_cart();
     pendulum = pendulum || (run.has_theta() && plant.pendulum);
   }
-  constexpr double shortest_correlation_s = 0.01, longest_correlation_s = 3.0;
+  constexpr double shortest_correlation_s = 0.01;
   return {NoiseParameter{&Noise::force, 1e-5, 10.0, 0.0, cart},
           NoiseParameter{&Noise::torque, 1e-7, 1.0, 0.0, pendulum},
           NoiseParameter{&Noise::jitter_s, 1e-6, 1e-2, 0.0, true},

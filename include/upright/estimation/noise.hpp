@@ -15,6 +15,9 @@ struct Noise {
   double jitter_s = 0.0;  ///< standard deviation of the sampling time of the encoders
 };
 
+/// [s] The longest correlation time that is estimated. What lasts longer is a drift and no noise.
+inline constexpr double longest_correlation_s = 3.0;
+
 /// All forces and torques reduced to a tenth. High noise estimates and poor parameters support each
 /// other: a second descent starts from low noise.
 inline Noise reduced_process_noise(Noise noise) {

@@ -1,7 +1,9 @@
-// A model beside which a large random force or torque remains does not explain the data.
-#include "diagnosis/large_disturbance.hpp"
+// A model beside which a large or drifting random force or torque remains does not explain the data.
+#include "diagnosis/unusual_disturbance.hpp"
 
 #include <gtest/gtest.h>
+
+#include <cmath>
 
 namespace upright {
 namespace {
@@ -16,18 +18,18 @@ Judged judge(const Noise& noise, ResidualTests tests = {}) {
   DataRange range;
   range.largest_force_n = 10.0;
   range.gravity_torque_nm = 2.0;
-  const bool found = find_large_disturbance(noise, range, PriorPolicy{}, tests);
+  const bool found = find_unusual_disturbance(noise, range, PriorPolicy{}, tests);
   return {found, tests};
 }
 
-TEST(LargeDisturbance, AUsualForceAndTorqueAreAccepted) {
+TEST(UnusualDisturbance, AUsualForceAndTorqueAreAccepted) {
   const Judged judged = judge({.coloured_force_n = 0.29, .coloured_torque_nm = 0.019});
   EXPECT_FALSE(judged.found);
   EXPECT_FALSE(judged.tests.structured);
   EXPECT_EQ(judged.tests.sentence, "");
 }
 
-TEST(LargeDisturbance, ALargerForceIsStatedWithItsSizeAndTime) {
+TEST(UnusualDisturbance, ALargerForceIsStatedWithItsSizeAndTime) {
   const Judged judged = judge({.coloured_force_n = 0.31, .correlation_s = 0.2});
   EXPECT_TRUE(judged.found);
   EXPECT_TRUE(judged.tests.structured);
@@ -36,13 +38,25 @@ TEST(LargeDisturbance, ALargerForceIsStatedWithItsSizeAndTime) {
             "disturbance: something is missing, or the rig was disturbed");
 }
 
-TEST(LargeDisturbance, ALargerTorqueIsStated) {
+TEST(UnusualDisturbance, ALargerTorqueIsStated) {
   const Judged judged = judge({.coloured_torque_nm = 0.021});
   EXPECT_TRUE(judged.found);
   EXPECT_NE(judged.tests.sentence.find("a random torque of 0.021 N m remains"), std::string::npos);
 }
 
-TEST(LargeDisturbance, WhatATestHasFoundIsKept) {
+TEST(UnusualDisturbance, AForceThatLastsTooLongDrifts) {
+  const double just_shorter_s = std::nextafter(longest_correlation_s, 0.0);
+  EXPECT_FALSE(judge({.coloured_force_n = 0.1, .correlation_s = just_shorter_s}).found);
+  const Judged judged = judge({.coloured_force_n = 0.1, .correlation_s = longest_correlation_s});
+  EXPECT_TRUE(judged.found);
+  EXPECT_EQ(
+      judged.tests.sentence,
+      "a random force of 0.1 N remains, with a correlation time of 3 s or more: it drifts, so something "
+      "is missing that changes slowly");
+  EXPECT_FALSE(judge({.correlation_s = longest_correlation_s}).found);
+}
+
+TEST(UnusualDisturbance, WhatATestHasFoundIsKept) {
   ResidualTests tests;
   tests.structured = true;
   tests.sentence = "bursts";
@@ -51,10 +65,10 @@ TEST(LargeDisturbance, WhatATestHasFoundIsKept) {
   EXPECT_EQ(judged.tests.sentence, "bursts");
 }
 
-TEST(LargeDisturbance, WithoutMotorAndPendulumNothingIsLarge) {
+TEST(UnusualDisturbance, WithoutMotorAndPendulumNothingIsLarge) {
   ResidualTests tests;
-  EXPECT_FALSE(find_large_disturbance({.coloured_force_n = 1.0, .coloured_torque_nm = 1.0}, DataRange{},
-                                      PriorPolicy{}, tests));
+  EXPECT_FALSE(find_unusual_disturbance({.coloured_force_n = 1.0, .coloured_torque_nm = 1.0}, DataRange{},
+                                        PriorPolicy{}, tests));
 }
 
 }  // namespace
