@@ -107,7 +107,7 @@ class Diagnostician {
     return std::any_of(selection_.found().begin(), selection_.found().end(),
                        [&](std::size_t effect) { return !search_.is_nuisance(effect); });
   }
-  bool is_disturbed() const { return disturbed_; }
+  bool is_disturbed() const { return disturbed_; }  ///< by more than is usual
   /// Of what is unexplained: whether held-out runs alone show it, or contradict the others to the end.
   bool misses_held_out_excitation() const {
     return selection_.contradicted() ||
@@ -525,7 +525,7 @@ class Diagnostician {
   double floor_ = 1.0;           ///< error of a simulation that noise accounts for [sensor noise]
   bool decided_ = false;         ///< the verdict stands
   bool beyond_sensors_ = false;  ///< more is left than noise of the sensors
-  bool disturbed_ = false;       ///< and more than a usual disturbance
+  bool disturbed_ = false;       ///< a large or drifting disturbance is left
   Search search_;
   StepwiseSelection selection_;
   FinalFits fits_;

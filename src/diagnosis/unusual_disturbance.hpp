@@ -8,7 +8,7 @@
 
 namespace upright {
 
-/// Whether tests that pass do so only beside a coloured force or torque in `noise` that is larger than
+/// Whether tests that pass beside `noise` do so beside a coloured force or torque that is larger than
 /// usual_force_n() or usual_torque_nm(), or lasts for longest_correlation_s. `tests` becomes structured and
 /// says so then.
 bool find_unusual_disturbance(const Noise& noise, const DataRange& range, const PriorPolicy& prior,
