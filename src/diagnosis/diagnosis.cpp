@@ -549,7 +549,8 @@ void look_further(const Plant& plant, const Record& record, const DiagnosisOptio
       options.report_progress(0.02, "repeating the search with other runs held out");
       second.emplace(plant, record, options, HeldOut::other);
       Diagnosis other = second->run(!unexplained);
-      if (other.verdict == Verdict::explained && (unexplained || second->found_missing_effect())) {
+      const bool explains = other.verdict == Verdict::explained || second->is_disturbed();
+      if (explains && (unexplained || second->found_missing_effect())) {
         second->describe_what_is_left(other);
         other.notes.emplace_back(
             "the runs held out at first show what the others alone do not: others were held out instead");
@@ -572,8 +573,7 @@ void look_further(const Plant& plant, const Record& record, const DiagnosisOptio
 Diagnosis diagnose(const Plant& plant, const std::vector<Measurement>& runs,
                    const DiagnosisOptions& options) {
   if (runs.empty()) throw ConfigError("no run was given: give at least one with --data");
-  const std::string fault = fault_of(plant);
-  if (!fault.empty()) throw ConfigError(fault);
+  if (const std::string fault = fault_of(plant); !fault.empty()) throw ConfigError(fault);
   const bool shared = std::any_of(runs.begin(), runs.end(), [&](const Measurement& run) {
     return run.has_cart() || (run.has_theta() && plant.pendulum);
   });
