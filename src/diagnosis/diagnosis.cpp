@@ -65,9 +65,9 @@ class Diagnostician {
     try {
       selection_.begin();
       selection_.find();
+      if (only_missing && !found_missing_effect()) return std::move(result_);
       ResidualTests left = settle();
       if (!options_.quick) left = search_further(left);
-      if (only_missing && !found_missing_effect()) return std::move(result_);
       conclude(beside_coloured_noise(without_local_effects(left)));
     } catch (const Interrupted&) {
       result_.interrupted = true;
