@@ -333,20 +333,23 @@ std::vector<double> Search::predicted_gains(const Hypothesis& base,
   return gains;
 }
 
-Hypothesis Search::screened(const Hypothesis& base, std::size_t effect) const {
-  std::set<std::size_t> added = base.added;
-  added.insert(effect);
-  const std::vector<FreeParameter> free = free_of(added);
-  Hypothesis best;
-  best.train.objective = infinity;
+Hypothesis Search::screened(const Hypothesis& base, std::size_t effect, double to_reach) const {
+  Hypothesis h;
+  h.added = base.added;
+  h.added.insert(effect);
+  h.free = free_of(h.added);
+  h.train.objective = infinity;
+  FitOptions options = screening();
+  options.noise_at_end = false;
   for (const FitPoint& point : points_with(screening_point(base), effect, base)) {
-    Hypothesis h;
-    h.added = added;
-    h.free = free;
-    h.train = fit(screening_subset_, point, free, screening());
-    if (h.train.objective < best.train.objective) best = std::move(h);
+    FitResult reached = fit(screening_subset_, point, h.free, options);
+    if (reached.objective < h.train.objective) h.train = std::move(reached);
   }
-  return best;
+  if (!(h.train.objective < to_reach)) return h;
+  options = screening();
+  options.max_iterations = 0;
+  h.train = fit(screening_subset_, h.train.point, h.free, options);
+  return h;
 }
 
 Hypothesis Search::screened_pair(const Hypothesis& base, const Hypothesis& first,
@@ -373,6 +376,13 @@ Hypothesis Search::on_screening_subset(const Hypothesis& base) const {
   h.free = base.free;
   h.train = fit(screening_subset_, screening_point(base), base.free, options);
   return h;
+}
+
+double Search::objective_with_its_noise(const Hypothesis& base) const {
+  FitOptions options = screening();
+  options.noise_at_end = false;
+  options.max_iterations = budget_.screening_reference_steps;
+  return fit(screening_subset_, screening_point(base), base.free, options).objective;
 }
 
 void Search::refit(const Hypothesis& base, Hypothesis& h) {

@@ -1,6 +1,7 @@
 // The search for missing effects: nested fits, forward by evidence, then backward deletion.
 #pragma once
 
+#include <limits>
 #include <map>
 #include <optional>
 #include <set>
@@ -94,14 +95,17 @@ class Search {
   /// not reach so far.
   std::vector<double> predicted_gains(const Hypothesis& base, const std::vector<std::size_t>& effects) const;
   /// Adds an effect to a hypothesis: a few steps from every start with the noise as it is, on a part of the
-  /// training data.
-  Hypothesis screened(const Hypothesis& base, std::size_t effect) const;
+  /// training data. The noise is estimated again only if the objective is below `to_reach` then.
+  Hypothesis screened(const Hypothesis& base, std::size_t effect,
+                      double to_reach = std::numeric_limits<double>::infinity()) const;
   /// Brings a screened hypothesis to convergence on that part, noise included.
   void converge_on_subset(Hypothesis& screened) const;
   /// Two effects at once on that part, from where each alone was fitted, to convergence.
   Hypothesis screened_pair(const Hypothesis& base, const Hypothesis& first, const Hypothesis& second) const;
   /// A hypothesis on that part alone, with which to compare.
   Hypothesis on_screening_subset(const Hypothesis& base) const;
+  /// The objective of a hypothesis on that part with the noise as it is.
+  double objective_with_its_noise(const Hypothesis& base) const;
   /// Brings a screened hypothesis to convergence on the whole training data, noise included, and judges it.
   void refine(const Hypothesis& base, Hypothesis& hypothesis);
   /// The same without judging it, from the noise that it has.

@@ -116,7 +116,8 @@ std::vector<std::size_t> StepwiseSelection::promising_candidates(const Hypothesi
   std::size_t kept = 0;
   for (const std::size_t i : ranking) {
     const bool unknown = !std::isfinite(predicted[i]);
-    if (unknown || kept < budget_.min_screened || predicted[i] > budget_.predicted_gain_share * best) {
+    const bool is_high = kept < budget_.min_screened || predicted[i] > budget_.predicted_gain_share * best;
+    if (unknown || (is_high && predicted[i] > least_predicted_gain())) {
       chosen.push_back(candidates[i]);
       kept += unknown ? 0 : 1;
     } else {
@@ -124,6 +125,10 @@ std::vector<std::size_t> StepwiseSelection::promising_candidates(const Hypothesi
     }
   }
   return chosen;
+}
+
+double StepwiseSelection::least_predicted_gain() const {
+  return budget_.predicted_gain_share * policy_.acceptance.min_evidence * search_.screening_share();
 }
 
 void StepwiseSelection::note_candidate(std::size_t effect, double gain) {
@@ -304,12 +309,14 @@ std::vector<StepwiseSelection::ScreenedCandidate> StepwiseSelection::screen(int 
   if (with_low_noise) from.train.point.noise = reduced_process_noise(from.train.point.noise);
   const std::vector<std::size_t> candidates = promising_candidates(from, open_candidates(), round);
   const double on_screening_subset = search_.on_screening_subset(from).train.objective;
+  // What hardly gains with the noise as it is gains no more from other noise.
+  const double to_reach = search_.objective_with_its_noise(from) - least_predicted_gain();
   std::vector<ScreenedCandidate> screened;
   for (std::size_t c = 0; c < candidates.size(); ++c) {
     options_.report_progress(
         done + 0.02 + 0.1 * static_cast<double>(c) / static_cast<double>(candidates.size()),
         "trying " + kind_of(candidates[c]));
-    Hypothesis h = search_.screened(from, candidates[c]);
+    Hypothesis h = search_.screened(from, candidates[c], to_reach);
     const bool failed = !std::isfinite(h.train.objective);
     const double gain = failed ? 0.0 : on_screening_subset - h.train.objective - penalty_of(candidates[c]);
     if (round == 0) note_candidate(candidates[c], gain);

@@ -93,9 +93,11 @@ class StepwiseSelection {
   };
 
   std::vector<std::size_t> open_candidates() const;
+  /// A candidate that promises less is not screened: the least evidence is out of its reach.
+  double least_predicted_gain() const;
   /// Notes a candidate of the first round, in the place of an earlier note.
   void note_candidate(std::size_t effect, double gain);
-  /// Those that promise a share of what the best one does, some at least, and all that cannot promise. A
+  /// Those that promise a share of what the best one does, some of the others, and all that cannot promise. A
   /// promise is kept within a factor of a few (measured on the matrix), so that the best is among them.
   std::vector<std::size_t> promising_candidates(const Hypothesis& from,
                                                 const std::vector<std::size_t>& candidates, int round);
