@@ -1,0 +1,55 @@
+// The screening of candidates: what their derivatives promise, and when the noise is estimated again.
+#include <gtest/gtest.h>
+
+#include <limits>
+
+#include "diagnosis/plant_scale.hpp"
+#include "diagnosis/search.hpp"
+#include "estimation/held_out.hpp"
+#include "named_effects.hpp"
+
+namespace upright {
+namespace {
+
+constexpr double unreachable = -std::numeric_limits<double>::infinity();
+
+/// Runs of a rig with a constant force that its plant file lacks.
+class Screening : public ::testing::Test {
+ protected:
+  static Plant rig() {
+    Plant plant = cart_with_friction();
+    plant.set("constant_force", {0.3});
+    return plant;
+  }
+
+  std::vector<Measurement> runs_ = three_runs(blind::Rig{.plant = rig()}, 6.0, 2);
+  SelectionPolicy policy_ = policy_for(cart_with_friction());
+  SearchBudget budget_;
+  DataSplit data_ =
+      split(runs_, HeldOut::middle, policy_.excitation.arm_m, policy_.excitation.speed_window_s);
+  Search search_{cart_with_friction(), runs_, data_.train, data_.held, policy_, budget_};
+  Hypothesis base_ = search_.baseline();
+  std::size_t hidden_ = effect_number("constant_force");
+};
+
+TEST_F(Screening, KeepsTheNoiseOfACandidateThatGainsTooLittle) {
+  const Noise& before = base_.train.point.noise;
+  const Hypothesis kept = search_.screened(base_, hidden_, unreachable);
+  const Hypothesis renewed = search_.screened(base_, hidden_);
+  EXPECT_EQ(kept.train.point.noise.force, before.force);
+  EXPECT_LT(renewed.train.point.noise.force, before.force);
+  EXPECT_LT(renewed.train.objective, kept.train.objective);
+}
+
+// A prediction below a tenth of the least evidence can therefore rule a candidate out.
+TEST_F(Screening, GainsWhatTheDerivativesPromise) {
+  const double without = search_.objective_with_its_noise(base_);
+  const double gained = without - search_.screened(base_, hidden_, unreachable).train.objective;
+  const double promised = search_.predicted_gains(base_, {hidden_}).front();
+  ASSERT_GT(gained, policy_.acceptance.min_evidence);
+  EXPECT_GT(promised, 0.5 * gained);
+  EXPECT_LT(promised, 2.0 * gained);
+}
+
+}  // namespace
+}  // namespace upright
