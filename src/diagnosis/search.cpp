@@ -42,10 +42,10 @@ double log_determinant(const Eigen::MatrixXd& information) {
   return symmetric_pivots(information).array().abs().max(1e-300).log().sum();
 }
 
-/// Of a fit that stays where it is: how its data depend on the parameters.
-FitOptions linearisation() {
+/// Of a fit whose noise stays. Without steps it says how the data depend on the parameters.
+FitOptions steps_with_fixed_noise(int steps) {
   FitOptions options;
-  options.max_iterations = 0;
+  options.max_iterations = steps;
   options.noise_rounds = 0;
   return options;
 }
@@ -99,14 +99,6 @@ Search::Search(const Plant& plant, const std::vector<Measurement>& runs, const F
   choose_screening_subset(stride);
   train_starts_ = estimate_initial_states(*train.runs, train.segments, plant_);
   held_starts_ = estimate_initial_states(*held.runs, held.segments, plant_);
-}
-
-FitOptions Search::screening() const {
-  FitOptions options;
-  options.noise_rounds = 0;
-  options.noise_at_end = true;
-  options.max_iterations = budget_.screening_steps;
-  return options;
 }
 
 bool Search::is_nuisance(std::size_t effect) const {
@@ -178,7 +170,9 @@ bool Search::may_restart_with_low_noise(const Hypothesis& base, const Hypothesis
   if (screening_subset_.segments.size() == train_.segments.size()) return true;
   if (!(base.train.objective - h.train.objective > budget_.clear_evidence)) return true;
   FitPoint point = screening_point(h);
-  const double as_it_is = fit(screening_subset_, point, h.free, screening()).objective;
+  FitOptions options = steps_with_fixed_noise(budget_.screening_steps);
+  options.noise_at_end = true;
+  const double as_it_is = fit(screening_subset_, point, h.free, options).objective;
   point.noise = reduced_process_noise(point.noise);
   return fit(screening_subset_, point, h.free, {}).objective < as_it_is - budget_.restart_tolerance;
 }
@@ -313,7 +307,7 @@ std::vector<FitPoint> Search::points_with(const FitPoint& from, std::size_t effe
 
 std::vector<double> Search::predicted_gains(const Hypothesis& base,
                                             const std::vector<std::size_t>& effects) const {
-  const FitOptions linearise_only = linearisation();
+  const FitOptions linearise_only = steps_with_fixed_noise(0);
   const auto predicted_objective = [&](const FitPoint& point, const std::vector<FreeParameter>& free) {
     const FitResult seen = fit(screening_subset_, point, free, linearise_only);
     return seen.predicted_reduction ? seen.objective - *seen.predicted_reduction : -infinity;
@@ -339,16 +333,12 @@ Hypothesis Search::screened(const Hypothesis& base, std::size_t effect, double t
   h.added.insert(effect);
   h.free = free_of(h.added);
   h.train.objective = infinity;
-  FitOptions options = screening();
-  options.noise_at_end = false;
   for (const FitPoint& point : points_with(screening_point(base), effect, base)) {
-    FitResult reached = fit(screening_subset_, point, h.free, options);
+    FitResult reached =
+        fit(screening_subset_, point, h.free, steps_with_fixed_noise(budget_.screening_steps));
     if (reached.objective < h.train.objective) h.train = std::move(reached);
   }
-  if (!(h.train.objective < to_reach)) return h;
-  options = screening();
-  options.max_iterations = 0;
-  h.train = fit(screening_subset_, h.train.point, h.free, options);
+  if (h.train.objective < to_reach) renew_noise_on_subset(h);
   return h;
 }
 
@@ -368,21 +358,25 @@ void Search::converge_on_subset(Hypothesis& h) const {
   if (std::isfinite(h.train.objective)) h.train = fit(screening_subset_, h.train.point, h.free, {});
 }
 
-Hypothesis Search::on_screening_subset(const Hypothesis& base) const {
-  FitOptions options = screening();
-  options.max_iterations = budget_.screening_reference_steps;
+Hypothesis Search::descended_on_subset(const Hypothesis& base) const {
   Hypothesis h;
   h.added = base.added;
   h.free = base.free;
-  h.train = fit(screening_subset_, screening_point(base), base.free, options);
+  h.train = fit(screening_subset_, screening_point(base), base.free,
+                steps_with_fixed_noise(budget_.screening_reference_steps));
   return h;
 }
 
-double Search::objective_with_its_noise(const Hypothesis& base) const {
-  FitOptions options = screening();
-  options.noise_at_end = false;
-  options.max_iterations = budget_.screening_reference_steps;
-  return fit(screening_subset_, screening_point(base), base.free, options).objective;
+void Search::renew_noise_on_subset(Hypothesis& h) const {
+  FitOptions options = steps_with_fixed_noise(0);
+  options.noise_at_end = true;
+  h.train = fit(screening_subset_, h.train.point, h.free, options);
+}
+
+Hypothesis Search::on_screening_subset(const Hypothesis& base) const {
+  Hypothesis h = descended_on_subset(base);
+  renew_noise_on_subset(h);
+  return h;
 }
 
 void Search::refit(const Hypothesis& base, Hypothesis& h) {
@@ -521,7 +515,7 @@ Eigen::MatrixXd Search::covariance_from_held_numbers(const FitData& data, const 
   for (const std::size_t number : held_numbers_)
     for (const FreeParameter& p : correction_parameters(given_, number, range_, policy_.prior))
       free.push_back(p);
-  const FitOptions linearise_only = linearisation();
+  const FitOptions linearise_only = steps_with_fixed_noise(0);
   const FitResult beside = fit(data, fitted.train.point, free, linearise_only);
   if (!std::isfinite(beside.objective)) return Eigen::MatrixXd::Zero(n, n);
   const Eigen::Index held = beside.information.rows() - n;
@@ -561,7 +555,7 @@ Hypothesis Search::with_effect_free(const Hypothesis& h, std::size_t effect, dou
       result.free.push_back(p);
     }
   }
-  const FitOptions linearise_only = linearisation();
+  const FitOptions linearise_only = steps_with_fixed_noise(0);
   result.train = fit(train_, point, result.free, linearise_only);
   result.valid = std::isfinite(result.train.objective);
   return result;

@@ -102,10 +102,12 @@ class Search {
   void converge_on_subset(Hypothesis& screened) const;
   /// Two effects at once on that part, from where each alone was fitted, to convergence.
   Hypothesis screened_pair(const Hypothesis& base, const Hypothesis& first, const Hypothesis& second) const;
-  /// A hypothesis on that part alone, with which to compare.
+  /// A hypothesis on that part alone after a few steps with the noise as it is.
+  Hypothesis descended_on_subset(const Hypothesis& base) const;
+  /// Estimates the noise of a hypothesis on that part again.
+  void renew_noise_on_subset(Hypothesis& on_subset) const;
+  /// Both, for a comparison.
   Hypothesis on_screening_subset(const Hypothesis& base) const;
-  /// The objective of a hypothesis on that part with the noise as it is.
-  double objective_with_its_noise(const Hypothesis& base) const;
   /// Brings a screened hypothesis to convergence on the whole training data, noise included, and judges it.
   void refine(const Hypothesis& base, Hypothesis& hypothesis);
   /// The same without judging it, from the noise that it has.
@@ -173,8 +175,6 @@ class Search {
   bool bristles_are_short(const Hypothesis& h) const;
   /// The zero of the angle where the plant file does not state it.
   bool is_unknown_zero(std::size_t effect) const;
-  /// A few steps with the noise as it is.
-  FitOptions screening() const;
   /// A hypothesis's point on the screening subset alone.
   FitPoint screening_point(const Hypothesis& base) const;
   std::vector<FreeParameter> free_of(const std::set<std::size_t>& added) const;

@@ -308,9 +308,10 @@ std::vector<StepwiseSelection::ScreenedCandidate> StepwiseSelection::screen(int 
   Hypothesis from = current_;
   if (with_low_noise) from.train.point.noise = reduced_process_noise(from.train.point.noise);
   const std::vector<std::size_t> candidates = promising_candidates(from, open_candidates(), round);
-  const double on_screening_subset = search_.on_screening_subset(from).train.objective;
+  Hypothesis reference = search_.descended_on_subset(from);
   // What hardly gains with the noise as it is gains no more from other noise.
-  const double to_reach = search_.objective_with_its_noise(from) - least_predicted_gain();
+  const double to_reach = reference.train.objective - least_predicted_gain();
+  search_.renew_noise_on_subset(reference);
   std::vector<ScreenedCandidate> screened;
   for (std::size_t c = 0; c < candidates.size(); ++c) {
     options_.report_progress(
@@ -318,7 +319,8 @@ std::vector<StepwiseSelection::ScreenedCandidate> StepwiseSelection::screen(int 
         "trying " + kind_of(candidates[c]));
     Hypothesis h = search_.screened(from, candidates[c], to_reach);
     const bool failed = !std::isfinite(h.train.objective);
-    const double gain = failed ? 0.0 : on_screening_subset - h.train.objective - penalty_of(candidates[c]);
+    const double gain =
+        failed ? 0.0 : reference.train.objective - h.train.objective - penalty_of(candidates[c]);
     if (round == 0) note_candidate(candidates[c], gain);
     if (!failed) screened.push_back({candidates[c], std::move(h), gain});
   }

@@ -43,7 +43,7 @@ TEST_F(Screening, KeepsTheNoiseOfACandidateThatGainsTooLittle) {
 
 // A prediction below a tenth of the least evidence can therefore rule a candidate out.
 TEST_F(Screening, GainsWhatTheDerivativesPromise) {
-  const double without = search_.objective_with_its_noise(base_);
+  const double without = search_.descended_on_subset(base_).train.objective;
   const double gained = without - search_.screened(base_, hidden_, unreachable).train.objective;
   const double promised = search_.predicted_gains(base_, {hidden_}).front();
   ASSERT_GT(gained, policy_.acceptance.min_evidence);
