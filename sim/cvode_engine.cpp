@@ -17,14 +17,14 @@ namespace upright {
 
 namespace {
 
-constexpr sunindextype state_size = 6;
+constexpr sunindextype state_size = 8;
 constexpr double min_lag_s = 1e-6;
 constexpr double smallest_step_s = 1e-13;
 /// Faster rates than this make the plant stiff against control periods of a millisecond.
 constexpr double stiff_rate_radps = 5000.0;
 
 PlantState<double> unpack(const double* y) {
-  return {y[0], y[1], y[2], y[3], y[4], y[5]};
+  return {y[0], y[1], y[2], y[3], y[4], y[5], y[6], y[7]};
 }
 
 void pack(const PlantState<double>& s, double* y) {
@@ -34,6 +34,8 @@ void pack(const PlantState<double>& s, double* y) {
   y[3] = s.theta_radps;
   y[4] = s.motor_v;
   y[5] = s.bristle_m;
+  y[6] = s.sprung_m;
+  y[7] = s.sprung_mps;
 }
 
 void require(int flag, const char* what) {

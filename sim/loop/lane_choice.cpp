@@ -89,8 +89,15 @@ const LaneBuild& lanes_for(LaneRegisters registers) {
   return registers == LaneRegisters::wide ? wide : baseline;
 }
 
+/// Whether the motion of a sliding cart is analytic in time, as far as its effects say that.
 bool has_short_series(const PlantModel<double>& model) {
-  return Dynamics<double>(model).has_short_series();
+  bool all = true;
+  for_each_effect([&]<std::size_t I>() {
+    using E = EffectAt<I>;
+    if constexpr (requires { E::has_short_series(model.of<I>()); })
+      if (model.present.has<I>()) all = all && E::has_short_series(model.of<I>());
+  });
+  return all;
 }
 
 bool compensates(const LoopSetup& setup) {
@@ -176,7 +183,7 @@ bool lanes_can_run(const LoopSetup& setup) {
     return false;
   if (setup.model.cart_locked || !setup.model.has_pendulum) return false;
   const Dynamics<double> physics(setup.model);
-  if (physics.changes_with_time() || physics.depends_on_load()) return false;
+  if (physics.changes_with_time() || physics.depends_on_load() || physics.has_sprung_mass()) return false;
   const double pivot_nm = physics.pivot_dry_level();
   if (!setup.sampled && (physics.has_motor_lag() || pivot_nm > 0.0)) return false;
   if (setup.model.smoothing > 0.0 && pivot_nm > largest_smoothed_pivot_nm) return false;

@@ -68,8 +68,8 @@ SelectionPolicy policy_for(const Plant& plant) {
   ResidualWalk& walk = policy.location.walk;
   walk.force_n_per_sqrt_s *= scale.force;
   walk.torque_nm_per_sqrt_s *= scale.torque;
-  const std::array start = {scale.length, 1.0,         scale.speed, scale.rate,
-                            scale.length, scale.force, scale.torque};
+  const std::array start = {scale.length, 1.0,         scale.speed, scale.rate,  scale.length,
+                            scale.length, scale.speed, scale.force, scale.torque};
   for (std::size_t i = 0; i < start.size(); ++i) walk.start_variances[i] *= start[i] * start[i];
   PriorPolicy& prior = policy.prior;
   prior.min_stribeck_mps *= scale.speed;

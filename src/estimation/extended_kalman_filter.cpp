@@ -4,6 +4,7 @@
 #include <numbers>
 
 #include "sim/loop/lanes.hpp"
+#include "state_vector.hpp"
 
 namespace upright {
 
@@ -72,12 +73,13 @@ EkfCovariance<S>::EkfCovariance(const Measurement& run, const Plant& plant, cons
       present_{has_channel(run, plant, 0), has_channel(run, plant, 1)},
       sensor_variance_{square(run.has_cart() ? run.cart_noise_m() : 1.0),
                        square(run.has_theta() ? run.theta_noise_rad() : 1.0)},
-      bristles_(plant.find(bristle_effect()) != nullptr) {
+      bristles_(plant.find(bristle_effect()) != nullptr),
+      states_(estimated_states(plant)) {
   for (auto& row : p_)
     for (S& element : row) element = S(0.0);
   for (S& element : gain_) element = S(0.0);
-  p_[states][states] = square(noise.coloured_force_n);
-  p_[states + 1][states + 1] = square(noise.coloured_torque_nm);
+  p_[states_][states_] = square(noise.coloured_force_n);
+  p_[states_ + 1][states_ + 1] = square(noise.coloured_torque_nm);
 }
 
 template <class S>
@@ -107,82 +109,106 @@ void EkfCovariance<S>::update(const LinearStep& step, int channel) {
   const S spread = c * c * p_[channel][channel];
   variance_ = variance_ + spread;
   const S with_weight = sensor * (1.0 / step.weight[channel]) + spread;
-  if (noise_.disturbed) return correct<all>(c, channel, with_weight);
-  bristles_ ? correct<states>(c, channel, with_weight) : correct<states - 1>(c, channel, with_weight);
+  const bool sprung = states_ == most_states;
+  if (noise_.disturbed)
+    return sprung ? correct<most_states, true>(c, channel, with_weight)
+                  : correct<rigid_states, true>(c, channel, with_weight);
+  if (sprung) return correct<most_states, false>(c, channel, with_weight);
+  bristles_ ? correct<rigid_states, false>(c, channel, with_weight)
+            : correct<rigid_states - 1, false>(c, channel, with_weight);
 }
 
-/// `Moving` states, the last one only with bristles; or all, with disturbances. Inner loops run along rows,
-/// which SIMD likes.
+/// `States` of them, the fifth only with bristles, and the disturbances. Inner loops run along rows, which
+/// SIMD likes.
 template <class S>
-template <int Moving>
+template <int States, bool Disturbed>
 void EkfCovariance<S>::correct(double c, int channel, const S& variance) {
-  S seen[Moving];
-  for (int j = 0; j < Moving; ++j) seen[j] = c * p_[channel][j];
+  constexpr int all = States + (Disturbed ? disturbances : 0);
+  constexpr auto place = [](int i) { return i < States ? i : i - States + most_states; };
+  S seen[all];
+  for (int j = 0; j < all; ++j) seen[j] = c * p_[channel][j];
   const S per_variance = 1.0 / variance;
-  for (int i = 0; i < Moving; ++i) gain_[i] = seen[i] * per_variance;
-  for (int i = 0; i < Moving; ++i)
-    for (int j = 0; j < Moving; ++j) p_[i][j] = p_[i][j] - gain_[i] * seen[j];
+  for (int i = 0; i < all; ++i) gain_[place(i)] = seen[i] * per_variance;
+  for (int i = 0; i < all; ++i)
+    for (int j = 0; j < all; ++j) p_[i][j] = p_[i][j] - gain_[place(i)] * seen[j];
 }
 
 template <class S>
 template <class Step>
 void EkfCovariance<S>::propagate(const Step& step) {
-  if (noise_.disturbed) push_by_disturbances(step);
-  bristles_ ? carry<states>(step) : carry<states - 1>(step);
-  if (noise_.disturbed) decay_disturbances(step);
+  const bool sprung = states_ == most_states;
+  if (noise_.disturbed)
+    return sprung ? carry_disturbed<most_states>(step) : carry_disturbed<rigid_states>(step);
+  if (sprung) return carry<most_states>(step);
+  bristles_ ? carry<rigid_states>(step) : carry<rigid_states - 1>(step);
+}
+
+template <class S>
+template <int States, class Step>
+void EkfCovariance<S>::carry_disturbed(const Step& step) {
+  push_by_disturbances<States>(step);
+  // A fifth state that the plant does not have has no covariances.
+  if constexpr (States == rigid_states) {
+    bristles_ ? carry<States>(step) : carry<States - 1>(step);
+  } else {
+    carry<States>(step);
+  }
+  decay_disturbances<States>(step);
 }
 
 /// The velocities change by what the disturbances push: P goes to M P M', where M adds their impulses.
 template <class S>
-template <class Step>
+template <int States, class Step>
 void EkfCovariance<S>::push_by_disturbances(const Step& step) {
-  for (int d = 0; d < LinearStep::disturbances; ++d)
+  constexpr int all = States + disturbances;
+  for (int d = 0; d < disturbances; ++d)
     for (int i = 0; i < 2; ++i)
-      for (int j = 0; j < all; ++j) p_[2 + i][j] += step.impulse[d][i] * p_[states + d][j];
-  for (int d = 0; d < LinearStep::disturbances; ++d)
+      for (int j = 0; j < all; ++j) p_[2 + i][j] += step.impulse[d][i] * p_[States + d][j];
+  for (int d = 0; d < disturbances; ++d)
     for (int j = 0; j < all; ++j)
-      for (int i = 0; i < 2; ++i) p_[j][2 + i] += step.impulse[d][i] * p_[j][states + d];
+      for (int i = 0; i < 2; ++i) p_[j][2 + i] += step.impulse[d][i] * p_[j][States + d];
 }
 
 /// Covariances of states with disturbances follow the transition; the disturbances forget, and are renewed so
 /// that they stay as large as they are.
 template <class S>
-template <class Step>
+template <int States, class Step>
 void EkfCovariance<S>::decay_disturbances(const Step& step) {
+  constexpr int all = States + disturbances;
   const S kept = keeps(step.period_s);
-  for (int d = states; d < all; ++d) {
-    S carried[states];
-    for (int i = 0; i < states; ++i) {
+  for (int d = States; d < all; ++d) {
+    S carried[States];
+    for (int i = 0; i < States; ++i) {
       carried[i] = step.transition[i][0] * p_[0][d];
-      for (int j = 1; j < states; ++j) carried[i] += step.transition[i][j] * p_[j][d];
+      for (int j = 1; j < States; ++j) carried[i] += step.transition[i][j] * p_[j][d];
     }
-    for (int i = 0; i < states; ++i) p_[i][d] = p_[d][i] = kept * carried[i];
+    for (int i = 0; i < States; ++i) p_[i][d] = p_[d][i] = kept * carried[i];
   }
   const S forgets = square(kept);
-  for (int d = states; d < all; ++d)
-    for (int e = states; e < all; ++e) p_[d][e] = p_[d][e] * forgets;
-  p_[states][states] += (1.0 - forgets) * square(noise_.coloured_force_n);
-  p_[states + 1][states + 1] += (1.0 - forgets) * square(noise_.coloured_torque_nm);
+  for (int d = States; d < all; ++d)
+    for (int e = States; e < all; ++e) p_[d][e] = p_[d][e] * forgets;
+  p_[States][States] += (1.0 - forgets) * square(noise_.coloured_force_n);
+  p_[States + 1][States + 1] += (1.0 - forgets) * square(noise_.coloured_torque_nm);
 }
 
 template <class S>
-template <int Moving, class Step>
+template <int States, class Step>
 void EkfCovariance<S>::carry(const Step& step) {
   const S f = square(noise_.force) * step.period_s, t = square(noise_.torque) * step.period_s;
   for (int i = 0; i < 2; ++i)
     for (int j = 0; j < 2; ++j)
       p_[2 + i][2 + j] += f * step.by_force[i] * step.by_force[j] + t * step.by_torque[i] * step.by_torque[j];
-  S half[Moving][Moving];
-  for (int i = 0; i < Moving; ++i) {
-    for (int j = 0; j < Moving; ++j) half[i][j] = step.transition[i][0] * p_[0][j];
-    for (int k = 1; k < Moving; ++k)
-      for (int j = 0; j < Moving; ++j) half[i][j] += step.transition[i][k] * p_[k][j];
+  S half[States][States];
+  for (int i = 0; i < States; ++i) {
+    for (int j = 0; j < States; ++j) half[i][j] = step.transition[i][0] * p_[0][j];
+    for (int k = 1; k < States; ++k)
+      for (int j = 0; j < States; ++j) half[i][j] += step.transition[i][k] * p_[k][j];
   }
   // P goes to T P T', which is symmetric.
-  for (int i = 0; i < Moving; ++i)
+  for (int i = 0; i < States; ++i)
     for (int j = 0; j <= i; ++j) {
       S sum = half[i][0] * step.transition[j][0];
-      for (int k = 1; k < Moving; ++k) sum += half[i][k] * step.transition[j][k];
+      for (int k = 1; k < States; ++k) sum += half[i][k] * step.transition[j][k];
       p_[i][j] = p_[j][i] = sum;
     }
 }
@@ -223,12 +249,12 @@ void EkfCovariance<S>::propagate_creeping(const LinearStep& from) {
                           creep_of(from, 1, from.by_torque[1] * noise_.torque)};
   if (!creep[0].creeps && !creep[1].creeps) return propagate(from);
   CreepingStep step;
-  for (int i = 0; i < states; ++i)
-    for (int j = 0; j < states; ++j) step.transition[i][j] = S(from.transition[i][j]);
+  for (int i = 0; i < states_; ++i)
+    for (int j = 0; j < states_; ++j) step.transition[i][j] = S(from.transition[i][j]);
   for (int i = 0; i < 2; ++i) {
     step.by_force[i] = S(from.by_force[i]);
     step.by_torque[i] = S(from.by_torque[i]);
-    for (int d = 0; d < LinearStep::disturbances; ++d) step.impulse[d][i] = from.impulse[d][i];
+    for (int d = 0; d < disturbances; ++d) step.impulse[d][i] = from.impulse[d][i];
   }
   step.period_s = from.period_s;
   for (int c = 0; c < 2; ++c) {

@@ -52,7 +52,7 @@ class EkfCovariance {
   void update(const LinearStep& step, int channel);
 
   const S& variance() const { return variance_; }
-  /// Of all states and disturbances.
+  /// Of all states and disturbances, in the places of LinearStep::update.
   const S* gain() const { return gain_; }
   /// Whether the noise has a coloured part.
   bool disturbed() const { return noise_.disturbed; }
@@ -60,7 +60,8 @@ class EkfCovariance {
   S keeps(double period_s) const;
 
  private:
-  static constexpr int states = LinearStep::states, all = states + LinearStep::disturbances;
+  static constexpr int most_states = LinearStep::states, rigid_states = LinearStep::rigid_states,
+                       disturbances = LinearStep::disturbances;
 
   /// Dry friction under white force: a contact that rests in the model creeps randomly in reality.
   struct Creep {
@@ -71,21 +72,23 @@ class EkfCovariance {
   };
   /// A step along which contacts creep: the same as LinearStep where they do not.
   struct CreepingStep {
-    S transition[states][states];
+    S transition[most_states][most_states];
     S by_force[2], by_torque[2];
-    double impulse[LinearStep::disturbances][2];
+    double impulse[disturbances][2];
     double period_s;
   };
 
-  template <int Moving>
+  template <int States, bool Disturbed>
   void correct(double c, int channel, const S& variance);
-  template <int Moving, class Step>
+  template <int States, class Step>
   void carry(const Step& step);
+  template <int States, class Step>
+  void carry_disturbed(const Step& step);
   template <class Step>
   void propagate(const Step& step);
-  template <class Step>
+  template <int States, class Step>
   void push_by_disturbances(const Step& step);
-  template <class Step>
+  template <int States, class Step>
   void decay_disturbances(const Step& step);
   void propagate_creeping(const LinearStep& from);
   Creep creep_of(const LinearStep& step, int contact, const S& push) const;
@@ -94,9 +97,10 @@ class EkfCovariance {
   bool present_[2];
   double sensor_variance_[2];
   bool bristles_;
+  int states_;  ///< that the plant may have: the first of all
   bool active_ = false;
-  S p_[all][all];
-  S gain_[all], variance_{1.0};
+  S p_[most_states + disturbances][most_states + disturbances];  ///< of these states, then the disturbances
+  S gain_[most_states + disturbances], variance_{1.0};
 };
 
 /// Minus twice the log likelihood of innovations, of one filter or of several side by side.

@@ -9,6 +9,7 @@
 #include "gauss_newton.hpp"
 #include "noise_estimation.hpp"
 #include "parameter_covariance.hpp"
+#include "state_vector.hpp"
 
 namespace upright {
 
@@ -112,7 +113,8 @@ FitResult failed_at(const FitPoint& start, std::size_t segments, std::size_t fre
 FitResult fit(const FitData& data, const FitPoint& start, const std::vector<FreeParameter>& free,
               const FitOptions& options) {
   if (data.bound != nullptr) data.bound->check();
-  if (free.size() > max_free_parameters) return failed_at(start, data.segments.size(), free.size());
+  if (free.size() + static_cast<std::size_t>(estimated_states(start.plant)) > max_derivatives)
+    return failed_at(start, data.segments.size(), free.size());
   GaussNewton solver(data, start, free, options);
   iterate(data, options, solver);
   FitResult result = result_of(solver, free);

@@ -22,7 +22,7 @@ constexpr double infinity = std::numeric_limits<double>::infinity();
 using Matrix = Eigen::MatrixXd;
 
 /// Information on the initial state beyond the data: nearly none, enough to keep unmeasured states in place.
-constexpr double start_information[state_count] = {1.0, 1.0, 0.1, 0.01, 1e4};
+constexpr double start_information[state_count] = {1.0, 1.0, 0.1, 0.01, 1e4, 1e4, 10.0};
 
 /// By how much a quadratic objective falls along a way.
 double promise(const Matrix& information, const Eigen::VectorXd& slope, const Eigen::VectorXd& way) {
@@ -301,7 +301,7 @@ void GaussNewton::move_parameters(Eigen::VectorXd& delta, Step& result) const {
 /// Moves the initial states after the parameters, none further than makes sense.
 void GaussNewton::move_initial_states(const ReducedEquations& reduced, const Eigen::VectorXd& delta,
                                       Step& result) const {
-  constexpr double longest[state_count] = {0.01, 0.3, 0.5, 3.0, 0.01};
+  constexpr double longest[state_count] = {0.01, 0.3, 0.5, 3.0, 0.01, 0.01, 0.5};
   Eigen::VectorXd way(state_count + delta.size());
   way.tail(delta.size()) = delta;
   for (std::size_t s = 0; s < linearised_.size(); ++s) {

@@ -46,7 +46,8 @@ void correct_state(EventEngine<S>& engine, const double (&correction)[state_coun
   if (std::all_of(correction, correction + state_count, [](double u) { return u == 0.0; })) return;
   PlantState<S> state = engine.state();
   const auto values = as_array(state);
-  for (int i = 0; i < state_count; ++i) *values[static_cast<std::size_t>(i)] += S(correction[i]);
+  for (int i = 0; i < state_count; ++i)
+    if (correction[i] != 0.0) *values[static_cast<std::size_t>(i)] += S(correction[i]);
   engine.correct(state);
 }
 
@@ -122,15 +123,14 @@ class SegmentLineariser {
                     const PlantState<double>& start, const std::vector<FreeParameter>& free)
       : run_(run),
         segment_(segment),
-        columns_(state_count + static_cast<int>(free.size())),
+        states_(estimated_states(point.plant)),
+        columns_(states_ + static_cast<int>(free.size())),
         simulator_(model_of(run, point.plant, free), engine_options(), max_commands(run, segment)),
         sensors_(sensor_gains(dynamics().model())),
         shown_of_speed_s_(shown_of_cart_speed_s(dynamics())),
         noise_input_(point.plant, run.cart_locked),
         covariance_(run, point.plant, noise_of_filter(point.noise)) {
-    PlantState<Dual> state = without_bristles(start);
-    state.bristle_m = Dual(start.bristle_m);
-    start_segment(simulator_, run, segment, state);
+    start_segment(simulator_, run, segment, constant_state(start));
     // A correction is in the sensors' units: to a state it is worth as much less as they show more of it.
     for (std::size_t channel = 0; channel < 2; ++channel)
       worth_less_[channel] = sensors_[channel].v / sensors_[channel].a;
@@ -142,8 +142,9 @@ class SegmentLineariser {
     steps.resize(segment_.last - segment_.first + 1);
     NormalEquations unused;
     NormalEquations& sums = normal != nullptr ? *normal : unused;
-    sums.information.setZero(columns_, columns_);
-    sums.score.setZero(columns_);
+    const int rows = outward(columns_);
+    sums.information.setZero(rows, rows);
+    sums.score.setZero(rows);
     sums.likelihood = {};
     BlockSums blocks(sums.blocks);
     for (std::size_t k = segment_.first; k <= segment_.last; ++k) {
@@ -162,8 +163,9 @@ class SegmentLineariser {
     if (normal == nullptr) return;
     for (int j = 0; j < columns_; ++j) {
       for (int i = j; i < columns_; ++i)
-        sums.information(i, j) = sums.information(j, i) = information_[static_cast<std::size_t>(j)][i];
-      sums.score[j] = score_[j];
+        sums.information(outward(i), outward(j)) = sums.information(outward(j), outward(i)) =
+            information_[static_cast<std::size_t>(j)][i];
+      sums.score[outward(j)] = score_[j];
     }
   }
 
@@ -171,12 +173,27 @@ class SegmentLineariser {
   using Dual = DualNumber<N>;
   using Row = Derivatives<N>;
 
-  static PlantModel<Dual> model_of(const Measurement& run, const Plant& plant,
-                                   const std::vector<FreeParameter>& free) {
+  /// The states that every plant has in a loop of fixed length, which is faster, and then the others.
+  template <class Visit>
+  void for_each_state(const Visit& visit) const {
+    for (int i = 0; i < LinearStep::rigid_states; ++i) visit(i);
+    if (states_ == LinearStep::rigid_states) return;
+    for (int i = LinearStep::rigid_states; i < state_count; ++i) visit(i);
+  }
+  void clear_states(Row& row) const {
+    row.clear_first(LinearStep::rigid_states);
+    if (states_ != LinearStep::rigid_states) row.clear_first(state_count);
+  }
+
+  /// Where a row is in the normal equations, which have a row for each state that a plant may have.
+  int outward(int row) const { return row < states_ ? row : row - states_ + state_count; }
+
+  PlantModel<Dual> model_of(const Measurement& run, const Plant& plant,
+                            const std::vector<FreeParameter>& free) const {
     PlantModel<Dual> model = make_model_of_run<Dual>(plant, run);
     for (std::size_t j = 0; j < free.size(); ++j)
       model.parameters[effect_parameter_offset(free[j].effect) + free[j].index].v.set(
-          state_count + static_cast<int>(j), 1.0);
+          states_ + static_cast<int>(j), 1.0);
     return model;
   }
 
@@ -185,21 +202,22 @@ class SegmentLineariser {
     return {line.cart_gain, line.theta_gain};
   }
 
-  static PlantState<Dual> without_bristles(const PlantState<double>& state) {
-    return {Dual(state.cart_m), Dual(state.theta_rad), Dual(state.cart_mps), Dual(state.theta_radps)};
+  static PlantState<Dual> constant_state(const PlantState<double>& from) {
+    PlantState<Dual> state;
+    const auto values = as_array(state);
+    const auto numbers = as_array(from);
+    for (std::size_t i = 0; i < values.size(); ++i) *values[i] = Dual(*numbers[i]);
+    return state;
   }
 
   const Dynamics<Dual>& dynamics() const { return simulator_.engine().dynamics(); }
 
-  std::array<const Dual*, state_count> reached_state() const {
-    const PlantState<Dual>& reached = simulator_.engine().state();
-    return {&reached.cart_m, &reached.theta_rad, &reached.cart_mps, &reached.theta_radps, &reached.bristle_m};
-  }
+  std::array<const Dual*, state_count> reached_state() const { return as_array(simulator_.engine().state()); }
 
   void start_sensitivity(const PlantState<double>& start) {
-    for (int i = 0; i < state_count; ++i) sensitivity_[static_cast<std::size_t>(i)] = Row::unit(i);
+    for (int i = 0; i < states_; ++i) sensitivity_[static_cast<std::size_t>(i)] = Row::unit(i);
     // Parameters of the sensors change what is meant by what they show at the start, not what they show.
-    PlantState<Dual> at_start = without_bristles(start);
+    PlantState<Dual> at_start = constant_state(start);
     at_start.cart_m.v.set(0, 1.0);
     const Outputs<Dual> shown = dynamics().measure(at_start);
     Row by_parameters = shown.cart_m.v;
@@ -226,9 +244,14 @@ class SegmentLineariser {
     }
     const PlantState<Dual>& reached = simulator_.engine().state();
     const std::array<const Dual*, state_count> end = reached_state();
-    for (int i = 0; i < state_count; ++i)
-      for (int j = 0; j < state_count; ++j)
-        step.transition[i][j] = first ? (i == j ? 1.0 : 0.0) : end[static_cast<std::size_t>(i)]->v[j];
+    std::fill_n(&step.transition[0][0], state_count * state_count, 0.0);
+    for_each_state([&](int i) {
+      if (first) {
+        step.transition[i][i] = 1.0;
+      } else {
+        for_each_state([&](int j) { step.transition[i][j] = end[static_cast<std::size_t>(i)]->v[j]; });
+      }
+    });
     set_holds(step);
     const Outputs<Dual> outputs = simulator_.engine().outputs();
     const double simulated[2] = {value_of(outputs.cart_m), value_of(outputs.theta_rad)};
@@ -286,13 +309,16 @@ class SegmentLineariser {
       }
     }
     const std::array<Row, state_count> former = sensitivity_;
-    for (std::size_t i = 0; i < state_count; ++i) {
-      Row moved = end[i]->v;
-      moved.clear_first(state_count);
-      for (std::size_t j = 0; j < state_count; ++j)
-        if (step.transition[i][j] != 0.0) moved += step.transition[i][j] * former[j];
-      sensitivity_[i] = moved;
-    }
+    for_each_state([&](int i) {
+      const auto at = static_cast<std::size_t>(i);
+      Row moved = end[at]->v;
+      clear_states(moved);
+      for_each_state([&](int j) {
+        if (step.transition[i][j] != 0.0)
+          moved += step.transition[i][j] * former[static_cast<std::size_t>(j)];
+      });
+      sensitivity_[at] = moved;
+    });
   }
 
   /// Updates the filter with each channel in turn. False for a value that is not finite.
@@ -329,18 +355,19 @@ class SegmentLineariser {
     Row row = channel == 0 ? outputs.cart_m.v : outputs.theta_rad.v;
     row -= step.gain[channel] * reached_state()[static_cast<std::size_t>(channel)]->v;
     if (channel == 0) row -= shown_of_speed_s_ * reached.cart_mps.v;
-    row.clear_first(state_count);
+    clear_states(row);
     row += step.gain[channel] * sensitivity_[static_cast<std::size_t>(channel)];
     if (channel == 0) row += shown_of_speed_s_ * sensitivity_[2];
     const double weight = step.weight[channel] / covariance_.variance();
     add_square<N>(row, weight, columns_, information_);
     score_ += (weight * e) * row;
-    for (std::size_t i = 0; i < state_count; ++i) {
-      if (covariance_.gain()[i] == 0.0) continue;
-      sensitivity_[i] -= covariance_.gain()[i] * row;
-      const std::size_t sensor = i % 2 == 0 ? 0 : 1;  // x, v and the bristles; theta and omega
-      sensitivity_[i] -= covariance_.gain()[i] * e * worth_less_[sensor];
-    }
+    for_each_state([&](int i) {
+      if (covariance_.gain()[i] == 0.0) return;
+      Row& of_state = sensitivity_[static_cast<std::size_t>(i)];
+      of_state -= covariance_.gain()[i] * row;
+      const std::size_t sensor = i == 1 || i == 3 ? 1 : 0;  // theta and omega; all others are of the cart
+      of_state -= covariance_.gain()[i] * e * worth_less_[sensor];
+    });
     if (!covariance_.disturbed()) return;
     for (std::size_t d = 0; d < disturbance_sensitivity_.size(); ++d)
       disturbance_sensitivity_[d] -= covariance_.gain()[state_count + d] * row;
@@ -348,6 +375,7 @@ class SegmentLineariser {
 
   const Measurement& run_;
   const Segment& segment_;
+  int states_;  ///< that the plant has
   int columns_;
   Simulator<Dual> simulator_;
   std::array<Dual, 2> sensors_;
@@ -371,13 +399,12 @@ void linearise_segment(const FitData& data, std::size_t s, const FitPoint& point
   const auto with = [&]<int N>() {
     SegmentLineariser<N>((*data.runs)[segment.run], segment, point, point.starts[s], free).run(steps, normal);
   };
-  const std::size_t slots = free.size() + state_count;
+  const std::size_t slots = free.size() + static_cast<std::size_t>(estimated_states(point.plant));
   if (slots <= 8) return with.template operator()<8>();
   if (slots <= 16) return with.template operator()<16>();
   if (slots <= 24) return with.template operator()<24>();
-  constexpr int max_slots = 32;
-  static_assert(max_slots == max_free_parameters + state_count);
-  return with.template operator()<max_slots>();
+  static_assert(max_derivatives == 32);
+  return with.template operator()<max_derivatives>();
 }
 
 }  // namespace upright

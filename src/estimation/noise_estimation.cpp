@@ -42,12 +42,13 @@ FilterNoise<Lanes> noise_of_filters(const Noise* noises, std::size_t count) {
 }
 
 /// Objectives of a segment that is linearised, had the noise been another: to first order the filtered
-/// trajectory moves by what the other gains would have corrected.
+/// trajectory moves by what the other gains would have corrected. `States`: that the plant has.
+template <int States>
 Lanes objectives_with_noise(const std::vector<LinearStep>& steps, const Measurement& run, const Plant& plant,
                             const FilterNoise<Lanes>& noise) {
   EkfCovariance<Lanes> covariance(run, plant, noise);
   LikelihoodOf<Lanes> sum;
-  Lanes shift[state_count], moved[state_count], disturbance[LinearStep::disturbances];
+  Lanes shift[States], moved[States], disturbance[LinearStep::disturbances];
   for (std::size_t k = 0; k < steps.size(); ++k) {
     const LinearStep& step = steps[k];
     if (k > 0) {
@@ -59,23 +60,23 @@ Lanes objectives_with_noise(const std::vector<LinearStep>& steps, const Measurem
           disturbance[d] = keeps * disturbance[d];
         }
       }
-      for (int i = 0; i < state_count; ++i) {
+      for (int i = 0; i < States; ++i) {
         moved[i] = step.transition[i][0] * shift[0];
-        for (int j = 1; j < state_count; ++j) moved[i] += step.transition[i][j] * shift[j];
+        for (int j = 1; j < States; ++j) moved[i] += step.transition[i][j] * shift[j];
       }
-      std::copy(moved, moved + state_count, shift);
+      std::copy(moved, moved + States, shift);
     }
-    Lanes update[state_count];
+    Lanes update[States];
     for (int channel = 0; channel < 2; ++channel) {
       if (!covariance.present(channel)) continue;
       covariance.update(step, channel);
       const Lanes e = step.residual[channel] - step.gain[channel] * (shift[channel] + update[channel]);
       sum.add(e, covariance.variance(), step.weight[channel]);
-      for (int i = 0; i < state_count; ++i) update[i] += covariance.gain()[i] * e;
+      for (int i = 0; i < States; ++i) update[i] += covariance.gain()[i] * e;
       for (int d = 0; d < LinearStep::disturbances; ++d)
         disturbance[d] += covariance.gain()[state_count + d] * e;
     }
-    for (int i = 0; i < state_count; ++i) shift[i] += update[i] - Lanes(step.correction[i]);
+    for (int i = 0; i < States; ++i) shift[i] += update[i] - Lanes(step.correction[i]);
   }
   return sum.objective();
 }
@@ -321,9 +322,11 @@ std::vector<double> noise_objectives(const FitData& data, const Plant& plant,
     const FilterNoise<Lanes> together = noise_of_filters(noises.data() + first, count);
     std::vector<std::array<double, lane_count>> parts(data.segments.size());
     parallel_for(parts.size(), [&](std::size_t s) {
+      const auto objectives = estimated_states(plant) == state_count
+                                  ? objectives_with_noise<state_count>
+                                  : objectives_with_noise<LinearStep::rigid_states>;
       parts[s] =
-          objectives_with_noise(linearised[s].steps, (*data.runs)[data.segments[s].run], plant, together)
-              .values();
+          objectives(linearised[s].steps, (*data.runs)[data.segments[s].run], plant, together).values();
     });
     for (const auto& part : parts)
       for (std::size_t i = 0; i < count; ++i) sums[first + i] += part[i];

@@ -12,7 +12,17 @@ constexpr int state_count = LinearStep::states;
 
 template <class S>
 std::array<S*, state_count> as_array(PlantState<S>& s) {
-  return {&s.cart_m, &s.theta_rad, &s.cart_mps, &s.theta_radps, &s.bristle_m};
+  return {&s.cart_m, &s.theta_rad, &s.cart_mps, &s.theta_radps, &s.bristle_m, &s.sprung_m, &s.sprung_mps};
+}
+template <class S>
+std::array<const S*, state_count> as_array(const PlantState<S>& s) {
+  return {&s.cart_m, &s.theta_rad, &s.cart_mps, &s.theta_radps, &s.bristle_m, &s.sprung_m, &s.sprung_mps};
+}
+
+/// The number of states that the filter of a plant estimates: the first of them.
+inline int estimated_states(const Plant& plant) {
+  const bool sprung = plant.find(effect_index<effects::SprungMass>()) != nullptr;
+  return sprung ? state_count : LinearStep::rigid_states;
 }
 
 }  // namespace upright

@@ -16,8 +16,9 @@ namespace upright {
 namespace {
 
 constexpr int bristle_place = 4;
-constexpr int motor_place = 5;
-constexpr int state_places = 6;
+constexpr int sprung_place = 5;
+constexpr int motor_place = 7;
+constexpr int state_places = 8;
 using Dual = DualNumber<state_places>;
 using Slopes = Eigen::Matrix<double, state_places, state_places>;
 
@@ -30,7 +31,9 @@ PlantState<Dual> seeded_state(double side) {
           Dual(side * beside_a_kink, 2),
           Dual(side * beside_a_kink, 3),
           Dual(0.0, motor_place),
-          Dual(0.0, bristle_place)};
+          Dual(0.0, bristle_place),
+          Dual(0.0, sprung_place),
+          Dual(0.0, sprung_place + 1)};
 }
 
 struct Line {
@@ -44,8 +47,9 @@ Line line_of(const Dynamics<Dual>& dynamics) {
   for (const double side : {1.0, -1.0}) {
     const PlantState<Dual> state = seeded_state(side);
     const PlantState<Dual> rate = dynamics.derivative(state, state.motor_v, Contacts{});
-    const std::array<const Dual*, 5> rows = {&rate.cart_m, &rate.theta_rad, &rate.cart_mps, &rate.theta_radps,
-                                             &rate.bristle_m};
+    const std::array<const Dual*, motor_place> rows = {&rate.cart_m,      &rate.theta_rad, &rate.cart_mps,
+                                                       &rate.theta_radps, &rate.bristle_m, &rate.sprung_m,
+                                                       &rate.sprung_mps};
     for (std::size_t row = 0; row < rows.size(); ++row) {
       for (int place = 0; place < state_places; ++place)
         line.slopes(static_cast<Eigen::Index>(row), place) += 0.5 * rows[row]->v[place];
@@ -66,6 +70,10 @@ std::vector<Place> places_of(const Dynamics<Dual>& dynamics) {
     if (dynamics.has_pendulum() || i % 2 == 0)
       places.push_back({i, std::string(fed_back_names[static_cast<std::size_t>(i)])});
   if (dynamics.has_bristle_state()) places.push_back({bristle_place, "bristle_m"});
+  if (dynamics.has_sprung_mass()) {
+    places.push_back({sprung_place, "sprung_m"});
+    places.push_back({sprung_place + 1, "sprung_mps"});
+  }
   if (dynamics.has_motor_lag()) places.push_back({motor_place, "motor_v"});
   return places;
 }
@@ -127,6 +135,16 @@ Plant sliding_plant(const Plant& plant) {
   std::erase_if(sliding.effects, is_dry);
   sliding.remove(effect_number("bristle_friction"));
   return sliding;
+}
+
+Plant with_sprung_mass_fixed(Plant plant) {
+  const std::size_t sprung = effect_index<effects::SprungMass>();
+  if (const PlantEffect* found = plant.find(sprung); found != nullptr) {
+    const double corrected = make_model<double>(plant).corrected().cart_mass_kg / plant.cart_mass_kg;
+    plant.cart_mass_kg += effects::SprungMass::sprung_mass_kg(found->values.data()) / corrected;
+    plant.remove(sprung);
+  }
+  return plant;
 }
 
 SampledPlant hold_input(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b, double duration_s) {

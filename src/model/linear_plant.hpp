@@ -19,7 +19,8 @@ constexpr std::array<std::string_view, fed_back_count> fed_back_names = {
     "cart_m", "theta_rad", "cart_velocity_mps", "pendulum_rate_radps"};
 
 /// n states in SI units: cart_m, theta_rad, cart_velocity_mps, pendulum_rate_radps (without a pendulum
-/// the two of the cart only), then bristle_m and motor_v where the plant has them. The sensors show scale
+/// the two of the cart only), then bristle_m, sprung_m and sprung_mps, and motor_v where the plant has them.
+/// The sensors show scale
 /// * state + offset of the fed-back states.
 struct LinearPlant {
   std::vector<std::string> states;    ///< names, n
@@ -42,6 +43,10 @@ LinearPlant linearize(const Plant& plant, double smoothing);
 /// The plant while it slides in one direction. Dry levels do not affect the slopes, so they and their
 /// bristles are removed. Valid for motions far larger than the stick-slip band.
 Plant sliding_plant(const Plant& plant);
+
+/// The plant with its sprung mass bolted to the cart, as slow motions see it: for feedback and observers,
+/// whose gains and states are those of the rigid cart.
+Plant with_sprung_mass_fixed(Plant plant);
 
 /// x(t + duration) = a x(t) + b u for an input that is constant over the duration; exact.
 struct SampledPlant {

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <functional>
 #include <map>
+#include <numbers>
 #include <set>
 #include <string>
 
@@ -128,6 +129,25 @@ const std::map<std::string, std::function<void()>>& answers() {
          const Physics cart(make_model<double>(plant));
          EXPECT_NEAR(cart.derivative(s, 0.0, {}).cart_mps,
                      (-7.682 * 0.2 - 121.0 * 0.001 - 70.0 * rate) / 0.815, 1e-12);
+       }},
+      {"sprung_mass",
+       [] {
+         Plant plant = paper_plant();
+         plant.set("sprung_mass", {0.2, 3.0, 0.1});
+         plant.pendulum.reset();
+         const Physics p(make_model<double>(plant));
+         EXPECT_TRUE(p.has_sprung_mass());
+         PlantState<double> s;
+         s.cart_mps = 0.2;
+         s.sprung_m = 0.01;
+         s.sprung_mps = -0.05;
+         const double w = 2.0 * std::numbers::pi * 3.0;
+         const double pull_mps2 = w * w * 0.01 - 2.0 * 0.1 * w * 0.05;
+         const double cart_mps2 = (0.2 * pull_mps2 - 7.682 * 0.2) / 0.815;
+         const PlantState<double> rate = p.derivative(s, 0.0, {});
+         EXPECT_NEAR(rate.cart_mps, cart_mps2, 1e-12);
+         EXPECT_DOUBLE_EQ(rate.sprung_m, -0.05);
+         EXPECT_NEAR(rate.sprung_mps, -pull_mps2 - cart_mps2, 1e-12);
        }},
       {"quadratic_drag",
        [] { EXPECT_NEAR(cart_force(with("quadratic_drag", {2.0}), 0.0, -0.5), 0.5, 1e-12); }},
@@ -269,7 +289,7 @@ INSTANTIATE_TEST_SUITE_P(All, Effect, testing::Range(std::size_t{0}, effect_coun
 });
 
 TEST(Registry, IsWhole) {
-  EXPECT_EQ(effect_count, 33u);
+  EXPECT_EQ(effect_count, 34u);
   std::set<std::string_view> kinds;
   std::size_t offset = 0;
   for (std::size_t i = 0; i < effect_count; ++i) {

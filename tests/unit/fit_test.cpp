@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "blind_case.hpp"
 
@@ -38,6 +39,42 @@ TEST(Fit, TakesSlidingWhereTheModelRestsForAForce) {
   EXPECT_LT(noise.sensors, 1.5);
   EXPECT_GT(noise.force, 0.01);
   EXPECT_LT(noise.force, 1.0);
+}
+
+TEST(Fit, FindsASprungMassFromAGuess) {
+  Plant plant = cart_alone();
+  plant.set("coulomb_friction", {0.3});
+  const double truth[] = {0.15, 5.0, 0.08};
+  plant.set("sprung_mass", {truth[0], truth[1], truth[2]});
+  const blind::Rig rig{.plant = plant};
+  std::vector<Measurement> runs;
+  for (const blind::Experiment experiment : {blind::Experiment::square, blind::Experiment::multisine}) {
+    blind::Plan plan;
+    plan.experiment = experiment;
+    plan.rate_hz = 500.0;
+    plan.duration_s = 6.0;
+    plan.amplitude_v = 3.0;
+    runs.push_back(measure(rig, plan, "run"));
+  }
+  plant.set("sprung_mass", {0.1, 5.6, 0.04});
+  const FitData data{&runs, cut_segments(runs)};
+  std::vector<FreeParameter> free(3);
+  for (std::size_t i = 0; i < free.size(); ++i) {
+    free[i].effect = effect_index<effects::SprungMass>();
+    free[i].index = i;
+    free[i].low = 1e-4;
+    free[i].high = 100.0;
+    free[i].scale = 0.3 * truth[i];
+  }
+  const FitPoint start{plant, estimate_initial_states(runs, data.segments, plant), {.force = 0.1}};
+  const FitResult found = fit(data, start, free);
+  EXPECT_LT(whitened_rms(found), 1.2);
+  for (std::size_t i = 0; i < free.size(); ++i) {
+    const double value = found.point.plant.find(free[i].effect)->values[i];
+    const auto at = static_cast<Eigen::Index>(i);
+    EXPECT_NEAR(value, truth[i], 4.0 * std::sqrt(found.covariance(at, at))) << i;
+    EXPECT_NEAR(value, truth[i], 0.1 * truth[i]) << i;
+  }
 }
 
 TEST(Fit, BeginsAfterAGapOnceTheMotorsLagHasForgottenIt) {
@@ -89,6 +126,7 @@ TEST(Fit, FailsWithMoreParametersThanItCanFree) {
   for (std::size_t effect = 0; free.size() <= max_free_parameters; ++effect) {
     const EffectInfo& info = effect_registry()[effect];
     if (info.enters != Enters::cart || plant.find(effect) != nullptr) continue;
+    if (effect == effect_index<effects::SprungMass>()) continue;  // its states leave less room
     std::vector<double> values;
     for (std::size_t i = 0; i < info.parameters.size(); ++i) {
       values.push_back(info.parameters[i].typical);
@@ -104,6 +142,11 @@ TEST(Fit, FailsWithMoreParametersThanItCanFree) {
   EXPECT_EQ(of_too_many.covariance.rows(), static_cast<Eigen::Index>(free.size()));
   free.resize(max_free_parameters);
   EXPECT_TRUE(std::isfinite(fit(data, start, free, quick).objective));
+  FitPoint with_two_states = start;
+  with_two_states.plant.set("sprung_mass", {0.1, 5.0, 0.05});
+  EXPECT_TRUE(std::isinf(fit(data, with_two_states, free, quick).objective));
+  free.resize(max_free_parameters - 2);
+  EXPECT_TRUE(std::isfinite(fit(data, with_two_states, free, quick).objective));
 }
 
 TEST(Fit, FindsTheMostLikelyNoise) {

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Eigenvalues>
+#include <numbers>
 #include <random>
 
 #include "model/dense_algebra.hpp"
@@ -31,6 +32,36 @@ TEST(GainDesign, GivesThePapersExponentialGain) {
 
 TEST(GainDesign, GivesTheViscousGain) {
   expect_gains(design_gains(plant_named("viscous"), {}, 100.0), {70.7107, 143.2162, 51.3919, 27.1288});
+}
+
+TEST(GainDesign, TakesASprungMassAsFixedAndShowsItsPoles) {
+  Plant plant = plant_named("viscous"), fixed = plant;
+  plant.set("sprung_mass", {0.1, 6.0, 0.05});
+  fixed.cart_mass_kg += 0.1;
+  const GainDesign design = design_gains(plant, {}, 100.0), of_fixed = design_gains(fixed, {}, 100.0);
+  EXPECT_EQ(design.gains, of_fixed.gains);
+  EXPECT_EQ(design.closed_loop_poles.size(), of_fixed.closed_loop_poles.size() + 2);
+  for (const auto& pole : design.closed_loop_poles) EXPECT_LT(pole.real(), 0.0);
+  ASSERT_FALSE(design.notes.empty());
+  EXPECT_NE(design.notes.back().find("sprung_mass"), std::string::npos);
+}
+
+// Two bodies on one spring swing faster than the mass on a cart at rest.
+TEST(LinearPlant, HasTheSwingOfASprungMass) {
+  Plant plant = plant_named("viscous");
+  plant.pendulum.reset();
+  plant.effects.clear();
+  plant.motor.back_emf_n_per_mps = 0.0;
+  constexpr double sprung_kg = 0.2, frequency_hz = 4.0, damping_ratio = 0.05;
+  plant.set("sprung_mass", {sprung_kg, frequency_hz, damping_ratio});
+  const LinearPlant linear = linearize(plant, 100.0);
+  EXPECT_EQ(linear.states,
+            (std::vector<std::string>{"cart_m", "cart_velocity_mps", "sprung_m", "sprung_mps"}));
+  const double both = 1.0 + sprung_kg / plant.cart_mass_kg;
+  const double radps = 2.0 * std::numbers::pi * frequency_hz * std::sqrt(both);
+  const Eigen::VectorXcd poles = eigenvalues(linear.a);
+  EXPECT_NEAR(poles.cwiseAbs().maxCoeff(), radps, 1e-9 * radps);
+  EXPECT_NEAR(poles.real().minCoeff(), -damping_ratio * std::sqrt(both) * radps, 1e-9 * radps);
 }
 
 TEST(GainDesign, EliminatesTheBristleThatTheVoltageCannotMoveAlone) {

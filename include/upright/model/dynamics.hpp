@@ -45,6 +45,7 @@ class Dynamics {
       using E = EffectAt<I>;
       if (!present_.template has<I>()) return;
       if constexpr (has_bristles<E, S>) bristles_ = true;
+      if constexpr (upright::has_sprung_mass<E, S>) sprung_ = true;
       if constexpr (has_cart_level<E, S>) cart_dry_ = cart_dry_ || acts_as_cart_level<E>(p<I>());
       if constexpr (has_level_of_time<E, S>) cart_dry_ = changes_with_time_ = true;
       if constexpr (has_level_of_load<E, S>) cart_dry_ = depends_on_load_ = true;
@@ -70,6 +71,7 @@ class Dynamics {
   bool pivot_has_kink() const { return pivot_can_stick() || pivot_kink_; }
   bool has_motor_lag() const { return lag_; }                ///< whether `motor_v` is a state
   bool has_bristle_state() const { return bristles_; }       ///< whether `bristle_m` is a state
+  bool has_sprung_mass() const { return sprung_; }           ///< whether `sprung_m` is a state
   bool has_pendulum() const { return model_.has_pendulum; }  ///< false: the cart is alone
   bool cart_locked() const { return model_.cart_locked; }    ///< true: only the pendulum moves
 
@@ -164,7 +166,7 @@ class Dynamics {
   /// Force of the motor including back-EMF [N].
   S motor_force(const PlantState<S>& state, const S& motor_v) const { return motor_force_of(state, motor_v); }
 
-  /// The motor force and all smooth forces on the cart, without dry friction and bristles.
+  /// All smooth forces on the cart, with those of the motor and a sprung mass, without bristles.
   S cart_smooth_force(const PlantState<S>& state, const S& motor_v) const {
     return smooth_force(state, motor_v);
   }
@@ -193,6 +195,7 @@ class Dynamics {
     accelerate(state, force, torque, cart_rests, pivot_rests, rate);
     rate.cart_m = cart_rests ? S(0.0) : state.cart_mps;
     rate.theta_rad = pivot_rests ? S(0.0) : state.theta_radps;
+    if (sprung_) move_sprung_mass(state, rate);
     return rate;
   }
 
@@ -284,17 +287,6 @@ class Dynamics {
   PlantState<S> derivative_by_direction(const PlantState<S>& state, const S& motor_v,
                                         const S& direction) const {
     return derivative_by_direction(state, cart_balance(state, motor_v), direction);
-  }
-
-  /// Whether the motion of a sliding cart is analytic in time, as far as its effects say that.
-  bool has_short_series() const {
-    bool all = true;
-    for_each_effect([&]<std::size_t I>() {
-      using E = EffectAt<I>;
-      if constexpr (requires { E::has_short_series(p<I>()); })
-        if (present_.template has<I>()) all = all && E::has_short_series(p<I>());
-    });
-    return all;
   }
 
   /// By how much a step of 1 ms by a Taylor series of order 4 may change the velocity of the cart [m/s].
@@ -480,6 +472,9 @@ class Dynamics {
       using E = EffectAt<I>;
       if constexpr (may_have<I>() && requires { E::cart_force(p<I>(), S(), S()); })
         if (present_.template has<I>()) force = force + E::cart_force(p<I>(), state.cart_m, state.cart_mps);
+      if constexpr (may_have<I>() && upright::has_sprung_mass<E, S>)
+        if (present_.template has<I>())
+          force = force + E::sprung_force_n(p<I>(), state.sprung_m, state.sprung_mps);
     });
     return force;
   }
@@ -493,6 +488,17 @@ class Dynamics {
         if (present_.template has<I>()) torque = torque + E::pivot_torque(p<I>(), omega);
     });
     return torque;
+  }
+
+  void move_sprung_mass(const PlantState<S>& state, PlantState<S>& rate) const {
+    const S& q = state.sprung_m;
+    rate.sprung_m = state.sprung_mps;
+    for_each_effect([&]<std::size_t I>() {
+      using E = EffectAt<I>;
+      if constexpr (may_have<I>() && upright::has_sprung_mass<E, S>)
+        if (present_.template has<I>())
+          rate.sprung_mps = -E::sprung_pull_mps2(p<I>(), q, state.sprung_mps) - rate.cart_mps;
+    });
   }
 
   S drive_deflection_m(const PlantState<S>& state) const {
@@ -587,8 +593,8 @@ class Dynamics {
   S total_mass_, coupling_, gravity_torque_;
   Divisor<S> inertia_{S(1.0)}, mass_{S(1.0)};  ///< about the pivot, and of both bodies
   S level_of_time_{0.0};                       ///< of the cart's dry friction at the time that was set
-  bool bristles_ = false, cart_dry_ = false, pivot_dry_ = false, cart_kink_ = false, pivot_kink_ = false,
-       lag_ = false, changes_with_time_ = false, depends_on_load_ = false;
+  bool bristles_ = false, sprung_ = false, cart_dry_ = false, pivot_dry_ = false, cart_kink_ = false,
+       pivot_kink_ = false, lag_ = false, changes_with_time_ = false, depends_on_load_ = false;
 };
 
 }  // namespace upright

@@ -1,4 +1,4 @@
-// Which hooks of dry friction an effect E has, for numbers S (effect.hpp).
+// Which hooks of dry friction and of states of its own an effect E has, for numbers S (effect.hpp).
 #pragma once
 
 namespace upright {
@@ -36,6 +36,11 @@ constexpr bool has_pivot_level = requires(const S* p) {
 template <class E, class S>
 constexpr bool has_bristles = requires(const S* p) {
   E::bristle_stiffness(p);
+};
+/// A mass on a spring, with states of its own.
+template <class E, class S>
+constexpr bool has_sprung_mass = requires(const S* p) {
+  E::sprung_mass_kg(p);
 };
 
 }  // namespace upright

@@ -5,7 +5,8 @@
 
 namespace upright {
 
-/// State of the plant. `motor_v` is used with motor_lag only, `bristle_m` with bristle_friction only.
+/// State of the plant. `motor_v` is used with motor_lag only, `bristle_m` with bristle_friction only,
+/// `sprung_m` and `sprung_mps` with sprung_mass only.
 template <class S>
 struct PlantState {
   S cart_m{};       ///< position of the cart [m]
@@ -14,6 +15,8 @@ struct PlantState {
   S theta_radps{};  ///< rate of the pendulum [rad/s]
   S motor_v{};      ///< motor voltage after the motor lag [V]
   S bristle_m{};    ///< deflection of the bristles [m]
+  S sprung_m{};     ///< position of the sprung mass relative to the cart, 0 at rest [m]
+  S sprung_mps{};   ///< velocity of the sprung mass relative to the cart [m/s]
 };
 
 /// Mode of a contact with dry friction: sticking, or sliding in one direction.

@@ -202,8 +202,8 @@ class EventEngine {
     if (value_of(state.theta_radps) != 0.0) contacts_.pivot = direction_of(value_of(state.theta_radps));
   }
   /// Replaces the derivatives of the state (dual numbers only) by the identity, in the order x, theta, v,
-  /// omega, bristle; no parameter may use these places. Coordinates that cannot move have none, nor has
-  /// the velocity of a sticking contact, where an impulse has no effect.
+  /// omega, bristle, and a sprung mass if there is one; no parameter may use these places. What cannot move
+  /// has none, nor has the velocity of a sticking contact, where an impulse has no effect.
   void seed() requires(!std::is_same_v<S, double>) {
     const bool cart = !dynamics_.cart_locked(), pendulum = dynamics_.has_pendulum();
     const auto set = [](S& number, int place, bool moves) {
@@ -215,6 +215,8 @@ class EventEngine {
     set(state_.cart_mps, 2, cart && !cart_at_rest());
     set(state_.theta_radps, 3, pendulum && !pivot_at_rest());
     set(state_.bristle_m, 4, dynamics_.has_bristle_state());
+    set(state_.sprung_m, 5, dynamics_.has_sprung_mass());
+    set(state_.sprung_mps, 6, dynamics_.has_sprung_mass());
     seeded_ = true;
   }
   Contacts contacts() const { return contacts_; }  ///< the modes of the contacts now
@@ -235,9 +237,9 @@ class EventEngine {
   std::uint64_t step_count() const { return step_count_; }
 
  private:
-  static constexpr double min_lag_s = 1e-6;
-  static constexpr double smallest_step_s = 1e-13;
-  static constexpr double max_rate_radps = 2e6;
+  static constexpr MotorVoltage held_v = MotorVoltage::held, driven_v = MotorVoltage::moves;
+  static constexpr SprungMass sprung = SprungMass::possible;
+  static constexpr double min_lag_s = 1e-6, smallest_step_s = 1e-13, max_rate_radps = 2e6;
 
   struct Found {
     Watch watch;
@@ -357,13 +359,14 @@ class EventEngine {
     const PlantState<T> k1 = known ? **begin : dynamics.derivative(s, begin_v, contacts_);
     if (begin != nullptr) *begin = k1;
     const std::optional<Relaxation<T>> bristles = relaxation_over(h);
-    PlantState<T> end = runge_kutta_4(rate, s, k1, h, bristles ? &*bristles : nullptr);
+    PlantState<T> end = runge_kutta_4<held_v, sprung>(rate, s, k1, h, bristles ? &*bristles : nullptr);
     end.motor_v = lagged ? lagged->after_v : drive;
     return end;
   }
 
   bool linearises_in_middle() const {
-    return !std::is_same_v<S, double> && options_.quick_derivatives && !dynamics_.has_bristle_state();
+    if (dynamics_.has_bristle_state() || dynamics_.has_sprung_mass()) return false;
+    return !std::is_same_v<S, double> && options_.quick_derivatives;
   }
 
   LinearisedStep<S> linearised() const {
@@ -421,7 +424,7 @@ class EventEngine {
     const PlantState<double> s = plain_state(state_);
     DrivenStep step{driven_rate(command, lag, time_s_, s), {}};
     const std::optional<Relaxation<double>> bristles = relaxation_over(h);
-    step.end = runge_kutta_4<MotorVoltage::moves>(rate, s, step.first, h, bristles ? &*bristles : nullptr);
+    step.end = runge_kutta_4<driven_v, sprung>(rate, s, step.first, h, bristles ? &*bristles : nullptr);
     if (!lag) step.end.motor_v = plain_.actuate(command(time_s_ + h, step.end));
     return step;
   }
@@ -442,12 +445,10 @@ class EventEngine {
       dense.factor[2].*of = (3.0 * rise - 2.0 * (step.first.*of) - last.*of) / h;
       dense.factor[3].*of = (step.first.*of + last.*of - 2.0 * rise) / (h * h);
     };
-    cubic(&PlantState<double>::cart_m);
-    cubic(&PlantState<double>::theta_rad);
-    cubic(&PlantState<double>::cart_mps);
-    cubic(&PlantState<double>::theta_radps);
-    cubic(&PlantState<double>::motor_v);
-    cubic(&PlantState<double>::bristle_m);
+    using Plain = PlantState<double>;
+    for (double Plain::*of : {&Plain::cart_m, &Plain::theta_rad, &Plain::cart_mps, &Plain::theta_radps,
+                              &Plain::motor_v, &Plain::bristle_m, &Plain::sprung_m, &Plain::sprung_mps})
+      cubic(of);
     return dense;
   }
 
@@ -514,7 +515,7 @@ class EventEngine {
   template <class T>
   PlantState<T> moved_on(const Dynamics<T>& dynamics, const PlantState<T>& at, const PlantState<T>& rate,
                          const T& drive, const T& shift_s) const {
-    PlantState<T> to = moved(at, rate, shift_s);
+    PlantState<T> to = moved<held_v, sprung>(at, rate, shift_s);
     if (dynamics.has_motor_lag())
       to.motor_v = at.motor_v + shift_s * (drive - at.motor_v) / dynamics.motor_time_constant_s();
     return to;

@@ -27,6 +27,7 @@
 #include "upright/model/effects/pivot_viscous_friction.hpp"
 #include "upright/model/effects/position_dependent_friction.hpp"
 #include "upright/model/effects/quadratic_drag.hpp"
+#include "upright/model/effects/sprung_mass.hpp"
 #include "upright/model/effects/stribeck_friction.hpp"
 #include "upright/model/effects/torque_ripple.hpp"
 #include "upright/model/effects/viscous_asymmetry.hpp"
@@ -54,6 +55,7 @@ using AllEffects =
                effects::QuadraticDrag,
                effects::ConstantForce,
                effects::CableSpring,
+               effects::SprungMass,
                effects::CoggingForce,
                effects::TorqueRipple,
                effects::VoltageSaturation,
