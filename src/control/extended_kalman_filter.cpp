@@ -2,15 +2,12 @@
 
 #include <cmath>
 
-#include "model/linear_plant.hpp"
-
 namespace upright {
 
 namespace {
 
 /// The engine gets the voltage behind the static chain and the delay, which the filter follows itself.
-Plant without_static_actuator(const Plant& of) {
-  Plant plant = with_sprung_mass_fixed(of);
+Plant without_static_actuator(Plant plant) {
   const std::size_t lag = effect_number("motor_lag");
   for (std::size_t effect = 0; effect < effect_count; ++effect)
     if (effect_registry()[effect].enters == Enters::actuator && effect != lag) plant.remove(effect);

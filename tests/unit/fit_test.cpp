@@ -19,20 +19,27 @@ Plant cart_alone() {
   return plant;
 }
 
+/// A run of each, of this length and with this amplitude of the voltage.
+std::vector<Measurement> square_and_multisine(const blind::Rig& rig, double rate_hz, double duration_s,
+                                              double amplitude_v) {
+  std::vector<Measurement> runs;
+  for (const blind::Experiment experiment : {blind::Experiment::square, blind::Experiment::multisine}) {
+    blind::Plan plan;
+    plan.experiment = experiment;
+    plan.rate_hz = rate_hz;
+    plan.duration_s = duration_s;
+    plan.amplitude_v = amplitude_v;
+    runs.push_back(measure(rig, plan, "run"));
+  }
+  return runs;
+}
+
 TEST(Fit, TakesSlidingWhereTheModelRestsForAForce) {
   Plant believed = cart_alone();
   believed.set("coulomb_friction", {0.41});
   blind::Rig rig{.plant = believed};
   rig.plant.set("constant_force", {0.55});
-  std::vector<Measurement> runs;
-  for (const blind::Experiment experiment : {blind::Experiment::square, blind::Experiment::multisine}) {
-    blind::Plan plan;
-    plan.experiment = experiment;
-    plan.rate_hz = 250.0;
-    plan.duration_s = 8.0;
-    plan.amplitude_v = 0.5;
-    runs.push_back(measure(rig, plan, "run"));
-  }
+  const std::vector<Measurement> runs = square_and_multisine(rig, 250.0, 8.0, 0.5);
   const FitData data{&runs, cut_segments(runs)};
   const FitPoint start{believed, estimate_initial_states(runs, data.segments, believed), {.force = 0.1}};
   const Noise noise = fit(data, start, {}).point.noise;
@@ -47,15 +54,7 @@ TEST(Fit, FindsASprungMassFromAGuess) {
   const double truth[] = {0.15, 5.0, 0.08};
   plant.set("sprung_mass", {truth[0], truth[1], truth[2]});
   const blind::Rig rig{.plant = plant};
-  std::vector<Measurement> runs;
-  for (const blind::Experiment experiment : {blind::Experiment::square, blind::Experiment::multisine}) {
-    blind::Plan plan;
-    plan.experiment = experiment;
-    plan.rate_hz = 500.0;
-    plan.duration_s = 6.0;
-    plan.amplitude_v = 3.0;
-    runs.push_back(measure(rig, plan, "run"));
-  }
+  const std::vector<Measurement> runs = square_and_multisine(rig, 500.0, 6.0, 3.0);
   plant.set("sprung_mass", {0.1, 5.6, 0.04});
   const FitData data{&runs, cut_segments(runs)};
   std::vector<FreeParameter> free(3);
