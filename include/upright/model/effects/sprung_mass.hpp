@@ -12,7 +12,7 @@ namespace upright::effects {
 struct SprungMass {
   /// Its parameters, in the order of a plant file.
   static constexpr ParameterInfo parameters[] = {
-      {"mass_kg", "kg", Range::not_negative(), 0.0, 0.1, "m: in addition to the cart's own mass"},
+      {"sprung_mass_kg", "kg", Range::not_negative(), 0.0, 0.1, "m: in addition to the cart's own mass"},
       {"frequency_hz", "Hz", Range::positive(), no_neutral, 5.0, "f: at which it swings on a cart at rest"},
       {"damping_ratio", "1", Range::not_negative(), no_neutral, 0.05, "d: 1 is critical damping"},
   };
