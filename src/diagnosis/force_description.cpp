@@ -228,7 +228,7 @@ std::vector<FreeParameter> free_beside(const Search& search, const Hypothesis& h
   std::vector<FreeParameter> free;
   for (const FreeParameter& p : h.free)
     if (!search.is_nuisance(p.effect)) free.push_back(p);
-  if (free.size() + Table::node_count > max_free_parameters) free.clear();
+  if (free.size() + Table::node_count > max_free_parameters(h.train.point.plant)) free.clear();
   const double scale_n = std::max(curve.force_n.cwiseAbs().maxCoeff(), 1e-9);
   const double low_n = curve.over == Table::position_and_direction ? 0.0 : -unbounded;
   for (std::size_t i = 0; i < Table::node_count; ++i)

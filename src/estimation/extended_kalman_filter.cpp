@@ -136,24 +136,17 @@ void EkfCovariance<S>::correct(double c, int channel, const S& variance) {
 template <class S>
 template <class Step>
 void EkfCovariance<S>::propagate(const Step& step) {
-  const bool sprung = states_ == most_states;
-  if (noise_.disturbed)
-    return sprung ? carry_disturbed<most_states>(step) : carry_disturbed<rigid_states>(step);
-  if (sprung) return carry<most_states>(step);
-  bristles_ ? carry<rigid_states>(step) : carry<rigid_states - 1>(step);
+  states_ == most_states ? propagate_states<most_states>(step) : propagate_states<rigid_states>(step);
 }
 
 template <class S>
 template <int States, class Step>
-void EkfCovariance<S>::carry_disturbed(const Step& step) {
-  push_by_disturbances<States>(step);
-  // A fifth state that the plant does not have has no covariances.
-  if constexpr (States == rigid_states) {
-    bristles_ ? carry<States>(step) : carry<States - 1>(step);
-  } else {
-    carry<States>(step);
-  }
-  decay_disturbances<States>(step);
+void EkfCovariance<S>::propagate_states(const Step& step) {
+  // A fifth state that a plant without bristles does not have, as the last one, has no covariances.
+  constexpr int without_bristles = States == rigid_states ? States - 1 : States;
+  if (noise_.disturbed) push_by_disturbances<States>(step);
+  bristles_ ? carry<States>(step) : carry<without_bristles>(step);
+  if (noise_.disturbed) decay_disturbances<States>(step);
 }
 
 /// The velocities change by what the disturbances push: P goes to M P M', where M adds their impulses.

@@ -83,7 +83,7 @@ class EkfCovariance {
   template <int States, class Step>
   void carry(const Step& step);
   template <int States, class Step>
-  void carry_disturbed(const Step& step);
+  void propagate_states(const Step& step);
   template <class Step>
   void propagate(const Step& step);
   template <int States, class Step>

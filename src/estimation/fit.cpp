@@ -110,10 +110,14 @@ FitResult failed_at(const FitPoint& start, std::size_t segments, std::size_t fre
 
 }  // namespace
 
+std::size_t max_free_parameters(const Plant& plant) {
+  return max_derivatives - static_cast<std::size_t>(estimated_states(plant));
+}
+
 FitResult fit(const FitData& data, const FitPoint& start, const std::vector<FreeParameter>& free,
               const FitOptions& options) {
   if (data.bound != nullptr) data.bound->check();
-  if (free.size() + static_cast<std::size_t>(estimated_states(start.plant)) > max_derivatives)
+  if (free.size() > max_free_parameters(start.plant))
     return failed_at(start, data.segments.size(), free.size());
   GaussNewton solver(data, start, free, options);
   iterate(data, options, solver);

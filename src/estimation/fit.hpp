@@ -89,10 +89,10 @@ struct FitOptions {
 
 /// The most derivatives that a fit takes: with respect to the states of the plant and the free parameters.
 inline constexpr std::size_t max_derivatives = 32;
-/// The most parameters that a fit can free. With a sprung mass, which has two states, two fewer.
-inline constexpr std::size_t max_free_parameters = max_derivatives - LinearStep::rigid_states;
+/// The most parameters that a fit of this plant can free.
+std::size_t max_free_parameters(const Plant& plant);
 
-/// Fits a plant. The objective of a failed fit is infinite; with more free parameters than it can have it
+/// Fits a plant. The objective of a failed fit is infinite; with more free parameters than that it
 /// fails. Throws only Interrupted (parallel.hpp), and BoundReached if the bound of the data was reached
 /// beforehand. A fit that reaches the bound returns its present point.
 FitResult fit(const FitData& data, const FitPoint& start, const std::vector<FreeParameter>& free,

@@ -403,7 +403,6 @@ void linearise_segment(const FitData& data, std::size_t s, const FitPoint& point
   if (slots <= 8) return with.template operator()<8>();
   if (slots <= 16) return with.template operator()<16>();
   if (slots <= 24) return with.template operator()<24>();
-  static_assert(max_derivatives == 32);
   return with.template operator()<max_derivatives>();
 }
 

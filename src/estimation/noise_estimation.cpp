@@ -316,15 +316,15 @@ class PatternSearch {
 std::vector<double> noise_objectives(const FitData& data, const Plant& plant,
                                      const std::vector<LinearisedSegment>& linearised,
                                      const std::vector<Noise>& noises) {
+  const auto objectives = estimated_states(plant) == state_count
+                              ? objectives_with_noise<state_count>
+                              : objectives_with_noise<LinearStep::rigid_states>;
   std::vector<double> sums(noises.size(), 0.0);
   for (std::size_t first = 0; first < noises.size(); first += lane_count) {
     const std::size_t count = std::min(lane_count, noises.size() - first);
     const FilterNoise<Lanes> together = noise_of_filters(noises.data() + first, count);
     std::vector<std::array<double, lane_count>> parts(data.segments.size());
     parallel_for(parts.size(), [&](std::size_t s) {
-      const auto objectives = estimated_states(plant) == state_count
-                                  ? objectives_with_noise<state_count>
-                                  : objectives_with_noise<LinearStep::rigid_states>;
       parts[s] =
           objectives(linearised[s].steps, (*data.runs)[data.segments[s].run], plant, together).values();
     });

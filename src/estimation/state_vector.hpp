@@ -10,12 +10,9 @@ namespace upright {
 
 constexpr int state_count = LinearStep::states;
 
-template <class S>
-std::array<S*, state_count> as_array(PlantState<S>& s) {
-  return {&s.cart_m, &s.theta_rad, &s.cart_mps, &s.theta_radps, &s.bristle_m, &s.sprung_m, &s.sprung_mps};
-}
-template <class S>
-std::array<const S*, state_count> as_array(const PlantState<S>& s) {
+/// Pointers to the numbers of a state, constant or not.
+template <class State>
+auto as_array(State& s) -> std::array<decltype(&s.cart_m), state_count> {
   return {&s.cart_m, &s.theta_rad, &s.cart_mps, &s.theta_radps, &s.bristle_m, &s.sprung_m, &s.sprung_mps};
 }
 

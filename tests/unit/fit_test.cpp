@@ -122,7 +122,7 @@ TEST(Fit, FailsWithMoreParametersThanItCanFree) {
   const std::vector<Measurement> runs = {measure({.plant = plant}, plan, "run")};
   const FitData data{&runs, cut_segments(runs)};
   std::vector<FreeParameter> free;
-  for (std::size_t effect = 0; free.size() <= max_free_parameters; ++effect) {
+  for (std::size_t effect = 0; free.size() <= max_free_parameters(cart_alone()); ++effect) {
     const EffectInfo& info = effect_registry()[effect];
     if (info.enters != Enters::cart || plant.find(effect) != nullptr) continue;
     if (effect == effect_index<effects::SprungMass>()) continue;  // its states leave less room
@@ -139,12 +139,12 @@ TEST(Fit, FailsWithMoreParametersThanItCanFree) {
   const FitResult of_too_many = fit(data, start, free, quick);
   EXPECT_TRUE(std::isinf(of_too_many.objective));
   EXPECT_EQ(of_too_many.covariance.rows(), static_cast<Eigen::Index>(free.size()));
-  free.resize(max_free_parameters);
+  free.resize(max_free_parameters(cart_alone()));
   EXPECT_TRUE(std::isfinite(fit(data, start, free, quick).objective));
   FitPoint with_two_states = start;
   with_two_states.plant.set("sprung_mass", {0.1, 5.0, 0.05});
   EXPECT_TRUE(std::isinf(fit(data, with_two_states, free, quick).objective));
-  free.resize(max_free_parameters - 2);
+  free.resize(max_free_parameters(cart_alone()) - 2);
   EXPECT_TRUE(std::isfinite(fit(data, with_two_states, free, quick).objective));
 }
 

@@ -237,7 +237,7 @@ class EventEngine {
   std::uint64_t step_count() const { return step_count_; }
 
  private:
-  static constexpr MotorVoltage held_v = MotorVoltage::held, driven_v = MotorVoltage::moves;
+  static constexpr MotorVoltage held_voltage = MotorVoltage::held, moving_voltage = MotorVoltage::moves;
   static constexpr SprungMass sprung = SprungMass::possible;
   static constexpr double min_lag_s = 1e-6, smallest_step_s = 1e-13, max_rate_radps = 2e6;
 
@@ -359,7 +359,7 @@ class EventEngine {
     const PlantState<T> k1 = known ? **begin : dynamics.derivative(s, begin_v, contacts_);
     if (begin != nullptr) *begin = k1;
     const std::optional<Relaxation<T>> bristles = relaxation_over(h);
-    PlantState<T> end = runge_kutta_4<held_v, sprung>(rate, s, k1, h, bristles ? &*bristles : nullptr);
+    PlantState<T> end = runge_kutta_4<held_voltage, sprung>(rate, s, k1, h, bristles ? &*bristles : nullptr);
     end.motor_v = lagged ? lagged->after_v : drive;
     return end;
   }
@@ -424,7 +424,7 @@ class EventEngine {
     const PlantState<double> s = plain_state(state_);
     DrivenStep step{driven_rate(command, lag, time_s_, s), {}};
     const std::optional<Relaxation<double>> bristles = relaxation_over(h);
-    step.end = runge_kutta_4<driven_v, sprung>(rate, s, step.first, h, bristles ? &*bristles : nullptr);
+    step.end = runge_kutta_4<moving_voltage, sprung>(rate, s, step.first, h, bristles ? &*bristles : nullptr);
     if (!lag) step.end.motor_v = plain_.actuate(command(time_s_ + h, step.end));
     return step;
   }
@@ -515,7 +515,7 @@ class EventEngine {
   template <class T>
   PlantState<T> moved_on(const Dynamics<T>& dynamics, const PlantState<T>& at, const PlantState<T>& rate,
                          const T& drive, const T& shift_s) const {
-    PlantState<T> to = moved<held_v, sprung>(at, rate, shift_s);
+    PlantState<T> to = moved<held_voltage, sprung>(at, rate, shift_s);
     if (dynamics.has_motor_lag())
       to.motor_v = at.motor_v + shift_s * (drive - at.motor_v) / dynamics.motor_time_constant_s();
     return to;
