@@ -142,10 +142,12 @@ void EkfCovariance<S>::propagate(const Step& step) {
 template <class S>
 template <int States, class Step>
 void EkfCovariance<S>::propagate_states(const Step& step) {
-  // A fifth state that a plant without bristles does not have, as the last one, has no covariances.
-  constexpr int without_bristles = States == rigid_states ? States - 1 : States;
   if (noise_.disturbed) push_by_disturbances<States>(step);
-  bristles_ ? carry<States>(step) : carry<without_bristles>(step);
+  // Without bristles the fifth and last state of a rigid plant has no covariances.
+  if (States == rigid_states && !bristles_)
+    carry<rigid_states - 1>(step);
+  else
+    carry<States>(step);
   if (noise_.disturbed) decay_disturbances<States>(step);
 }
 
