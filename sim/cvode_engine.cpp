@@ -34,8 +34,8 @@ void pack(const PlantState<double>& s, double* y) {
   y[3] = s.theta_radps;
   y[4] = s.motor_v;
   y[5] = s.bristle_m;
-  y[6] = s.sprung_m;
-  y[7] = s.sprung_mps;
+  y[6] = s.attached_m;
+  y[7] = s.attached_mps;
 }
 
 void require(int flag, const char* what) {

@@ -21,9 +21,10 @@ bool is_table(std::size_t effect) {
 
 /// A mass on a spring fits the part of any random force that is near its frequency. As a candidate it was
 /// named in 3 of 18 cases without one, and a diagnosis took 2.5 times as long. So it is fitted where the
-/// plant file has it, and not searched for.
+/// plant file has it, and not searched for; so are backlash, which has the same two states, and a ripple with
+/// the velocity, which a curve describes.
 bool is_searched_for(std::size_t effect) {
-  return !is_table(effect) && effect != effect_index<effects::SprungMass>();
+  return !is_table(effect) && !attaches_mass(effect) && effect != effect_index<effects::VelocityRipple>();
 }
 
 /// Of the forces at work in these runs, whatever the size of the rig: a few percent of the motor's. In the

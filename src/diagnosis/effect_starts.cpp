@@ -50,8 +50,8 @@ bool is_same(const FitPoint& a, const FitPoint& b) {
     return one.number == other.number && one.values == other.values;
   };
   const auto numbers = [](const PlantState<double>& s) {
-    return std::array{s.cart_m,    s.theta_rad, s.cart_mps,  s.theta_radps,
-                      s.bristle_m, s.sprung_m,  s.sprung_mps};
+    return std::array{s.cart_m,    s.theta_rad,  s.cart_mps,    s.theta_radps,
+                      s.bristle_m, s.attached_m, s.attached_mps};
   };
   const auto same_state = [&](const PlantState<double>& one, const PlantState<double>& other) {
     return numbers(one) == numbers(other);

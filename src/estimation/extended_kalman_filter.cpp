@@ -109,11 +109,11 @@ void EkfCovariance<S>::update(const LinearStep& step, int channel) {
   const S spread = c * c * p_[channel][channel];
   variance_ = variance_ + spread;
   const S with_weight = sensor * (1.0 / step.weight[channel]) + spread;
-  const bool sprung = states_ == most_states;
+  const bool attached = states_ == most_states;
   if (noise_.disturbed)
-    return sprung ? correct<most_states, true>(c, channel, with_weight)
-                  : correct<rigid_states, true>(c, channel, with_weight);
-  if (sprung) return correct<most_states, false>(c, channel, with_weight);
+    return attached ? correct<most_states, true>(c, channel, with_weight)
+                    : correct<rigid_states, true>(c, channel, with_weight);
+  if (attached) return correct<most_states, false>(c, channel, with_weight);
   bristles_ ? correct<rigid_states, false>(c, channel, with_weight)
             : correct<rigid_states - 1, false>(c, channel, with_weight);
 }

@@ -3,12 +3,12 @@
 
 namespace upright {
 
-/// State order: x, theta, v, omega, bristle, then position and velocity of a sprung mass. Of states that a
+/// State order: x, theta, v, omega, bristle, then position and velocity of an attached mass. Of states that a
 /// plant does not have all is zero. Channels: cart, pendulum. The filter also estimates two disturbances, a
 /// coloured force and a coloured torque, which come after the states in `update`.
 struct LinearStep {
   static constexpr int states = 7;        ///< the number of states
-  static constexpr int rigid_states = 5;  ///< of a plant without a sprung mass
+  static constexpr int rigid_states = 5;  ///< of a plant without an attached mass
   static constexpr int disturbances = 2;  ///< the number of disturbances
   double transition[states][states];  ///< from the previous sample, after its update; identity at the first
   double by_force[2];                 ///< accelerations of cart and pendulum per unit of force on the cart

@@ -17,8 +17,8 @@ struct ResidualWalk {
   double force_n_per_sqrt_s = 3.0;
   double torque_nm_per_sqrt_s = 0.3;
   /// Variances at the beginning of a segment: of position, angle, their rates, the bristles' deflection, and
-  /// position and velocity of a sprung mass [m2, rad2, (m/s)2, (rad/s)2, m2, m2, (m/s)2], and of the residual
-  /// force and torque [N2, (N m)2]. For a small cart. Chosen.
+  /// position and velocity of an attached mass [m2, rad2, (m/s)2, (rad/s)2, m2, m2, (m/s)2], and of the
+  /// residual force and torque [N2, (N m)2]. For a small cart. Chosen.
   std::array<double, 9> start_variances = {1e-6, 1e-4, 1e-2, 1e-1, 1e-6, 1e-6, 1e-2, 4.0, 0.04};
 };
 

@@ -16,7 +16,7 @@ namespace upright {
 namespace {
 
 constexpr int bristle_place = 4;
-constexpr int sprung_place = 5;
+constexpr int attached_place = 5;
 constexpr int motor_place = 7;
 constexpr int state_places = 8;
 using Dual = DualNumber<state_places>;
@@ -32,8 +32,8 @@ PlantState<Dual> seeded_state(double side) {
           Dual(side * beside_a_kink, 3),
           Dual(0.0, motor_place),
           Dual(0.0, bristle_place),
-          Dual(0.0, sprung_place),
-          Dual(0.0, sprung_place + 1)};
+          Dual(0.0, attached_place),
+          Dual(0.0, attached_place + 1)};
 }
 
 struct Line {
@@ -48,8 +48,8 @@ Line line_of(const Dynamics<Dual>& dynamics) {
     const PlantState<Dual> state = seeded_state(side);
     const PlantState<Dual> rate = dynamics.derivative(state, state.motor_v, Contacts{});
     const std::array<const Dual*, motor_place> rows = {&rate.cart_m,      &rate.theta_rad, &rate.cart_mps,
-                                                       &rate.theta_radps, &rate.bristle_m, &rate.sprung_m,
-                                                       &rate.sprung_mps};
+                                                       &rate.theta_radps, &rate.bristle_m, &rate.attached_m,
+                                                       &rate.attached_mps};
     for (std::size_t row = 0; row < rows.size(); ++row) {
       for (int place = 0; place < state_places; ++place)
         line.slopes(static_cast<Eigen::Index>(row), place) += 0.5 * rows[row]->v[place];
@@ -70,9 +70,9 @@ std::vector<Place> places_of(const Dynamics<Dual>& dynamics) {
     if (dynamics.has_pendulum() || i % 2 == 0)
       places.push_back({i, std::string(fed_back_names[static_cast<std::size_t>(i)])});
   if (dynamics.has_bristle_state()) places.push_back({bristle_place, "bristle_m"});
-  if (dynamics.has_sprung_mass()) {
-    places.push_back({sprung_place, "sprung_m"});
-    places.push_back({sprung_place + 1, "sprung_mps"});
+  if (dynamics.has_attached_mass()) {
+    places.push_back({attached_place, "attached_m"});
+    places.push_back({attached_place + 1, "attached_mps"});
   }
   if (dynamics.has_motor_lag()) places.push_back({motor_place, "motor_v"});
   return places;
@@ -93,12 +93,17 @@ void read_sensors(const Dynamics<Dual>& dynamics, LinearPlant& linear) {
   }
 }
 
-Plant without_dead_zone(Plant plant, LinearPlant& linear) {
-  const std::size_t zone = effect_number("voltage_dead_zone");
-  if (plant.find(zone) == nullptr) return plant;
-  plant.remove(zone);
-  linear.notes.emplace_back(
-      "voltage_dead_zone: the slope outside the zone is used, inside it the voltage does nothing");
+/// What does nothing within a dead zone has the slope outside it.
+Plant without_dead_zones(Plant plant, LinearPlant& linear) {
+  for (const auto& [kind, note] :
+       {std::pair{"voltage_dead_zone",
+                  "the slope outside the zone is used, inside it the voltage does nothing"},
+        std::pair{"backlash",
+                  "the motor is taken as fixed to the cart, inside the gap it does not move the cart"}}) {
+    if (plant.find(kind) == nullptr) continue;
+    plant.remove(effect_number(kind));
+    linear.notes.push_back(std::string(kind) + ": " + note);
+  }
   return plant;
 }
 
@@ -141,7 +146,7 @@ Plant with_sprung_mass_fixed(Plant plant) {
   const std::size_t sprung = effect_index<effects::SprungMass>();
   if (const PlantEffect* found = plant.find(sprung); found != nullptr) {
     const double corrected = make_model<double>(plant).corrected().cart_mass_kg / plant.cart_mass_kg;
-    plant.cart_mass_kg += effects::SprungMass::sprung_mass_kg(found->values.data()) / corrected;
+    plant.cart_mass_kg += found->values[0] / corrected;
     plant.remove(sprung);
   }
   return plant;
@@ -160,7 +165,7 @@ LinearPlant linearize(const Plant& plant, double smoothing) {
   if (!(smoothing > 0.0) || !std::isfinite(smoothing))
     throw ConfigError("sgn(v) cannot be linearised at rest without smoothing: use a smoothing above 0");
   LinearPlant linear;
-  PlantModel<Dual> model = make_model<Dual>(without_dead_zone(plant, linear));
+  PlantModel<Dual> model = make_model<Dual>(without_dead_zones(plant, linear));
   model.smoothing = smoothing;
   const Dynamics<Dual> dynamics(model);
   const std::vector<Place> places = places_of(dynamics);

@@ -19,8 +19,8 @@ constexpr std::array<std::string_view, fed_back_count> fed_back_names = {
     "cart_m", "theta_rad", "cart_velocity_mps", "pendulum_rate_radps"};
 
 /// n states in SI units: cart_m, theta_rad, cart_velocity_mps, pendulum_rate_radps (without a pendulum
-/// the two of the cart only), then bristle_m, sprung_m and sprung_mps, and motor_v where the plant has them.
-/// The sensors show scale * state + offset of the fed-back states.
+/// the two of the cart only), then bristle_m, attached_m and attached_mps, and motor_v where the plant has
+/// them. The sensors show scale * state + offset of the fed-back states.
 struct LinearPlant {
   std::vector<std::string> states;    ///< names, n
   std::vector<std::size_t> fed_back;  ///< for each of the first states its index among `fed_back_names`

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "upright/model/effect_hooks.hpp"
+
 namespace upright {
 
 const PlantEffect* Plant::find(std::size_t effect) const {
@@ -47,6 +49,14 @@ bool is_dry(const PlantEffect& effect) {
   return effect_registry()[effect.number].dry;
 }
 
+bool attaches_mass(std::size_t effect) {
+  bool attaches = false;
+  for_each_effect([&]<std::size_t I>() {
+    attaches = attaches || (I == effect && has_attached_mass<EffectAt<I>, double>);
+  });
+  return attaches;
+}
+
 std::string fault_of(const Plant& plant) {
   if (const PlantEffect* table = plant.find(effect_index<effects::ForceTable>()))
     if (std::string fault = fault_of_table(*table); !fault.empty()) return fault;
@@ -57,6 +67,10 @@ std::string fault_of(const Plant& plant) {
   if (plant.find("bristle_friction") != nullptr && !level)
     return "bristle_friction needs a dry friction level, and the plant has none: add coulomb_friction or "
            "stribeck_friction";
+  if (std::count_if(plant.effects.begin(), plant.effects.end(),
+                    [](const PlantEffect& e) { return attaches_mass(e.number); }) > 1)
+    return "the plant has sprung_mass and backlash, and one mass at most may move on the cart: remove one of "
+           "them";
   if (plant.pendulum) return "";
   for (const PlantEffect& effect : plant.effects) {
     const std::string kind(effect_registry()[effect.number].kind);

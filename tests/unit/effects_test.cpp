@@ -136,18 +136,18 @@ const std::map<std::string, std::function<void()>>& answers() {
          plant.set("sprung_mass", {0.2, 3.0, 0.1});
          plant.pendulum.reset();
          const Physics p(make_model<double>(plant));
-         EXPECT_TRUE(p.has_sprung_mass());
+         EXPECT_TRUE(p.has_attached_mass());
          PlantState<double> s;
          s.cart_mps = 0.2;
-         s.sprung_m = 0.01;
-         s.sprung_mps = -0.05;
+         s.attached_m = 0.01;
+         s.attached_mps = -0.05;
          const double w = 2.0 * std::numbers::pi * 3.0;
          const double pull_mps2 = w * w * 0.01 - 2.0 * 0.1 * w * 0.05;
          const double cart_mps2 = (0.2 * pull_mps2 - 7.682 * 0.2) / 0.815;
          const PlantState<double> rate = p.derivative(s, 0.0, {});
          EXPECT_NEAR(rate.cart_mps, cart_mps2, 1e-12);
-         EXPECT_DOUBLE_EQ(rate.sprung_m, -0.05);
-         EXPECT_NEAR(rate.sprung_mps, -pull_mps2 - cart_mps2, 1e-12);
+         EXPECT_DOUBLE_EQ(rate.attached_m, -0.05);
+         EXPECT_NEAR(rate.attached_mps, -pull_mps2 - cart_mps2, 1e-12);
        }},
       {"quadratic_drag",
        [] { EXPECT_NEAR(cart_force(with("quadratic_drag", {2.0}), 0.0, -0.5), 0.5, 1e-12); }},
@@ -162,6 +162,13 @@ const std::map<std::string, std::function<void()>>& answers() {
          const Physics p = with("cogging_force", {0.3, 0.01, 0.0});
          EXPECT_NEAR(cart_force(p, 0.0025, 0.0), 0.3, 1e-12);
          EXPECT_NEAR(cart_force(p, 0.0075, 0.0), -0.3, 1e-12);
+       }},
+      {"velocity_ripple",
+       [] {
+         const Physics p = with("velocity_ripple", {0.3, 0.2});
+         EXPECT_NEAR(cart_force(p, 0.1, 0.05), 0.3, 1e-12);
+         EXPECT_NEAR(cart_force(p, 0.1, -0.05), -0.3, 1e-12);
+         EXPECT_NEAR(cart_force(p, 0.1, 0.15), -0.3, 1e-12);
        }},
       {"torque_ripple",
        [] {
@@ -208,6 +215,27 @@ const std::map<std::string, std::function<void()>>& answers() {
          plant.set("angle_offset", {0.01});
          plant.set("angle_scale", {2.0});
          EXPECT_DOUBLE_EQ(shown(Physics(make_model<double>(plant))).theta_rad, 0.41);
+       }},
+      {"backlash",
+       [] {
+         Plant plant = paper_plant();
+         plant.set("backlash", {2e-3, 0.2, 1e4, 5.0});
+         plant.pendulum.reset();
+         const Physics p(make_model<double>(plant));
+         EXPECT_TRUE(p.has_attached_mass());
+         PlantState<double> s;
+         s.cart_mps = 0.2;
+         s.attached_mps = 0.1;
+         const double motor_n = 3.0 * 1.7189 - 7.682 * 0.3, motor_kg = 0.2 * 0.815;
+         EXPECT_NEAR(p.derivative(s, 3.0, {}).cart_mps, 0.0, 1e-12);  // in the gap
+         EXPECT_NEAR(p.derivative(s, 3.0, {}).attached_mps, motor_n / motor_kg, 1e-12);
+         s.attached_m = 1.2e-3;
+         const double flank_n = 1e4 * 0.2e-3 * (1.0 + 5.0 * 0.1);
+         const double cart_mps2 = flank_n / (0.8 * 0.815);
+         EXPECT_NEAR(p.derivative(s, 3.0, {}).cart_mps, cart_mps2, 1e-12);
+         EXPECT_NEAR(p.derivative(s, 3.0, {}).attached_mps, (motor_n - flank_n) / motor_kg - cart_mps2, 1e-9);
+         s.attached_mps = -0.3;  // leaves quickly: a flank does not pull
+         EXPECT_NEAR(p.derivative(s, 0.0, {}).cart_mps, 0.0, 1e-12);
        }},
       {"drive_compliance",
        [] {
@@ -289,7 +317,7 @@ INSTANTIATE_TEST_SUITE_P(All, Effect, testing::Range(std::size_t{0}, effect_coun
 });
 
 TEST(Registry, IsWhole) {
-  EXPECT_EQ(effect_count, 34u);
+  EXPECT_EQ(effect_count, 36u);
   std::set<std::string_view> kinds;
   std::size_t offset = 0;
   for (std::size_t i = 0; i < effect_count; ++i) {

@@ -76,6 +76,34 @@ TEST(Fit, FindsASprungMassFromAGuess) {
   }
 }
 
+TEST(Fit, FindsBacklashFromAGuess) {
+  Plant plant = cart_alone();
+  plant.set("coulomb_friction", {0.3});
+  const double truth[] = {5e-4, 0.25, 2e4, 10.0};
+  plant.set("backlash", {truth[0], truth[1], truth[2], truth[3]});
+  const blind::Rig rig{.plant = plant};
+  const std::vector<Measurement> runs = square_and_multisine(rig, 500.0, 6.0, 3.0);
+  plant.set("backlash", {3e-4, 0.2, 2e4, 10.0});
+  const FitData data{&runs, cut_segments(runs)};
+  std::vector<FreeParameter> free(2);
+  for (std::size_t i = 0; i < free.size(); ++i) {
+    free[i].effect = effect_index<effects::Backlash>();
+    free[i].index = i;
+    free[i].low = 1e-5;
+    free[i].high = 0.5;
+    free[i].scale = 0.3 * truth[i];
+  }
+  const FitPoint start{plant, estimate_initial_states(runs, data.segments, plant), {.force = 0.1}};
+  const FitResult found = fit(data, start, free);
+  EXPECT_LT(whitened_rms(found), 1.2);
+  for (std::size_t i = 0; i < free.size(); ++i) {
+    const double value = found.point.plant.find(free[i].effect)->values[i];
+    const auto at = static_cast<Eigen::Index>(i);
+    EXPECT_NEAR(value, truth[i], 4.0 * std::sqrt(found.covariance(at, at))) << i;
+    EXPECT_NEAR(value, truth[i], 0.1 * truth[i]) << i;
+  }
+}
+
 TEST(Fit, BeginsAfterAGapOnceTheMotorsLagHasForgottenIt) {
   Plant plant = cart_alone();
   plant.set("motor_lag", {0.036});

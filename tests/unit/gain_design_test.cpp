@@ -56,7 +56,7 @@ TEST(LinearPlant, HasTheSwingOfASprungMass) {
   plant.set("sprung_mass", {sprung_kg, frequency_hz, damping_ratio});
   const LinearPlant linear = linearize(plant, 100.0);
   EXPECT_EQ(linear.states,
-            (std::vector<std::string>{"cart_m", "cart_velocity_mps", "sprung_m", "sprung_mps"}));
+            (std::vector<std::string>{"cart_m", "cart_velocity_mps", "attached_m", "attached_mps"}));
   const double both = 1.0 + sprung_kg / plant.cart_mass_kg;
   const double radps = 2.0 * std::numbers::pi * frequency_hz * std::sqrt(both);
   const Eigen::VectorXcd poles = eigenvalues(linear.a);

@@ -171,57 +171,6 @@ TYPED_TEST(KnownAnswers, HoldsBelowBreakawayForEverAndMovesAboveIt) {
   EXPECT_GT(e.state().cart_m, 0.1 + 1e-5);
 }
 
-/// Free swing of an oscillator from rest at 1, after a time [s].
-double free_swing(double radps, double damping_ratio, double t) {
-  const double decay = damping_ratio * radps, swings = radps * std::sqrt(1.0 - damping_ratio * damping_ratio);
-  return std::exp(-decay * t) * (std::cos(swings * t) + decay / swings * std::sin(swings * t));
-}
-
-// Two bodies on one spring: their centre of mass stays where it is.
-TYPED_TEST(KnownAnswers, FreeCartSwingsAgainstItsSprungMass) {
-  Plant plant = paper_plant();
-  plant.pendulum.reset();
-  plant.motor.back_emf_n_per_mps = 0.0;
-  constexpr double sprung_kg = 0.2, frequency_hz = 4.0, damping_ratio = 0.05, q0_m = 0.01;
-  plant.set("sprung_mass", {sprung_kg, frequency_hz, damping_ratio});
-  auto e = this->engine(plant);
-  PlantState<double> start{0.1};
-  start.sprung_m = q0_m;
-  e.start(start);
-  const double both = 1.0 + sprung_kg / plant.cart_mass_kg, faster = std::sqrt(both);
-  const double radps = 2.0 * std::numbers::pi * frequency_hz * faster;
-  const double share = sprung_kg / (sprung_kg + plant.cart_mass_kg);
-  for (int k = 1; k <= 200; ++k) {
-    e.advance(0.005, 0.0);
-    const double q_m = q0_m * free_swing(radps, damping_ratio * faster, 0.005 * k);
-    ASSERT_NEAR(e.state().sprung_m, q_m, 1e-8) << k;
-    ASSERT_NEAR(e.state().cart_m, 0.1 + share * (q0_m - q_m), 1e-8) << k;
-  }
-}
-
-// A cart that friction holds does not move, and its sprung mass swings on.
-TYPED_TEST(KnownAnswers, SprungMassSwingsOnAStickingCart) {
-  Plant plant = paper_plant();
-  plant.pendulum.reset();
-  constexpr double sprung_kg = 0.2, frequency_hz = 4.0, damping_ratio = 0.05;
-  const double radps = 2.0 * std::numbers::pi * frequency_hz;
-  plant.set("coulomb_friction", {0.4});
-  plant.set("sprung_mass", {sprung_kg, frequency_hz, damping_ratio});
-  const double holds_m = 0.4 / (sprung_kg * radps * radps);  // at most
-  for (const double share : {0.99, 1.01}) {
-    auto e = this->engine(plant);
-    PlantState<double> start{0.1};
-    start.sprung_m = share * holds_m;
-    e.start(start);
-    e.advance(0.01, 0.0);
-    EXPECT_EQ(e.state().cart_m == 0.1, share < 1.0);
-    for (int k = 1; k <= 100; ++k) e.advance(0.005, 0.0);
-    if (share > 1.0) continue;
-    EXPECT_EQ(e.state().cart_m, 0.1);
-    EXPECT_NEAR(e.state().sprung_m, start.sprung_m * free_swing(radps, damping_ratio, 0.51), 1e-8);
-  }
-}
-
 // m v' = kV - b v - Fc - F exp(-t/T) from rest.
 TYPED_TEST(KnownAnswers, FrictionThatWarmsUpAsItsClosedForm) {
   Plant plant = paper_plant();

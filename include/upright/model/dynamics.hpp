@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "upright/model/attached_mass.hpp"
 #include "upright/model/effect_hooks.hpp"
 #include "upright/model/elementary.hpp"
 #include "upright/model/plant_model.hpp"
@@ -25,17 +26,16 @@ class Dynamics {
  public:
   /// `present`: the effects, where they are known at compile time.
   explicit Dynamics(const PlantModel<S>& model, Present present = {})
-      : model_(model), base_(model.corrected()) {
-    if constexpr (std::is_same_v<Present, EffectSet>) {
-      present_ = model.present;
-    } else {
-      present_ = present;
-    }
+      : model_(model),
+        base_(model.corrected()),
+        present_(set_of(model, present)),
+        attached_(model, present_, base_.cart_mass_kg) {
     total_mass_ = base_.cart_mass_kg;
+    if (attached_.is_motor()) total_mass_ = total_mass_ - attached_.mass_kg();
     coupling_ = S(0.0);
     gravity_torque_ = S(0.0);
     if (model.has_pendulum) {
-      total_mass_ = base_.cart_mass_kg + base_.pendulum_mass_kg;
+      total_mass_ = total_mass_ + base_.pendulum_mass_kg;
       coupling_ = base_.pendulum_mass_kg * base_.length_to_com_m;
       gravity_torque_ = coupling_ * base_.gravity_mps2;
       inertia_ = Divisor<S>(base_.inertia_about_pivot_kgm2);
@@ -45,7 +45,6 @@ class Dynamics {
       using E = EffectAt<I>;
       if (!present_.template has<I>()) return;
       if constexpr (has_bristles<E, S>) bristles_ = true;
-      if constexpr (upright::has_sprung_mass<E, S>) sprung_ = true;
       if constexpr (has_cart_level<E, S>) cart_dry_ = cart_dry_ || acts_as_cart_level<E>(p<I>());
       if constexpr (has_level_of_time<E, S>) cart_dry_ = changes_with_time_ = true;
       if constexpr (has_level_of_load<E, S>) cart_dry_ = depends_on_load_ = true;
@@ -69,11 +68,11 @@ class Dynamics {
   bool cart_has_kink() const { return cart_can_stick() || cart_kink_; }
   /// Whether a torque of the pivot is not smooth at rest.
   bool pivot_has_kink() const { return pivot_can_stick() || pivot_kink_; }
-  bool has_motor_lag() const { return lag_; }                ///< whether `motor_v` is a state
-  bool has_bristle_state() const { return bristles_; }       ///< whether `bristle_m` is a state
-  bool has_sprung_mass() const { return sprung_; }           ///< whether `sprung_m` is a state
-  bool has_pendulum() const { return model_.has_pendulum; }  ///< false: the cart is alone
-  bool cart_locked() const { return model_.cart_locked; }    ///< true: only the pendulum moves
+  bool has_motor_lag() const { return lag_; }                    ///< whether `motor_v` is a state
+  bool has_bristle_state() const { return bristles_; }           ///< whether `bristle_m` is a state
+  bool has_attached_mass() const { return attached_.exists(); }  ///< whether `attached_m` is a state
+  bool has_pendulum() const { return model_.has_pendulum; }      ///< false: the cart is alone
+  bool cart_locked() const { return model_.cart_locked; }        ///< true: only the pendulum moves
 
   bool changes_with_time() const { return changes_with_time_; }  ///< whether `set_time` has an effect
 
@@ -166,7 +165,7 @@ class Dynamics {
   /// Force of the motor including back-EMF [N].
   S motor_force(const PlantState<S>& state, const S& motor_v) const { return motor_force_of(state, motor_v); }
 
-  /// All smooth forces on the cart, with those of the motor and a sprung mass, without bristles.
+  /// All smooth forces on the cart, with those of the motor and an attached mass, without bristles.
   S cart_smooth_force(const PlantState<S>& state, const S& motor_v) const {
     return smooth_force(state, motor_v);
   }
@@ -195,7 +194,7 @@ class Dynamics {
     accelerate(state, force, torque, cart_rests, pivot_rests, rate);
     rate.cart_m = cart_rests ? S(0.0) : state.cart_mps;
     rate.theta_rad = pivot_rests ? S(0.0) : state.theta_radps;
-    if (sprung_) move_sprung_mass(state, rate);
+    if (attached_.exists()) move_attached_mass(state, motor_v, rate);
     return rate;
   }
 
@@ -427,13 +426,11 @@ class Dynamics {
   }
 
  private:
-  /// False: known at compile time not to be present, so that its equations need not know the scalar.
-  template <std::size_t I>
-  static constexpr bool may_have() {
+  static Present set_of([[maybe_unused]] const PlantModel<S>& model, [[maybe_unused]] const Present& known) {
     if constexpr (std::is_same_v<Present, EffectSet>)
-      return true;
+      return model.present;
     else
-      return Present::template has<I>();
+      return known;
   }
 
   template <class T>
@@ -441,9 +438,9 @@ class Dynamics {
     T level(0.0);
     for_each_effect([&]<std::size_t I>() {
       using E = EffectAt<I>;
-      if constexpr (may_have<I>() && has_cart_level<E, S>)
+      if constexpr (Present::template may_have<I>() && has_cart_level<E, S>)
         if (present_.template has<I>()) level = level + E::cart_dry_level(p<I>(), x, speed, direction);
-      if constexpr (may_have<I>() && has_level_of_time<E, S>)
+      if constexpr (Present::template may_have<I>() && has_level_of_time<E, S>)
         if (present_.template has<I>()) level = level + T(level_of_time_);
     });
     return positive_part(level);
@@ -452,11 +449,12 @@ class Dynamics {
   template <class T>
   T motor_force_of(const PlantState<T>& state, const S& motor_v) const {
     const S push = base_.force_per_volt_n * motor_v;
-    const T drag = base_.back_emf_n_per_mps * state.cart_mps;
+    const T motor_mps = attached_.is_motor() ? T(state.cart_mps + state.attached_mps) : state.cart_mps;
+    const T drag = base_.back_emf_n_per_mps * motor_mps;
     T force = push - drag;
     for_each_effect([&]<std::size_t I>() {
       using E = EffectAt<I>;
-      if constexpr (may_have<I>() && requires { E::motor_ripple(p<I>(), S()); })
+      if constexpr (Present::template may_have<I>() && requires { E::motor_ripple(p<I>(), S()); })
         if (present_.template has<I>()) {
           const T r = E::motor_ripple(p<I>(), state.cart_m);
           force = force + r * (push - (r + S(2.0)) * drag);  // 1 + r in the push, squared in the drag
@@ -467,14 +465,13 @@ class Dynamics {
 
   template <class T>
   T smooth_force(const PlantState<T>& state, const S& motor_v) const {
-    T force = motor_force_of(state, motor_v);
+    T force = attached_.is_motor() ? T(0.0) : motor_force_of(state, motor_v);
+    if (attached_.exists())
+      force = force + attached_.mass_kg() * attached_.pull_mps2(model_, state.attached_m, state.attached_mps);
     for_each_effect([&]<std::size_t I>() {
       using E = EffectAt<I>;
-      if constexpr (may_have<I>() && requires { E::cart_force(p<I>(), S(), S()); })
+      if constexpr (Present::template may_have<I>() && requires { E::cart_force(p<I>(), S(), S()); })
         if (present_.template has<I>()) force = force + E::cart_force(p<I>(), state.cart_m, state.cart_mps);
-      if constexpr (may_have<I>() && upright::has_sprung_mass<E, S>)
-        if (present_.template has<I>())
-          force = force + E::sprung_force_n(p<I>(), state.sprung_m, state.sprung_mps);
     });
     return force;
   }
@@ -484,21 +481,17 @@ class Dynamics {
     T torque(0.0);
     for_each_effect([&]<std::size_t I>() {
       using E = EffectAt<I>;
-      if constexpr (may_have<I>() && requires { E::pivot_torque(p<I>(), S()); })
+      if constexpr (Present::template may_have<I>() && requires { E::pivot_torque(p<I>(), S()); })
         if (present_.template has<I>()) torque = torque + E::pivot_torque(p<I>(), omega);
     });
     return torque;
   }
 
-  void move_sprung_mass(const PlantState<S>& state, PlantState<S>& rate) const {
-    const S& q = state.sprung_m;
-    rate.sprung_m = state.sprung_mps;
-    for_each_effect([&]<std::size_t I>() {
-      using E = EffectAt<I>;
-      if constexpr (may_have<I>() && upright::has_sprung_mass<E, S>)
-        if (present_.template has<I>())
-          rate.sprung_mps = -E::sprung_pull_mps2(p<I>(), q, state.sprung_mps) - rate.cart_mps;
-    });
+  void move_attached_mass(const PlantState<S>& state, const S& motor_v, PlantState<S>& rate) const {
+    rate.attached_m = state.attached_mps;
+    rate.attached_mps = -attached_.pull_mps2(model_, state.attached_m, state.attached_mps) - rate.cart_mps;
+    if (attached_.is_motor())
+      rate.attached_mps = rate.attached_mps + motor_force(state, motor_v) / attached_.mass_kg();
   }
 
   S drive_deflection_m(const PlantState<S>& state) const {
@@ -590,11 +583,12 @@ class Dynamics {
   PlantModel<S> model_;
   BaseParameters<S> base_;
   Present present_;
+  AttachedMass<S, Present> attached_;
   S total_mass_, coupling_, gravity_torque_;
   Divisor<S> inertia_{S(1.0)}, mass_{S(1.0)};  ///< about the pivot, and of both bodies
   S level_of_time_{0.0};                       ///< of the cart's dry friction at the time that was set
-  bool bristles_ = false, sprung_ = false, cart_dry_ = false, pivot_dry_ = false, cart_kink_ = false,
-       pivot_kink_ = false, lag_ = false, changes_with_time_ = false, depends_on_load_ = false;
+  bool bristles_ = false, cart_dry_ = false, pivot_dry_ = false, cart_kink_ = false, pivot_kink_ = false,
+       lag_ = false, changes_with_time_ = false, depends_on_load_ = false;
 };
 
 }  // namespace upright

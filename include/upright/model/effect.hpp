@@ -18,9 +18,10 @@
 //                                                   `actuator_stage`
 //   S input_delay_s(p), S motor_time_constant_s(p)
 //   S bristle_stiffness(p), S bristle_damping(p)
-//   S sprung_mass_kg(p)                             a mass on a spring that the cart carries [kg]
-//   S sprung_pull_mps2(p, q, rate)                  by which its spring pulls it back [m/s^2]
-//   S sprung_force_n(p, q, rate)                    of that spring on the cart [N]
+//   S attached_mass_kg(p, cart_mass_kg)             a mass with a motion of its own along the track [kg]
+//   S attached_pull_mps2(p, mass_kg, q, rate)       by which its spring pulls it back to the cart, at q
+//                                                   from there [m/s^2]
+//   bool motor_is_attached                          whether that mass is the motor, a part of the cart's
 //   S drive_deflection_m(p, force)                  position of the motor relative to the cart [m]
 //   S encoder_error_m(p, x)                         what the cart's encoder shows too much [m]
 //   void measure(p, Outputs<S>&)                    one linear stage of the sensors, by `sensor_stage`

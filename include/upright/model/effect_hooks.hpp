@@ -37,10 +37,10 @@ template <class E, class S>
 constexpr bool has_bristles = requires(const S* p) {
   E::bristle_stiffness(p);
 };
-/// A mass on a spring, with states of its own.
+/// A mass with states of its own.
 template <class E, class S>
-constexpr bool has_sprung_mass = requires(const S* p) {
-  E::sprung_mass_kg(p);
+constexpr bool has_attached_mass = requires(const S* p) {
+  E::attached_mass_kg(p, *p);
 };
 
 }  // namespace upright

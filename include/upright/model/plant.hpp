@@ -39,6 +39,9 @@ struct PlantEffect {
 /// Whether an effect is a level of dry friction. Of a force table its values decide.
 bool is_dry(const PlantEffect& effect);
 
+/// Whether an effect attaches a mass with a motion of its own to the cart (attached_mass.hpp).
+bool attaches_mass(std::size_t effect);
+
 /// Rigid body, motor and effects.
 struct Plant {
   double cart_mass_kg = 0.0;         ///< of the cart alone [kg]

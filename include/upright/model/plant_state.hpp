@@ -6,17 +6,17 @@
 namespace upright {
 
 /// State of the plant. `motor_v` is used with motor_lag only, `bristle_m` with bristle_friction only,
-/// `sprung_m` and `sprung_mps` with sprung_mass only.
+/// `attached_m` and `attached_mps` with sprung_mass or backlash only.
 template <class S>
 struct PlantState {
-  S cart_m{};       ///< position of the cart [m]
-  S theta_rad{};    ///< angle of the pendulum [rad], 0 upright
-  S cart_mps{};     ///< velocity of the cart [m/s]
-  S theta_radps{};  ///< rate of the pendulum [rad/s]
-  S motor_v{};      ///< motor voltage after the motor lag [V]
-  S bristle_m{};    ///< deflection of the bristles [m]
-  S sprung_m{};     ///< position of the sprung mass relative to the cart, 0 at rest [m]
-  S sprung_mps{};   ///< velocity of the sprung mass relative to the cart [m/s]
+  S cart_m{};        ///< position of the cart [m]
+  S theta_rad{};     ///< angle of the pendulum [rad], 0 upright
+  S cart_mps{};      ///< velocity of the cart [m/s]
+  S theta_radps{};   ///< rate of the pendulum [rad/s]
+  S motor_v{};       ///< motor voltage after the motor lag [V]
+  S bristle_m{};     ///< deflection of the bristles [m]
+  S attached_m{};    ///< position of the attached mass relative to the cart, 0 at rest [m]
+  S attached_mps{};  ///< velocity of the attached mass relative to the cart [m/s]
 };
 
 /// Mode of a contact with dry friction: sticking, or sliding in one direction.

@@ -79,6 +79,11 @@ struct EffectSet {
   /// Whether this effect is in the set.
   constexpr bool has(std::size_t effect) const { return (mask >> effect & 1u) != 0; }
   void add(std::size_t effect) { mask |= std::uint64_t{1} << effect; }  ///< puts this effect into the set
+  /// Any effect may be in the set.
+  template <std::size_t I>
+  static constexpr bool may_have() {
+    return true;
+  }
 };
 static_assert(effect_count <= 64);
 
@@ -89,6 +94,11 @@ struct StaticEffectSet {
   template <std::size_t I>
   static constexpr bool has() {
     return (Mask >> I & 1u) != 0;
+  }
+  /// False: it is not in the set, and its equations need not know the scalar.
+  template <std::size_t I>
+  static constexpr bool may_have() {
+    return has<I>();
   }
 };
 

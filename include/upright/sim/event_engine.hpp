@@ -202,8 +202,8 @@ class EventEngine {
     if (value_of(state.theta_radps) != 0.0) contacts_.pivot = direction_of(value_of(state.theta_radps));
   }
   /// Replaces the derivatives of the state (dual numbers only) by the identity, in the order x, theta, v,
-  /// omega, bristle, and a sprung mass if there is one; no parameter may use these places. What cannot move
-  /// has none, nor has the velocity of a sticking contact, where an impulse has no effect.
+  /// omega, bristle, and an attached mass if there is one; no parameter may use these places. What cannot
+  /// move has none, nor has the velocity of a sticking contact, where an impulse has no effect.
   void seed() requires(!std::is_same_v<S, double>) {
     const bool cart = !dynamics_.cart_locked(), pendulum = dynamics_.has_pendulum();
     const auto set = [](S& number, int place, bool moves) {
@@ -215,8 +215,8 @@ class EventEngine {
     set(state_.cart_mps, 2, cart && !cart_at_rest());
     set(state_.theta_radps, 3, pendulum && !pivot_at_rest());
     set(state_.bristle_m, 4, dynamics_.has_bristle_state());
-    set(state_.sprung_m, 5, dynamics_.has_sprung_mass());
-    set(state_.sprung_mps, 6, dynamics_.has_sprung_mass());
+    set(state_.attached_m, 5, dynamics_.has_attached_mass());
+    set(state_.attached_mps, 6, dynamics_.has_attached_mass());
     seeded_ = true;
   }
   Contacts contacts() const { return contacts_; }  ///< the modes of the contacts now
@@ -238,7 +238,7 @@ class EventEngine {
 
  private:
   static constexpr MotorVoltage held_voltage = MotorVoltage::held, moving_voltage = MotorVoltage::moves;
-  static constexpr SprungMass sprung = SprungMass::possible;
+  static constexpr AttachedStates mass = AttachedStates::possible;
   static constexpr double min_lag_s = 1e-6, smallest_step_s = 1e-13, max_rate_radps = 2e6;
 
   struct Found {
@@ -359,13 +359,13 @@ class EventEngine {
     const PlantState<T> k1 = known ? **begin : dynamics.derivative(s, begin_v, contacts_);
     if (begin != nullptr) *begin = k1;
     const std::optional<Relaxation<T>> bristles = relaxation_over(h);
-    PlantState<T> end = runge_kutta_4<held_voltage, sprung>(rate, s, k1, h, bristles ? &*bristles : nullptr);
+    PlantState<T> end = runge_kutta_4<held_voltage, mass>(rate, s, k1, h, bristles ? &*bristles : nullptr);
     end.motor_v = lagged ? lagged->after_v : drive;
     return end;
   }
 
   bool linearises_in_middle() const {
-    if (dynamics_.has_bristle_state() || dynamics_.has_sprung_mass()) return false;
+    if (dynamics_.has_bristle_state() || dynamics_.has_attached_mass()) return false;
     return !std::is_same_v<S, double> && options_.quick_derivatives;
   }
 
@@ -424,7 +424,7 @@ class EventEngine {
     const PlantState<double> s = plain_state(state_);
     DrivenStep step{driven_rate(command, lag, time_s_, s), {}};
     const std::optional<Relaxation<double>> bristles = relaxation_over(h);
-    step.end = runge_kutta_4<moving_voltage, sprung>(rate, s, step.first, h, bristles ? &*bristles : nullptr);
+    step.end = runge_kutta_4<moving_voltage, mass>(rate, s, step.first, h, bristles ? &*bristles : nullptr);
     if (!lag) step.end.motor_v = plain_.actuate(command(time_s_ + h, step.end));
     return step;
   }
@@ -447,7 +447,7 @@ class EventEngine {
     };
     using Plain = PlantState<double>;
     for (double Plain::*of : {&Plain::cart_m, &Plain::theta_rad, &Plain::cart_mps, &Plain::theta_radps,
-                              &Plain::motor_v, &Plain::bristle_m, &Plain::sprung_m, &Plain::sprung_mps})
+                              &Plain::motor_v, &Plain::bristle_m, &Plain::attached_m, &Plain::attached_mps})
       cubic(of);
     return dense;
   }
@@ -515,7 +515,7 @@ class EventEngine {
   template <class T>
   PlantState<T> moved_on(const Dynamics<T>& dynamics, const PlantState<T>& at, const PlantState<T>& rate,
                          const T& drive, const T& shift_s) const {
-    PlantState<T> to = moved<held_voltage, sprung>(at, rate, shift_s);
+    PlantState<T> to = moved<held_voltage, mass>(at, rate, shift_s);
     if (dynamics.has_motor_lag())
       to.motor_v = at.motor_v + shift_s * (drive - at.motor_v) / dynamics.motor_time_constant_s();
     return to;

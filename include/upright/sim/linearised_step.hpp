@@ -14,8 +14,8 @@ namespace upright {
 /// The values of a state, without their derivatives.
 template <class S>
 PlantState<double> plain_state(const PlantState<S>& s) {
-  return {value_of(s.cart_m),  value_of(s.theta_rad), value_of(s.cart_mps), value_of(s.theta_radps),
-          value_of(s.motor_v), value_of(s.bristle_m), value_of(s.sprung_m), value_of(s.sprung_mps)};
+  return {value_of(s.cart_m),  value_of(s.theta_rad), value_of(s.cart_mps),   value_of(s.theta_radps),
+          value_of(s.motor_v), value_of(s.bristle_m), value_of(s.attached_m), value_of(s.attached_mps)};
 }
 
 /// A voltage that is held for a time.

@@ -14,11 +14,11 @@ namespace upright {
 /// Whether the voltage at the motor is a state variable, or constant over the step.
 enum class MotorVoltage : std::uint8_t { held, moves };
 
-/// Whether a sprung mass may be part of the state. Without one, lanes carry less.
-enum class SprungMass : std::uint8_t { absent, possible };
+/// Whether the states of an attached mass may be part of the state. Without one, lanes carry less.
+enum class AttachedStates : std::uint8_t { absent, possible };
 
 /// The state after `h` at this rate [s].
-template <MotorVoltage motor = MotorVoltage::held, SprungMass sprung = SprungMass::absent, class S>
+template <MotorVoltage motor = MotorVoltage::held, AttachedStates attached = AttachedStates::absent, class S>
 PlantState<S> moved(const PlantState<S>& s, const PlantState<S>& rate, const S& h) {
   PlantState<S> to{s.cart_m + h * rate.cart_m,
                    s.theta_rad + h * rate.theta_rad,
@@ -27,9 +27,9 @@ PlantState<S> moved(const PlantState<S>& s, const PlantState<S>& rate, const S& 
                    s.motor_v,
                    s.bristle_m + h * rate.bristle_m};
   if constexpr (motor == MotorVoltage::moves) to.motor_v = s.motor_v + h * rate.motor_v;
-  if constexpr (sprung == SprungMass::possible) {
-    to.sprung_m = s.sprung_m + h * rate.sprung_m;
-    to.sprung_mps = s.sprung_mps + h * rate.sprung_mps;
+  if constexpr (attached == AttachedStates::possible) {
+    to.attached_m = s.attached_m + h * rate.attached_m;
+    to.attached_mps = s.attached_mps + h * rate.attached_mps;
   }
   return to;
 }
@@ -144,13 +144,13 @@ enum class Stage : std::uint8_t { middle, end };
 
 /// One step of length h from `s`. `first`: the rate at its beginning; `rate(state, Stage)`: at the other
 /// nodes. `bristles`: their motion, as `Relaxation` says it, null where no relaxation is fast.
-template <MotorVoltage motor = MotorVoltage::held, SprungMass sprung = SprungMass::absent, class S,
+template <MotorVoltage motor = MotorVoltage::held, AttachedStates attached = AttachedStates::absent, class S,
           class Rate, class Motion = Relaxation<S>>
 PlantState<S> runge_kutta_4(const Rate& rate, const PlantState<S>& s, const PlantState<S>& first, const S& h,
                             const Motion* bristles = nullptr) {
   const S half = S(0.5) * h;
   S begin_smooth{}, middle_smooth{}, again_smooth{}, middle_m{};
-  PlantState<S> at = moved<motor, sprung>(s, first, half);
+  PlantState<S> at = moved<motor, attached>(s, first, half);
   if (bristles != nullptr) {
     begin_smooth = bristles->smooth(s, first, S(0.0));
     middle_m =
@@ -159,13 +159,13 @@ PlantState<S> runge_kutta_4(const Rate& rate, const PlantState<S>& s, const Plan
   }
   const PlantState<S> second = rate(at, Stage::middle);
   if (bristles != nullptr) middle_smooth = bristles->smooth(at, second, bristles->half_drift_mps);
-  at = moved<motor, sprung>(s, second, half);
+  at = moved<motor, attached>(s, second, half);
   if (bristles != nullptr)
     bristles->put(at, bristles->half_decay * s.bristle_m + bristles->half_weight * middle_smooth +
                           bristles->first_half_m);
   const PlantState<S> third = rate(at, Stage::middle);
   if (bristles != nullptr) again_smooth = bristles->smooth(at, third, bristles->half_drift_mps);
-  at = moved<motor, sprung>(s, third, h);
+  at = moved<motor, attached>(s, third, h);
   if (bristles != nullptr)
     bristles->put(at, bristles->half_decay * middle_m +
                           bristles->half_weight * (S(2.0) * again_smooth - begin_smooth) +
@@ -183,9 +183,9 @@ PlantState<S> runge_kutta_4(const Rate& rate, const PlantState<S>& s, const Plan
   end.motor_v = s.motor_v;
   if constexpr (motor == MotorVoltage::moves) end.motor_v = along(&PlantState<S>::motor_v);
   end.bristle_m = along(&PlantState<S>::bristle_m);
-  if constexpr (sprung == SprungMass::possible) {
-    end.sprung_m = along(&PlantState<S>::sprung_m);
-    end.sprung_mps = along(&PlantState<S>::sprung_mps);
+  if constexpr (attached == AttachedStates::possible) {
+    end.attached_m = along(&PlantState<S>::attached_m);
+    end.attached_mps = along(&PlantState<S>::attached_mps);
   }
   if (bristles != nullptr) {
     const auto& [begin, middle, last] = bristles->whole_weights;

@@ -6,6 +6,7 @@
 #include "upright/model/effects/angle_offset.hpp"
 #include "upright/model/effects/angle_scale.hpp"
 #include "upright/model/effects/back_emf.hpp"
+#include "upright/model/effects/backlash.hpp"
 #include "upright/model/effects/bristle_friction.hpp"
 #include "upright/model/effects/cable_spring.hpp"
 #include "upright/model/effects/cart_mass.hpp"
@@ -30,6 +31,7 @@
 #include "upright/model/effects/sprung_mass.hpp"
 #include "upright/model/effects/stribeck_friction.hpp"
 #include "upright/model/effects/torque_ripple.hpp"
+#include "upright/model/effects/velocity_ripple.hpp"
 #include "upright/model/effects/viscous_asymmetry.hpp"
 #include "upright/model/effects/viscous_friction.hpp"
 #include "upright/model/effects/voltage_dead_zone.hpp"
@@ -57,6 +59,7 @@ using AllEffects =
                effects::CableSpring,
                effects::SprungMass,
                effects::CoggingForce,
+               effects::VelocityRipple,
                effects::TorqueRipple,
                effects::VoltageSaturation,
                effects::VoltageDeadZone,
@@ -64,6 +67,7 @@ using AllEffects =
                effects::VoltageOffset,
                effects::InputDelay,
                effects::MotorLag,
+               effects::Backlash,
                effects::PivotViscousFriction,
                effects::PivotCoulombFriction,
                effects::PivotQuadraticDrag,

@@ -26,23 +26,20 @@ struct SprungMass {
       "a mass that hangs on the cart by a spring: a cable chain, a loose cover",
       parameters};
 
+  /// The cart's mass does not contain it.
+  static constexpr bool motor_is_attached = false;
+
   /// Mass [kg].
   template <class S>
-  static S sprung_mass_kg(const S* p) {
+  static S attached_mass_kg(const S* p, const S& /*cart_mass_kg*/) {
     return p[0];
   }
 
   /// Acceleration by which its spring and damper pull it back to the cart [m/s^2].
   template <class S, class T>
-  static T sprung_pull_mps2(const S* p, const T& q, const T& rate) {
+  static T attached_pull_mps2(const S* p, const S& /*mass_kg*/, const T& q, const T& rate) {
     const S w = two_pi * p[1];
     return w * (w * q + (2.0 * p[2]) * rate);
-  }
-
-  /// Force of both on the cart [N].
-  template <class S, class T>
-  static T sprung_force_n(const S* p, const T& q, const T& rate) {
-    return p[0] * sprung_pull_mps2(p, q, rate);
   }
 
   /// Its greatest rate [1/s], on a cart of this mass that moves freely.
