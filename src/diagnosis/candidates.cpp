@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 
+#include "attached_mass_search.hpp"
 #include "motion_range.hpp"
 
 namespace upright {
@@ -19,12 +20,9 @@ bool is_table(std::size_t effect) {
   return effect == effect_index<effects::ForceTable>();
 }
 
-/// A mass on a spring fits the part of any random force that is near its frequency. As a candidate it was
-/// named in 3 of 18 cases without one, and a diagnosis took 2.5 times as long. So it is fitted where the
-/// plant file has it, and not searched for; so are backlash, which has the same two states, and a ripple with
-/// the velocity, which a curve describes.
+/// A ripple with the velocity is described by a curve. It is fitted where the plant file has it.
 bool is_searched_for(std::size_t effect) {
-  return !is_table(effect) && !attaches_mass(effect) && effect != effect_index<effects::VelocityRipple>();
+  return !is_table(effect) && effect != effect_index<effects::VelocityRipple>();
 }
 
 /// Of the forces at work in these runs, whatever the size of the rig: a few percent of the motor's. In the
@@ -71,6 +69,7 @@ double usual_torque_nm(const DataRange& range, const PriorPolicy& prior) {
 
 DataRange range_of(const std::vector<Measurement>& runs, const Plant& plant, const ExcitationPolicy& policy) {
   DataRange range;
+  range.cart_mass_kg = plant.cart_mass_kg;
   double sum = 0.0, count = 0.0;
   range.shortest_period_s = 1.0;
   range.measured = motion_range(runs, policy.speed_window_s);
@@ -165,6 +164,7 @@ std::vector<FreeParameter> free_parameters(std::size_t effect, const DataRange& 
     }
     free.push_back(p);
   }
+  if (attaches_mass(effect)) limit_attached_mass(effect, range, prior, free);
   return free;
 }
 
@@ -246,9 +246,15 @@ std::vector<std::size_t> base_corrections(const Plant& plant, const DataRange& r
   return effects;
 }
 
-std::vector<std::size_t> candidate_effects(const Plant& plant, const DataRange& range) {
+namespace {
+
+/// Candidates among the effects for which `is_asked` holds.
+template <class IsAsked>
+std::vector<std::size_t> candidates_among(const Plant& plant, const DataRange& range,
+                                          const IsAsked& is_asked) {
   std::vector<std::size_t> effects;
   for (std::size_t i = 0; i < effect_count; ++i) {
+    if (!is_asked(i)) continue;
     const EffectInfo& info = effect_registry()[i];
     if (plant.find(i) != nullptr || info.enters == Enters::parameter || !is_searched_for(i)) continue;
     const bool angle = info.kind.starts_with("angle_");
@@ -268,10 +274,21 @@ std::vector<std::size_t> candidate_effects(const Plant& plant, const DataRange& 
   return effects;
 }
 
+}  // namespace
+
+std::vector<std::size_t> candidate_effects(const Plant& plant, const DataRange& range) {
+  return candidates_among(plant, range, [](std::size_t effect) { return !attaches_mass(effect); });
+}
+
+std::vector<std::size_t> attached_mass_candidates(const Plant& plant, const DataRange& range) {
+  return candidates_among(plant, range, attaches_mass);
+}
+
 std::vector<std::vector<double>> search_starts(std::size_t effect, const DataRange& range,
                                                const PriorPolicy& prior, const SearchBudget& budget) {
   const EffectInfo& info = effect_registry()[effect];
   const double speed = range.largest_speed_mps, volts = range.largest_voltage_v;
+  if (attaches_mass(effect)) return attached_mass_starts(effect, range, prior);
   if (is_periodic(effect)) return periodic_starts(effect, {}, range, prior, budget);
   if (is_named(effect, "voltage_saturation"))
     return {{0.9 * volts}, {0.7 * volts}, {0.5 * volts}, {0.3 * volts}};

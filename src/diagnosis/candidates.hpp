@@ -17,6 +17,7 @@ struct DataRange {
   std::vector<QuantityRange> measured;  ///< of each quantity that some run measured
   bool cart_moves = false;              ///< some run has a free cart that is measured
   bool theta_measured = false;
+  double cart_mass_kg = 0.0;  ///< as in the plant file
   double largest_voltage_v = 0.0;
   double largest_force_n = 0.0;  ///< of the motor at that voltage
   double largest_speed_mps = 0.0;
@@ -54,6 +55,10 @@ std::vector<std::size_t> base_corrections(const Plant& plant, const DataRange& r
 
 /// Effects that could be added to the plant, in the registry's order: those it does not have.
 std::vector<std::size_t> candidate_effects(const Plant& plant, const DataRange& range);
+
+/// Of the effects that attach a mass to the cart, those that could be added. They are not among the others:
+/// a mass on a spring fits the part of any random force that is near its frequency.
+std::vector<std::size_t> attached_mass_candidates(const Plant& plant, const DataRange& range);
 
 /// Whether `a` is the plainer of two effects that explain the same: fewer parameters; of the names of one and
 /// the same force (docs/reference/effects.md) the one that supposes least; else the one registered first.

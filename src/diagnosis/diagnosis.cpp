@@ -207,10 +207,25 @@ class Diagnostician {
   /// Where more than noise is left, the search goes on.
   ResidualTests search_further(ResidualTests left) {
     if (left.structured && selection_.renew_initial_states()) left = settle();
+    if (left.structured) left = with_attached_mass(left);
     if (left.structured && selection_.find_pairs_of_all()) left = settle();
     if (left.structured && selection_.find_without_each()) left = settle();
     if (left.beyond_sensors && selection_.find_thoroughly(left.structured)) left = settle();
     return left;
+  }
+
+  /// A mass on a spring fits a part of most of what is left, so it stays only if nothing is left beside it,
+  /// or beside it and what else the data then show.
+  ResidualTests with_attached_mass(const ResidualTests& left) {
+    if (!selection_.find_attached_mass()) return left;
+    ResidualTests with = settle();
+    if (with.structured) {
+      selection_.find_again();
+      with = settle();
+    }
+    if (selection_.has_attached_mass() && !beside_coloured_noise(with).structured) return with;
+    selection_.give_up_attached_mass();
+    return settle();
   }
 
   /// Settles the corrections, and looks at what is left.
@@ -244,6 +259,7 @@ class Diagnostician {
   /// that accounts for the residual better. What passes the tests beside white noise has passed them.
   ResidualTests beside_coloured_noise(const ResidualTests& left) {
     noise_ = fits_.known().train.point.noise;
+    disturbed_ = false;
     options_.report_progress(0.945, "estimating a coloured disturbance");
     const FitResult coloured = search_.with_coloured_noise(fits_.known());
     if (!(minus_log_likelihood(fits_.known().train) - minus_log_likelihood(coloured) >
@@ -293,7 +309,8 @@ class Diagnostician {
       withdraw(worst->effect, worst->where);
       return true;
     }
-    if (const RunDifference* differs = most_different_between_runs()) {
+    differences_ = run_differences(search_, fits_.known(), fits_.effects());
+    if (const RunDifference* differs = most_certain_of_single_runs(differences_, policy_.reproducibility)) {
       withdraw(differs->effect, sentence_on(*differs, runs_));
       result_.helps_here_only.back().by_run = differs->sizes;
       selection_.exclude(same_force_as(differs->effect));
@@ -352,18 +369,6 @@ class Diagnostician {
       if (!withdrawn_.contains(effect))
         withdraw(effect, "not certain enough for a quick diagnosis: repeat it without --quick");
     return !doubtful.empty();
-  }
-
-  /// Of the effects that need not help on a further run, the one whose sizes differ most certainly; else
-  /// null.
-  const RunDifference* most_different_between_runs() {
-    differences_ = run_differences(search_, fits_.known(), fits_.effects());
-    const RunDifference* most = nullptr;
-    for (const RunDifference& difference : differences_)
-      if (is_of_single_runs(difference, policy_.reproducibility) &&
-          (most == nullptr || difference.certainty > most->certainty))
-        most = &difference;
-    return most;
   }
 
   void withdraw(std::size_t effect, const std::string& where) {
@@ -476,21 +481,13 @@ class Diagnostician {
         options_.report_progress(0.97, "fitting " + kind_of(other) + " in place of " + kind_of(effect));
         if (!without) without = search_.without(selection_.current(), effect);
         if (!std::isfinite(without->train.objective)) break;
-        Hypothesis alternative = search_.screened(*without, other);
-        search_.converge_on_subset(alternative);
         if (!on_screening_subset)
           on_screening_subset = search_.on_screening_subset(selection_.current()).train.objective;
-        // So much worse on a part, it is no better on the whole.
-        if (!(alternative.train.objective - *on_screening_subset <
-              policy_.distinction.max_scattered_evidence))
-          continue;
-        alternative.train.point.noise = selection_.current().train.point.noise;
-        search_.refit(*without, alternative);
-        const Improvement worse = compare(alternative, selection_.current());
-        if (!search_.is_plausible(alternative, other)) continue;
-        if (!is_indistinguishable(worse.train, worse.t_value, policy_.distinction)) continue;
+        const auto plant =
+            fitted_alternative(search_, selection_.current(), *without, other, *on_screening_subset);
+        if (!plant) continue;
         declare(effect, other);
-        alternatives.emplace_back(other, alternative.train.point.plant);
+        alternatives.emplace_back(other, *plant);
       }
     }
     if (!alternatives.empty())

@@ -78,6 +78,22 @@ std::vector<FreedEffect> freed_effects(const Search& search, const Hypothesis& h
   return freed;
 }
 
+std::optional<Plant> fitted_alternative(Search& search, const Hypothesis& current, const Hypothesis& without,
+                                        std::size_t effect, double objective_on_subset) {
+  const DistinctionPolicy& policy = search.policy().distinction;
+  Hypothesis alternative = search.screened(without, effect);
+  search.converge_on_subset(alternative);
+  // So much worse on a part, it is no better on the whole.
+  if (!(alternative.train.objective - objective_on_subset < policy.max_scattered_evidence))
+    return std::nullopt;
+  alternative.train.point.noise = current.train.point.noise;
+  search.refit(without, alternative);
+  const Improvement worse = compare(alternative, current);
+  if (!search.is_plausible(alternative, effect) || !is_indistinguishable(worse.train, worse.t_value, policy))
+    return std::nullopt;
+  return alternative.train.point.plant;
+}
+
 std::vector<Alternative> linear_alternatives(const Search& search, const Hypothesis& h,
                                              const std::vector<std::size_t>& listed,
                                              const std::vector<FreedEffect>& freed) {

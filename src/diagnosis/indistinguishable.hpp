@@ -2,6 +2,7 @@
 // open beside it, could take its place.
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "search.hpp"
@@ -33,6 +34,11 @@ bool reduces_certainty(double distance_with_other, double distance_alone, const 
 /// Whether an effect that was fitted in the place of another does as well: by the evidence that is lost, and
 /// the t value of the loss.
 bool is_indistinguishable(double evidence_lost, double t_value, const DistinctionPolicy& policy);
+
+/// The plant with an effect fitted in the place of the one that `without` lacks; none if the data distinguish
+/// it from `current`, whose objective on the screening subset is given.
+std::optional<Plant> fitted_alternative(Search& search, const Hypothesis& current, const Hypothesis& without,
+                                        std::size_t effect, double objective_on_subset);
 
 /// Alternatives of `listed` effects of `h` among the `freed` ones that act in proportion to their size where
 /// they do nothing. What acts otherwise (saturation, lag, delay, ...) does not show here and has to be

@@ -109,6 +109,15 @@ bool is_of_single_runs(const RunDifference& difference, const ReproducibilityPol
   return differs && difference.certainty_of_help < normal_95;
 }
 
+const RunDifference* most_certain_of_single_runs(const std::vector<RunDifference>& differences,
+                                                 const ReproducibilityPolicy& policy) {
+  const RunDifference* most = nullptr;
+  for (const RunDifference& difference : differences)
+    if (is_of_single_runs(difference, policy) && (most == nullptr || difference.certainty > most->certainty))
+      most = &difference;
+  return most;
+}
+
 std::string sentence_on(const RunDifference& difference, const std::vector<Measurement>& runs) {
   const ParameterInfo& size = effect_registry()[difference.effect].parameters[0];
   std::ostringstream text;

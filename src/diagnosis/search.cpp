@@ -197,9 +197,13 @@ bool Search::is_plausible(const Hypothesis& h, std::size_t effect) const {
 }
 
 bool Search::is_admissible(const Hypothesis& h, std::size_t effect) const {
-  for (const FreeParameter& p : h.free)
-    if (p.effect == effect && p.index == 0 && !(h.train.point.plant.find(effect)->values[0] < p.high))
-      return false;
+  // A vibration at the slow or the fast end is none, so an attached mass has no parameter at an end.
+  const bool all = attaches_mass(effect);
+  for (const FreeParameter& p : h.free) {
+    if (p.effect != effect || (p.index != 0 && !all)) continue;
+    const double value = h.train.point.plant.find(effect)->values[p.index];
+    if (!(value < p.high) || (all && p.low > 0.0 && !(value > p.low))) return false;
+  }
   return kind_of(effect) != "bristle_friction" || bristles_are_short(h);
 }
 

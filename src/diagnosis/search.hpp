@@ -158,7 +158,8 @@ class Search {
   /// A hypothesis in which the new effect does nothing, or is of a size that makes it another effect, has
   /// lost.
   bool is_plausible(const Hypothesis& h, std::size_t effect) const;
-  /// The second half of that: no size at the end of its range, no bristles that are a spring.
+  /// The second half of that: no size at the end of its range, no bristles that are a spring, no attached
+  /// mass that does not vibrate.
   bool is_admissible(const Hypothesis& h, std::size_t effect) const;
   /// How many standard errors the size of an effect is from nothing: from what the plant file says, of a
   /// correction. Its other parameters (a shape, a place) are held: without a size they mean nothing.

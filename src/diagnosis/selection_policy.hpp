@@ -301,6 +301,9 @@ struct PriorPolicy {
   double min_pitch_m = 5e-4;
   /// [crests] A force is periodic only if the run passes this many of its crests.
   double crests_of_pitch = 3.0;
+  /// [samples] Of a vibration of an attached mass, the fewest in a period. Two would do without noise.
+  /// Chosen.
+  double samples_of_vibration = 4.0;
   /// [m] Pitches up to this are always searched. Chosen.
   double min_longest_pitch_m = 0.002;
   /// [m] Half a track: the standard deviation of the centre of a spring about the mean position of the cart.

@@ -1,7 +1,9 @@
-// The part of the selection that leaves its path: one wrong name at the beginning can keep all others away.
+// The part of the selection that leaves its path: one wrong name at the beginning can keep all others away,
+// and what has states of its own is no candidate on it.
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <utility>
 
 #include "stepwise_selection.hpp"
 
@@ -51,6 +53,31 @@ bool StepwiseSelection::find_without(std::size_t effect) {
   }
   record_step();
   return better;
+}
+
+bool StepwiseSelection::find_attached_mass() {
+  const int round = 4 * budget_.max_rounds;
+  const double to_beat = search_.on_screening_subset(current_).train.objective;
+  without_attached_mass_.emplace(Checkpoint{std::exchange(current_, given_), std::exchange(found_, {})});
+  std::vector<ScreenedCandidate> screened = screen(round, false, Candidates::attached_masses);
+  std::erase_if(screened,
+                [&](const ScreenedCandidate& s) { return !(s.hypothesis.train.objective < to_beat); });
+  if (add_best_of(screened, round, false)) {
+    converge(current_);
+    if (current_.train.objective < without_attached_mass_->hypothesis.train.objective) return true;
+  }
+  give_up_attached_mass();
+  return false;
+}
+
+bool StepwiseSelection::has_attached_mass() const {
+  return std::any_of(found_.begin(), found_.end(), attaches_mass);
+}
+
+void StepwiseSelection::give_up_attached_mass() {
+  current_ = std::move(without_attached_mass_->hypothesis);
+  found_ = std::move(without_attached_mass_->found);
+  record_step();
 }
 
 }  // namespace upright

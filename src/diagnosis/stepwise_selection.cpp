@@ -93,10 +93,12 @@ void StepwiseSelection::hold(std::size_t number) {
   current_ = search_.with_held_numbers(current_);
 }
 
-std::vector<std::size_t> StepwiseSelection::open_candidates() const {
-  std::vector<std::size_t> candidates = candidate_effects(current_.train.point.plant, search_.range());
+std::vector<std::size_t> StepwiseSelection::open_candidates(Candidates which) const {
+  const bool usual = which == Candidates::usual;
+  std::vector<std::size_t> candidates =
+      (usual ? candidate_effects : attached_mass_candidates)(current_.train.point.plant, search_.range());
   for (const std::size_t effect : search_.nuisances())
-    if (!current_.added.contains(effect)) candidates.push_back(effect);
+    if (usual && !current_.added.contains(effect)) candidates.push_back(effect);
   std::erase_if(candidates, [&](std::size_t effect) { return withdrawn_.contains(effect); });
   return candidates;
 }
@@ -291,9 +293,17 @@ void StepwiseSelection::select_forward(int first_round, int last_round, bool wit
   resolve_doubt();
 }
 
+double StepwiseSelection::share_done(int round) {
+  return std::min(0.05 + 0.2 * round, 0.7);
+}
+
 bool StepwiseSelection::add_best(int round, bool with_low_noise) {
-  const double done = std::min(0.05 + 0.2 * round, 0.7);
-  const std::vector<ScreenedCandidate> screened = screen(round, with_low_noise, done);
+  return add_best_of(screen(round, with_low_noise, Candidates::usual), round, with_low_noise);
+}
+
+bool StepwiseSelection::add_best_of(const std::vector<ScreenedCandidate>& screened, int round,
+                                    bool with_low_noise) {
+  const double done = share_done(round);
   std::vector<Finalist> accepted = fit_finalists(round, screened, with_low_noise, done);
   if (accepted.empty()) return false;
   take(round, accepted[choose(accepted)], screened);
@@ -303,11 +313,12 @@ bool StepwiseSelection::add_best(int round, bool with_low_noise) {
 }
 
 std::vector<StepwiseSelection::ScreenedCandidate> StepwiseSelection::screen(int round, bool with_low_noise,
-                                                                            double done) {
+                                                                            Candidates which) {
+  const double done = share_done(round);
   options_.report_progress(done, "ranking the candidates");
   Hypothesis from = current_;
   if (with_low_noise) from.train.point.noise = reduced_process_noise(from.train.point.noise);
-  const std::vector<std::size_t> candidates = promising_candidates(from, open_candidates(), round);
+  const std::vector<std::size_t> candidates = promising_candidates(from, open_candidates(which), round);
   Hypothesis reference = search_.descended_on_subset(from);
   // What hardly gains with the noise as it is gains no more from other noise.
   const double to_reach = reference.train.objective - least_predicted_gain();

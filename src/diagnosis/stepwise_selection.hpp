@@ -40,6 +40,14 @@ class StepwiseSelection {
   /// without it; one effect after the other, until a better model is found. Whether one was.
   bool find_without_each();
 
+  /// What is left is certainly more than noise: in the place of all that was found, a mass with a motion of
+  /// its own on the cart. Whether one is better. Until then no candidate is one.
+  bool find_attached_mass();
+  /// Whether one stands among what was found.
+  bool has_attached_mass() const;
+  /// Back to what stood before it was sought.
+  void give_up_attached_mass();
+
   /// After something was taken out for good: looks for what can stand in its place.
   void find_again();
   /// No candidate from now on.
@@ -92,7 +100,9 @@ class StepwiseSelection {
     std::vector<std::size_t> found;
   };
 
-  std::vector<std::size_t> open_candidates() const;
+  enum class Candidates { usual, attached_masses };
+
+  std::vector<std::size_t> open_candidates(Candidates which) const;
   /// A candidate that promises less is not screened: the least evidence is out of its reach.
   double least_predicted_gain() const;
   /// Notes a candidate of the first round, in the place of an earlier note.
@@ -134,8 +144,12 @@ class StepwiseSelection {
   void select_forward(int first_round, int last_round, bool with_low_noise);
   /// One round: whether an effect was added.
   bool add_best(int round, bool with_low_noise);
-  /// All promising candidates. `done`: how far the work is.
-  std::vector<ScreenedCandidate> screen(int round, bool with_low_noise, double done);
+  /// The same, of these.
+  bool add_best_of(const std::vector<ScreenedCandidate>& screened, int round, bool with_low_noise);
+  /// How far the work is.
+  static double share_done(int round);
+  /// All promising candidates.
+  std::vector<ScreenedCandidate> screen(int round, bool with_low_noise, Candidates which);
   /// The best of them fitted in full: those that the data believe, or, where there are none, those that only
   /// held-out runs speak against.
   std::vector<Finalist> fit_finalists(int round, const std::vector<ScreenedCandidate>& screened,
@@ -187,6 +201,7 @@ class StepwiseSelection {
   Hypothesis given_, current_;
   std::vector<std::size_t> found_;
   std::optional<Checkpoint> checkpoint_;
+  std::optional<Checkpoint> without_attached_mass_;
   bool contradicted_ = false;
   std::set<std::size_t> withdrawn_;
   std::set<std::pair<std::size_t, std::size_t>> exchanged_;   ///< tried already

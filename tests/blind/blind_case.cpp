@@ -91,9 +91,9 @@ void keep_as_believed(const Request& request, const Plant& believed, Plant& trut
 
 void hide_unknown(const std::string& kind, Size size, const Scales& scales, Rig& rig, Random& random) {
   const double share = pick(size, 0.03, 0.10, 0.25), force_n = share * scales.force_n;
-  if (kind == "backlash") {
-    rig.unknown = Unknown::backlash;
-    rig.backlash_m = pick(size, 0.002, 0.006, 0.02) * scales.travel_m;
+  if (kind == "encoder_play") {
+    rig.unknown = Unknown::encoder_play;
+    rig.play_m = pick(size, 0.002, 0.006, 0.02) * scales.travel_m;
   } else if (kind == "gusts") {
     rig.unknown = Unknown::gusts;
     rig.gust_force_n = 2.0 * force_n;
@@ -130,9 +130,9 @@ std::string_view name_of(Condition condition) {
 }
 
 std::vector<std::string> unknown_kinds(Condition condition) {
-  if (condition != Condition::laboratory) return {"backlash", "gusts"};
+  if (condition != Condition::laboratory) return {"encoder_play", "gusts"};
   std::vector<std::string> kinds;
-  for (const Unknown unknown : {Unknown::backlash, Unknown::gusts, Unknown::rough_track,
+  for (const Unknown unknown : {Unknown::encoder_play, Unknown::gusts, Unknown::rough_track,
                                 Unknown::velocity_ripple, Unknown::force_drift}) {
     const std::string kind(name_of(unknown));
     if (effect_number(kind) == effect_count) kinds.push_back(kind);
@@ -216,7 +216,7 @@ Plant nearly_as_believed(const Case& blind, double off, Random& random) {
 void hide_effects(Case& blind, const Scales& scales, Plant& truth, Random& random) {
   const auto& known = hidden_kinds();
   for (const std::string& kind : blind.request.hidden) {
-    if (std::find(known.begin(), known.end(), kind) == known.end()) {
+    if (std::find(known.begin(), known.end(), kind) == known.end() && !attaches_mass(effect_number(kind))) {
       hide_unknown(kind, blind.request.size, scales, blind.rig, random);
       continue;
     }

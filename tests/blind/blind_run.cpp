@@ -136,8 +136,8 @@ std::string_view name_of(Unknown unknown) {
   switch (unknown) {
     case Unknown::none:
       return "none";
-    case Unknown::backlash:
-      return "backlash";
+    case Unknown::encoder_play:
+      return "encoder_play";
     case Unknown::gusts:
       return "gusts";
     case Unknown::rough_track:
@@ -204,8 +204,8 @@ Measurement measure(const Rig& rig, const Plan& plan, const std::string& name) {
     simulator.advance_to(read_s);
     const Outputs<double> y = simulator.engine().outputs();
     double cart = y.cart_m;
-    if (rig.unknown == Unknown::backlash)
-      cart = shown_m = std::clamp(shown_m, cart - 0.5 * rig.backlash_m, cart + 0.5 * rig.backlash_m);
+    if (rig.unknown == Unknown::encoder_play)
+      cart = shown_m = std::clamp(shown_m, cart - 0.5 * rig.play_m, cart + 0.5 * rig.play_m);
     const double cart_m = quantised(cart + cart_noise.next(), rig.cart_step_m);
     const double theta_rad = quantised(y.theta_rad + theta_noise.next(), rig.theta_step_rad);
     const double volts = driver.volts(k, nominal_s, cart_m, theta_rad);

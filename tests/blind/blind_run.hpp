@@ -1,6 +1,6 @@
 // One run of a rig that is not the model's: the CVODE reference engine with true events follows the true
 // plant, sensors are quantised or noisy, reading times jitter, unmodelled forces and torques may act, and
-// what no effect of the registry says (backlash, gusts, ...) may be there.
+// what no effect of the registry says (play of an encoder, gusts, ...) may be there.
 #pragma once
 
 #include <array>
@@ -17,7 +17,7 @@ namespace upright::blind {
 /// What no effect of the registry describes.
 enum class Unknown {
   none,
-  backlash,
+  encoder_play,
   gusts,
   rough_track,      ///< a random force that belongs to the place
   velocity_ripple,  ///< a force that ripples with the velocity
@@ -38,7 +38,7 @@ struct ColouredDisturbance {
 struct Rig {
   Plant plant;
   Unknown unknown = Unknown::none;
-  double backlash_m = 0.0;    ///< play between cart and encoder
+  double play_m = 0.0;        ///< play between cart and encoder
   double gust_force_n = 0.0;  ///< typical peak
   /// rough_track: standard deviation [N]; velocity_ripple and force_drift: amplitude [N].
   double unknown_size = 0.0;

@@ -131,6 +131,15 @@ std::vector<double> values_for(const std::string& kind, Size size, const Plant& 
     return {pick(size, 0.005, 0.02, 0.06) * between(random, 0.8, 1.25),
             s.travel_m / between(random, 4.0, 12.0), between(random, -3.0, 3.0)};
   if (kind == "drive_compliance") return {pick(size, 0.0002, 0.0006, 0.002) * s.travel_m / s.force_n};
+  if (kind == "sprung_mass")
+    return {share * plant.cart_mass_kg, between(random, 1.0, 6.0) / time_constant_s(plant),
+            between(random, 0.03, 0.2)};
+  if (kind == "backlash") {
+    const double motor_share = between(random, 0.1, 0.4), contact_radps = between(random, 200.0, 600.0);
+    return {pick(size, 0.0005, 0.002, 0.008) * s.travel_m, motor_share,
+            motor_share * plant.cart_mass_kg * contact_radps * contact_radps,
+            between(random, 0.5, 2.0) / s.speed_mps};
+  }
   if (kind == "voltage_saturation") return {s.high_volts * pick(size, 0.85, 0.65, 0.45)};
   if (kind == "voltage_dead_zone") return {share * s.volts};
   if (kind == "voltage_gain") return {1.0 + sign * share};

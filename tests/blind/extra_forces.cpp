@@ -52,7 +52,7 @@ ExtraForces::ExtraForces(const Rig& rig, const Plan& plan)
   if (rig.unknown == Unknown::gusts) add_gusts(random);
   add_coloured(plan.seed * 15485863 + 11);
   varies_ = rig.disturbance_n > 0.0 || rig.coloured.force_n > 0.0 || rig.coloured.torque_nm > 0.0 ||
-            rig.rough_n > 0.0 || (rig.unknown != Unknown::none && rig.unknown != Unknown::backlash);
+            rig.rough_n > 0.0 || (rig.unknown != Unknown::none && rig.unknown != Unknown::encoder_play);
 }
 
 std::size_t ExtraForces::index_at(double time_s) const {
@@ -77,7 +77,7 @@ double ExtraForces::cart_force_n(double time_s, const PlantState<double>& state)
     case Unknown::force_drift:
       return force + size * (2.0 * time_s / duration_s_ - 1.0);
     case Unknown::none:
-    case Unknown::backlash:
+    case Unknown::encoder_play:
     case Unknown::gusts:
       break;
   }

@@ -175,7 +175,7 @@ bool is_recognised(const Diagnosis& diagnosis) {
 
 TEST(Diagnosis, DoesNotExplainBacklash) {
   std::mt19937_64 random(16);
-  const blind::Rig rig{.plant = true_plant(random), .unknown = blind::Unknown::backlash, .backlash_m = 2e-3};
+  const blind::Rig rig{.plant = true_plant(random), .unknown = blind::Unknown::encoder_play, .play_m = 2e-3};
   EXPECT_TRUE(is_recognised(diagnose(believed_plant(), hanging_runs(rig, 16))));
 }
 
@@ -307,7 +307,7 @@ INSTANTIATE_TEST_SUITE_P(Cases, BlindNothing,
                          name_of_case);
 INSTANTIATE_TEST_SUITE_P(Cases, BlindUnknown,
                          testing::Values(BlindCase{{"gusts"}, Size::strong, false, 231},
-                                         BlindCase{{"backlash"}, Size::strong, true, 234}),
+                                         BlindCase{{"encoder_play"}, Size::strong, true, 234}),
                          name_of_case);
 
 TEST(Diagnosis, RefusesRunsThatTheModelCannotShow) {

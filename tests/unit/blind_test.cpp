@@ -252,13 +252,16 @@ TEST(LaboratoryCase, StaysWithinWhatItStates) {
 
 TEST(LaboratoryCase, HidesEveryKind) {
   std::vector<std::string> kinds = blind::hidden_kinds();
+  kinds.insert(kinds.end(), {"sprung_mass", "backlash"});
+  const std::size_t known_kinds = kinds.size();
   for (const std::string& kind : blind::unknown_kinds(Condition::laboratory)) kinds.push_back(kind);
   std::uint64_t seed = 100;
-  for (const std::string& kind : kinds) {
+  for (std::size_t i = 0; i < kinds.size(); ++i) {
+    const std::string& kind = kinds[i];
     blind::Request request = laboratory(++seed, {kind});
     request.max_samples = 1000.0;
     const blind::Case one = make_case(request);
-    const bool known = effect_number(kind) < effect_count;
+    const bool known = i < known_kinds;
     EXPECT_EQ(one.hidden.size(), known ? 1u : 0u) << kind;
     EXPECT_EQ(one.rig.unknown == Unknown::none, known) << kind;
     EXPECT_TRUE(fault_of(one.rig.plant).empty()) << kind << ": " << fault_of(one.rig.plant);

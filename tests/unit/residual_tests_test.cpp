@@ -83,8 +83,8 @@ InnovationStatistics left_of(const std::vector<Measurement>& runs, const Plant& 
 
 TEST(Structure, SeesTheSameInARigThatIsTenTimesAsLarge) {
   blind::Rig rig{.plant = cart(), .disturbance_n = 0.05};
-  rig.unknown = blind::Unknown::backlash;
-  rig.backlash_m = 3e-4;
+  rig.unknown = blind::Unknown::encoder_play;
+  rig.play_m = 3e-4;
   const std::vector<Measurement> runs = runs_of(rig);
   const InnovationStatistics small = left_of(runs, cart(), 0.1, policy_for(cart()));
   const InnovationStatistics large = left_of(enlarged(runs), large_cart(), 100.0, policy_for(large_cart()));
@@ -159,8 +159,8 @@ TEST(Bootstrap, FindsBacklashAndNotWhiteForce) {
     return failed_test(tests_of(of_white_force(runs, rig)), {}) != nullptr;
   };
   EXPECT_FALSE(fails());
-  rig.unknown = blind::Unknown::backlash;
-  rig.backlash_m = 5e-4;
+  rig.unknown = blind::Unknown::encoder_play;
+  rig.play_m = 5e-4;
   EXPECT_TRUE(fails());
 }
 

@@ -101,8 +101,8 @@ TEST(BlindRun, BacklashHidesHalfThePlayEitherWay) {
   blind::Plan plan = short_plan(blind::Experiment::multisine);
   plan.centring_v_per_m = 0.0;  // so that what the encoder shows does not come back into the voltages
   const Measurement plain = measure(rig, plan, "run");
-  rig.unknown = blind::Unknown::backlash;
-  rig.backlash_m = 2e-3;
+  rig.unknown = blind::Unknown::encoder_play;
+  rig.play_m = 2e-3;
   const Measurement loose = measure(rig, plan, "run");
   double largest = 0.0;
   for (std::size_t k = 0; k < plain.size(); ++k)

@@ -1,0 +1,70 @@
+#include "attached_mass_search.hpp"
+
+#include <algorithm>
+#include <numbers>
+
+namespace upright {
+
+namespace {
+
+struct Frequencies {
+  double slowest_hz, fastest_hz;
+};
+
+Frequencies frequencies_shown(const DataRange& range, const PriorPolicy& prior) {
+  return {prior.crests_of_pitch / range.longest_run_s,
+          1.0 / (prior.samples_of_vibration * range.shortest_period_s)};
+}
+
+/// Of a spring on which this mass vibrates [N/m].
+double stiffness_for(double mass_kg, double frequency_hz) {
+  const double radps = 2.0 * std::numbers::pi * frequency_hz;
+  return mass_kg * radps * radps;
+}
+
+}  // namespace
+
+void limit_attached_mass(std::size_t effect, const DataRange& range, const PriorPolicy& prior,
+                         std::vector<FreeParameter>& free) {
+  const auto [slowest_hz, fastest_hz] = frequencies_shown(range, prior);
+  const auto parameters = effect_registry()[effect].parameters;
+  for (std::size_t i = 0; i < free.size(); ++i) {
+    FreeParameter& p = free[i];
+    const std::string_view name = parameters[i].name;
+    if (name == "sprung_mass_kg") p.high = range.cart_mass_kg;
+    if (name == "damping_ratio") p.high = 1.0;  // beyond it, nothing vibrates
+    if (name == "gap_m") p.high = range.longest_travel_m;
+    if (name == "frequency_hz") {
+      p.low = slowest_hz;
+      p.high = fastest_hz;
+    }
+    if (name == "stiffness_n_per_m" && range.longest_travel_m > 0.0) {
+      p.low = range.largest_force_n / range.longest_travel_m;
+      p.high = stiffness_for(range.cart_mass_kg, fastest_hz);
+    }
+  }
+}
+
+std::vector<std::vector<double>> attached_mass_starts(std::size_t effect, const DataRange& range,
+                                                      const PriorPolicy& prior) {
+  const auto [slowest_hz, fastest_hz] = frequencies_shown(range, prior);
+  const auto parameters = effect_registry()[effect].parameters;
+  std::vector<std::vector<double>> starts;
+  if (effect == effect_index<effects::SprungMass>()) {
+    constexpr double cart_share = 0.03, damping_ratio = 0.2;  // the peak is broad: a start may be far off
+    for (const double octaves : {0.25, 0.5, 1.0, 2.0, 4.0}) {
+      const double frequency_hz = octaves * parameters[1].typical;
+      if (frequency_hz > slowest_hz && frequency_hz < fastest_hz)
+        starts.push_back({cart_share * range.cart_mass_kg, frequency_hz, damping_ratio});
+    }
+    return starts;
+  }
+  constexpr double contact_hz = 100.0;
+  const double share = parameters[1].typical;
+  const double stiffness = stiffness_for(share * range.cart_mass_kg, std::min(contact_hz, 0.5 * fastest_hz));
+  for (const double times : {0.25, 1.0, 4.0})
+    starts.push_back({times * parameters[0].typical, share, stiffness, parameters[3].typical});
+  return starts;
+}
+
+}  // namespace upright

@@ -1,0 +1,81 @@
+// A mass with a motion of its own on the cart is found where the runs of a rig show one, on a light and on a
+// heavy rig. One that is in the plant file already stays the only one.
+#include "diagnosis/attached_mass_search.hpp"
+
+#include <gtest/gtest.h>
+
+#include "diagnosis/candidates.hpp"
+#include "diagnosis/plant_scale.hpp"
+#include "named_effects.hpp"
+
+namespace upright {
+namespace {
+
+/// The effect that is named alone, with the values that were found.
+PlantEffect only_named(const Plant& believed, const Plant& truth) {
+  const Diagnosis d = diagnose(believed, three_runs({.plant = truth}, 6.0, 5), {});
+  EXPECT_EQ(d.verdict, Verdict::explained);
+  EXPECT_EQ(d.effects.size(), 1u);
+  if (d.effects.size() != 1) return {};
+  return *d.model.find(d.effects.front().effect);
+}
+
+void expect_values(const PlantEffect& found, std::string_view kind, std::initializer_list<double> values,
+                   double tolerance) {
+  ASSERT_EQ(kind_of(found.number), kind);
+  std::size_t i = 0;
+  for (const double value : values) {
+    EXPECT_NEAR(found.values[i], value, tolerance * value) << i;
+    ++i;
+  }
+}
+
+TEST(AttachedMassSearch, FindsASprungMass) {
+  const auto values = {0.1, 4.0, 0.08};
+  Plant truth = cart_with_friction();
+  truth.set("sprung_mass", values);
+  expect_values(only_named(cart_with_friction(), truth), "sprung_mass", values, 0.1);
+}
+
+TEST(AttachedMassSearch, FindsBacklash) {
+  Plant truth = cart_with_friction();
+  truth.set("backlash", {1e-3, 0.25, 3e4, 10.0});
+  expect_values(only_named(cart_with_friction(), truth), "backlash", {1e-3, 0.25}, 0.1);
+}
+
+TEST(AttachedMassSearch, FindsASprungMassOnAHeavyRig) {
+  constexpr double factor = 85.0;
+  Plant heavy = cart_with_friction();
+  heavy.cart_mass_kg *= factor;
+  heavy.motor = {factor * heavy.motor.force_per_volt_n, factor * heavy.motor.back_emf_n_per_mps};
+  heavy.set("viscous_friction", {3.0 * factor});
+  heavy.set("coulomb_friction", {0.4 * factor});
+  Plant truth = heavy;
+  truth.set("sprung_mass", {0.1 * factor, 4.0, 0.08});
+  expect_values(only_named(heavy, truth), "sprung_mass", {0.1 * factor, 4.0, 0.08}, 0.1);
+}
+
+TEST(AttachedMassSearch, BeginsWithinItsLimits) {
+  const std::vector<Measurement> runs = three_runs({.plant = cart_with_friction()}, 6.0, 1);
+  Plant plant = cart_with_friction();
+  const SelectionPolicy policy = policy_for(plant);
+  const DataRange range = range_of(runs, plant, policy.excitation);
+  const std::vector<std::size_t> masses = attached_mass_candidates(plant, range);
+  ASSERT_EQ(masses.size(), 2u);
+  for (const std::size_t effect : masses) {
+    const std::vector<FreeParameter> free = free_parameters(effect, range, policy.prior);
+    const auto starts = attached_mass_starts(effect, range, policy.prior);
+    ASSERT_FALSE(starts.empty());
+    for (const std::vector<double>& start : starts)
+      for (std::size_t i = 0; i < free.size(); ++i) {
+        EXPECT_GT(start[i], free[i].low) << kind_of(effect) << i;
+        EXPECT_LT(start[i], free[i].high) << kind_of(effect) << i;
+      }
+  }
+  for (const std::size_t usual : candidate_effects(plant, range)) EXPECT_FALSE(attaches_mass(usual));
+  plant.set("sprung_mass", {0.1, 4.0, 0.08});
+  EXPECT_TRUE(attached_mass_candidates(plant, range).empty());
+}
+
+}  // namespace
+}  // namespace upright
