@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 namespace upright::blind {
 
@@ -131,9 +132,10 @@ std::vector<double> values_for(const std::string& kind, Size size, const Plant& 
     return {pick(size, 0.005, 0.02, 0.06) * between(random, 0.8, 1.25),
             s.travel_m / between(random, 4.0, 12.0), between(random, -3.0, 3.0)};
   if (kind == "drive_compliance") return {pick(size, 0.0002, 0.0006, 0.002) * s.travel_m / s.force_n};
-  if (kind == "sprung_mass")
-    return {share * plant.cart_mass_kg, between(random, 1.0, 6.0) / time_constant_s(plant),
-            between(random, 0.03, 0.2)};
+  if (kind == "sprung_mass") {
+    const double radps = between(random, 1.0, 6.0) / time_constant_s(plant);
+    return {share * plant.cart_mass_kg, radps / (2.0 * std::numbers::pi), between(random, 0.03, 0.2)};
+  }
   if (kind == "backlash") {
     const double motor_share = between(random, 0.1, 0.4), contact_radps = between(random, 200.0, 600.0);
     return {pick(size, 0.0005, 0.002, 0.008) * s.travel_m, motor_share,
