@@ -299,7 +299,8 @@ struct PriorPolicy {
   double fastest_stribeck_mps = 0.02;
   /// [m] The shortest pitch of a periodic force along the track. Chosen.
   double min_pitch_m = 5e-4;
-  /// [crests] A force is periodic only if the run passes this many of its crests.
+  /// [crests] A force is periodic only if the run passes this many of its crests. A vibration of an attached
+  /// mass has so many periods in the longest run.
   double crests_of_pitch = 3.0;
   /// [samples] Of a vibration of an attached mass, the fewest in a period. Two would do without noise.
   /// Chosen.
