@@ -6,11 +6,13 @@ namespace upright {
 
 namespace {
 
-/// The engine gets the voltage behind the static chain and the delay, which the filter follows itself.
+/// The engine gets the voltage behind the static chain and the delay, which the filter follows itself. What
+/// has a state stays.
 Plant without_static_actuator(Plant plant) {
   const std::size_t lag = effect_number("motor_lag");
   for (std::size_t effect = 0; effect < effect_count; ++effect)
-    if (effect_registry()[effect].enters == Enters::actuator && effect != lag) plant.remove(effect);
+    if (effect_registry()[effect].enters == Enters::actuator && effect != lag && !attaches_mass(effect))
+      plant.remove(effect);
   return plant;
 }
 
