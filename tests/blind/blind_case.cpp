@@ -129,13 +129,23 @@ std::string_view name_of(Condition condition) {
   return "";
 }
 
+namespace {
+
+/// Whether a diagnosis can name it: an effect of the registry that has a size here.
+bool is_known(const std::string& kind) {
+  const auto& known = hidden_kinds();
+  return std::find(known.begin(), known.end(), kind) != known.end() || attaches_mass(effect_number(kind));
+}
+
+}  // namespace
+
 std::vector<std::string> unknown_kinds(Condition condition) {
   if (condition != Condition::laboratory) return {"encoder_play", "gusts"};
   std::vector<std::string> kinds;
   for (const Unknown unknown : {Unknown::encoder_play, Unknown::gusts, Unknown::rough_track,
                                 Unknown::velocity_ripple, Unknown::force_drift}) {
     const std::string kind(name_of(unknown));
-    if (effect_number(kind) == effect_count) kinds.push_back(kind);
+    if (!is_known(kind)) kinds.push_back(kind);
   }
   return kinds;
 }
@@ -214,9 +224,8 @@ Plant nearly_as_believed(const Case& blind, double off, Random& random) {
 }
 
 void hide_effects(Case& blind, const Scales& scales, Plant& truth, Random& random) {
-  const auto& known = hidden_kinds();
   for (const std::string& kind : blind.request.hidden) {
-    if (std::find(known.begin(), known.end(), kind) == known.end() && !attaches_mass(effect_number(kind))) {
+    if (!is_known(kind)) {
       hide_unknown(kind, blind.request.size, scales, blind.rig, random);
       continue;
     }
