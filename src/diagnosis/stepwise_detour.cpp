@@ -59,12 +59,17 @@ bool StepwiseSelection::find_attached_mass() {
   const int round = 4 * budget_.max_rounds;
   const double to_beat = search_.on_screening_subset(current_).train.objective;
   without_attached_mass_.emplace(Checkpoint{std::exchange(current_, given_), std::exchange(found_, {})});
-  std::vector<ScreenedCandidate> screened = screen(round, false, Candidates::attached_masses);
-  std::erase_if(screened,
-                [&](const ScreenedCandidate& s) { return !(s.hypothesis.train.objective < to_beat); });
-  if (add_best_of(screened, round, false)) {
-    converge(current_);
-    if (current_.train.objective < without_attached_mass_->hypothesis.train.objective) return true;
+  try {
+    std::vector<ScreenedCandidate> screened = screen(round, false, Candidates::attached_masses);
+    std::erase_if(screened,
+                  [&](const ScreenedCandidate& s) { return !(s.hypothesis.train.objective < to_beat); });
+    if (add_best_of(screened, round, false)) {
+      converge(current_);
+      if (current_.train.objective < without_attached_mass_->hypothesis.train.objective) return true;
+    }
+  } catch (...) {  // the search may end at any time: what was found before it counts
+    give_up_attached_mass();
+    throw;
   }
   give_up_attached_mass();
   return false;
