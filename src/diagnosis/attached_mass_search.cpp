@@ -52,8 +52,8 @@ std::vector<std::vector<double>> attached_mass_starts(std::size_t effect, const 
   std::vector<std::vector<double>> starts;
   if (effect == effect_index<effects::SprungMass>()) {
     constexpr double cart_share = 0.03, damping_ratio = 0.2;  // the peak is broad: a start may be far off
-    for (const double octaves : {0.25, 0.5, 1.0, 2.0, 4.0}) {
-      const double frequency_hz = octaves * parameters[1].typical;
+    for (const double times : {0.25, 0.5, 1.0, 2.0, 4.0}) {
+      const double frequency_hz = times * parameters[1].typical;
       if (frequency_hz > slowest_hz && frequency_hz < fastest_hz)
         starts.push_back({cart_share * range.cart_mass_kg, frequency_hz, damping_ratio});
     }

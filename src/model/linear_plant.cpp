@@ -146,7 +146,8 @@ Plant with_sprung_mass_fixed(Plant plant) {
   const std::size_t sprung = effect_index<effects::SprungMass>();
   if (const PlantEffect* found = plant.find(sprung); found != nullptr) {
     const double corrected = make_model<double>(plant).corrected().cart_mass_kg / plant.cart_mass_kg;
-    plant.cart_mass_kg += found->values[0] / corrected;
+    plant.cart_mass_kg +=
+        effects::SprungMass::attached_mass_kg(found->values.data(), plant.cart_mass_kg) / corrected;
     plant.remove(sprung);
   }
   return plant;
