@@ -46,8 +46,8 @@ struct ExplainedShares {
   double voltage_needed = 0.0;
 };
 
-/// The residual of an equation with the channels as they are, and with the best delay of one of them
-/// (negative: of the others).
+/// The residual of an equation with the channels as they are, or with a delay of the motor that may be there,
+/// and with the best delay of one of them (negative: of the others).
 struct Lateness {
   double later_s = 0.0;
   double left = 1.0, left_at_best = 1.0;

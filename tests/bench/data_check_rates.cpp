@@ -1,10 +1,11 @@
 // How often the check of measured data names a mistake that was made, and how often one that was not: on
 // blind cases, whose rigs have hidden effects of every kind.
 //
-//   data_check_rates CASES [SEED [FOLDER]]
+//   data_check_rates CASES [SEED [MISTAKE [laboratory]]]
 //
-// FOLDER keeps the runs, so that they are made once. Prints a Markdown table for
-// docs/results/data-check.md.
+// MISTAKE is a part of the name of those that are made: "none", for example. With `laboratory`, the rigs, the
+// disturbances and the records are those of laboratories, else they are those of an IP02. Prints a Markdown
+// table for docs/results/data-check.md.
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -173,17 +174,20 @@ fs::path write(const Table& table, const fs::path& folder, const std::string& na
 }
 
 /// Every effect of the registry, none, pairs, and what the registry lacks, in turn.
-Case case_of(std::uint64_t seed, std::size_t number) {
+Case case_of(std::uint64_t seed, std::size_t number, bool laboratory) {
   std::vector<std::vector<std::string>> hidden = {{}, {}, {}};
   for (const EffectInfo& info : effect_registry()) hidden.push_back({std::string(info.kind)});
-  for (const std::string& kind : unknown_kinds(Condition::quantized)) hidden.push_back({kind});
+  for (const std::string& kind : unknown_kinds(laboratory ? Condition::laboratory : Condition::quantized))
+    hidden.push_back({kind});
   Request request;
   request.seed = seed * 1000003 + number;
   for (int i = 0; i < 4; ++i) hidden.push_back(random_pair(request.seed + static_cast<std::uint64_t>(i)));
   request.hidden = hidden[number % hidden.size()];
   request.size = static_cast<Size>((number + number / hidden.size()) % 3);
-  request.condition = number % 4 == 3 ? Condition::disturbed : Condition::quantized;
-  request.runs = 2;
+  request.condition = laboratory        ? Condition::laboratory
+                      : number % 4 == 3 ? Condition::disturbed
+                                        : Condition::quantized;
+  request.runs = laboratory ? 0 : 2;
   return make_case(request);
 }
 
@@ -216,8 +220,10 @@ void count_case(const Case& blind, const fs::path& folder, std::vector<Tally>& t
       else if (!said.empty())
         ++tallies[i].other;
       if (!said.empty() && !named)
-        std::fprintf(stderr, "seed %llu %s, %s: %s\n", static_cast<unsigned long long>(blind.request.seed),
-                     run.name.c_str(), mistake.name, said.c_str());
+        std::fprintf(stderr, "seed %llu %s, hidden: %s, %s: %s\n",
+                     static_cast<unsigned long long>(blind.request.seed), run.name.c_str(),
+                     blind.request.hidden.empty() ? "nothing" : blind.request.hidden[0].c_str(), mistake.name,
+                     said.c_str());
     }
   }
 }
@@ -227,12 +233,13 @@ void count_case(const Case& blind, const fs::path& folder, std::vector<Tally>& t
 int main(int argc, char** argv) {
   const std::size_t cases = argc > 1 ? std::strtoul(argv[1], nullptr, 10) : 20;
   const std::uint64_t seed = argc > 2 ? std::strtoul(argv[2], nullptr, 10) : 1;
+  const bool laboratory = argc > 4 && std::string(argv[4]) == "laboratory";
   const fs::path folder = fs::temp_directory_path() / "upright_data_check_rates";
   fs::create_directories(folder);
   std::vector<Tally> tallies(mistakes().size());
   for (std::size_t number = 0; number < cases; ++number) {
     try {
-      count_case(case_of(seed, number), folder, tallies, argc > 3 ? argv[3] : nullptr);
+      count_case(case_of(seed, number, laboratory), folder, tallies, argc > 3 ? argv[3] : nullptr);
     } catch (const Error& error) {
       std::fprintf(stderr, "case %zu: %s\n", number, error.what());
     }

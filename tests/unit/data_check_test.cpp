@@ -322,6 +322,23 @@ TEST_F(DataCheck, IsSilentAboutEveryEffectThatACaseHides) {
   }
 }
 
+/// The voltage of a closed loop follows the motion, so a later one accounts for it too. The motor of this rig
+/// is 31 ms late, and its cart has a strong drag.
+TEST_F(DataCheck, IsSilentAboutALateMotorInAClosedLoop) {
+  blind::Request request;
+  request.hidden = {"quadratic_drag", "input_delay"};
+  request.size = blind::Size::strong;
+  request.seed = 20261220ULL * 1000003 + 5;
+  request.condition = blind::Condition::laboratory;
+  request.runs = 7;
+  request.rate_hz = 1000.0;
+  request.duration_s = 10.0;
+  request.max_samples = 70000.0;
+  const blind::Case hidden = blind::make_case(request);
+  const auto found = find_mistakes(blind::measure_all(hidden), hidden.believed);
+  EXPECT_TRUE(found.empty()) << found[0].cause;
+}
+
 TEST_F(DataCheck, RefusesMotionThatNoVoltageOfTheRecordMakes) {
   const Plant plant = paper_plant();
   Measurement m = record(plant, Experiment::multisine, 0.4);
