@@ -12,7 +12,8 @@ struct Frequencies {
 };
 
 Frequencies frequencies_shown(const DataRange& range, const PriorPolicy& prior) {
-  return {prior.crests_of_pitch / range.longest_run_s,
+  // In segments that are shorter than a period, the initial states of the mass account for any slow force.
+  return {std::max(prior.crests_of_pitch / range.longest_run_s, 1.0 / range.longest_segment_s),
           1.0 / (prior.samples_of_vibration * range.shortest_period_s)};
 }
 

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "attached_mass_search.hpp"
+#include "estimation/segments.hpp"
 #include "motion_range.hpp"
 
 namespace upright {
@@ -80,6 +81,9 @@ DataRange range_of(const std::vector<Measurement>& runs, const Plant& plant, con
     range.cart_low_m = of.low;
     range.cart_high_m = of.high;
   }
+  for (const Segment& s : cut_segments(runs))
+    range.longest_segment_s =
+        std::max(range.longest_segment_s, runs[s.run].time_s[s.last] - runs[s.run].time_s[s.first]);
   for (const Measurement& run : runs) {
     range.longest_run_s = std::max(range.longest_run_s, run.time_s.back() - run.time_s.front());
     range.theta_measured = range.theta_measured || run.has_theta();

@@ -22,8 +22,9 @@ struct DataRange {
   double largest_force_n = 0.0;  ///< of the motor at that voltage
   double largest_speed_mps = 0.0;
   double cart_low_m = 0.0, cart_high_m = 0.0;
-  double longest_travel_m = 0.0;  ///< of one run
-  double longest_run_s = 0.0;     ///< from the first to the last sample of a run
+  double longest_travel_m = 0.0;   ///< of one run
+  double longest_run_s = 0.0;      ///< from the first to the last sample of a run
+  double longest_segment_s = 0.0;  ///< the same of what a fit follows from one initial state
   double cart_mean_m = 0.0;
   double shortest_period_s = 0.0;
   double theta_resolution_rad = 0.0;

@@ -49,8 +49,11 @@ std::optional<std::size_t> outdone_by_coloured_noise(const Search& search, const
   double least = std::numeric_limits<double>::infinity();
   if (!search.is_of_all_data(known.train.point)) return worst;
   for (const Reproduction& found : effects) {
-    if (search.is_plant_number(found.effect) || white_evidence(found) > policy.overwhelming_evidence)
-      continue;
+    // An attached mass colours a white force by its resonance, so no evidence against white ones speaks for
+    // it.
+    const bool overwhelming =
+        white_evidence(found) > policy.overwhelming_evidence && !attaches_mass(found.effect);
+    if (search.is_plant_number(found.effect) || overwhelming) continue;
     if (!null) null.emplace(search, known);
     const double evidence = null->evidence_of(found.effect);
     const bool holds =

@@ -1,6 +1,7 @@
 #include "decision.hpp"
 
 #include <algorithm>
+#include <boost/math/distributions/students_t.hpp>
 #include <cmath>
 #include <limits>
 
@@ -84,8 +85,8 @@ Decision decide_simulation(const Evidence& e, Rule rule, const AcceptancePolicy&
   if (!e.simulated_segments) return waiting(MissingFit::simulated_segments);
   const SimulationChange& change = *e.simulated_segments;
   if (change.segments == 0) return accepted(rule);
-  const double by_chance = p.worse_simulation_by_chance + change.standard_error(p.min_simulation_scatter);
-  return change.mean < by_chance ? accepted(rule) : rejected(Rule::simulates_worse);
+  return change.mean < p.worse_simulation_by_chance + change.by_chance(p) ? accepted(rule)
+                                                                          : rejected(Rule::simulates_worse);
 }
 
 bool is_open(const Decision& decision) {
@@ -176,9 +177,12 @@ SimulationChange simulation_change(const std::vector<double>& before, const std:
   return {now.size(), mean, std::sqrt(std::max(square - mean * mean, 0.0))};
 }
 
-double SimulationChange::standard_error(double min_scatter) const {
+double SimulationChange::by_chance(const AcceptancePolicy& p) const {
   if (segments == 0) return 0.0;
-  return std::max(min_scatter, scatter) / std::sqrt(static_cast<double>(segments));
+  const auto n = static_cast<double>(segments);
+  const double usual = p.usual_simulation_scatter;
+  const double standard_error = std::sqrt((usual * usual / n + scatter * scatter) / n);
+  return standard_error * quantile(boost::math::students_t(n), p.worse_simulation_level);
 }
 
 std::string_view name_of(Rule rule) {

@@ -23,8 +23,9 @@ struct Improvement {
 struct SimulationChange {
   std::size_t segments = 0;  ///< 0 where no data are held out
   double mean = 0.0, scatter = 0.0;
-  /// Of the mean, with at least this scatter.
-  double standard_error(double min_scatter = 0.0) const;
+  /// By how much the mean may be larger than its true value. A few segments say little of their scatter, so
+  /// the usual one counts as one more of them (Student's t, with a scaled inverse chi-square prior).
+  double by_chance(const AcceptancePolicy& policy) const;
 };
 
 /// From the errors of the same segments before and now [any unit, one for both]. They may be infinite.

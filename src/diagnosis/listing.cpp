@@ -34,10 +34,11 @@ class HeldOutSimulation {
   const Noise noise_;
 };
 
-/// How far the error grew, less one standard error of that [ln of a ratio].
-double certain_rise(const FreeRunSimulation& before, const FreeRunSimulation& now) {
+/// How far the error grew, less what may be chance [ln of a ratio].
+double certain_rise(const FreeRunSimulation& before, const FreeRunSimulation& now,
+                    const AcceptancePolicy& policy) {
   const SimulationChange change = simulation_change(before.segment_gap, now.segment_gap);
-  return change.mean - change.standard_error();
+  return change.mean - change.by_chance(policy);
 }
 
 std::vector<std::size_t> without(std::vector<std::size_t> effects, std::size_t gone) {
@@ -49,13 +50,14 @@ std::vector<std::size_t> without(std::vector<std::size_t> effects, std::size_t g
 /// `simulated_without(suspect)`: the simulation to compare.
 template <class Simulate>
 std::optional<std::size_t> raising(const std::vector<std::size_t>& suspects,
-                                   const FreeRunSimulation& complete, double by_chance,
+                                   const FreeRunSimulation& complete, const AcceptancePolicy& policy,
                                    Simulate&& simulated_without) {
   std::optional<std::size_t> raises;
+  double largest = policy.worse_simulation_by_chance;
   for (const std::size_t suspect : suspects) {
-    const double rise = certain_rise(simulated_without(suspect), complete);
-    if (!(rise > by_chance)) continue;
-    by_chance = rise;
+    const double rise = certain_rise(simulated_without(suspect), complete, policy);
+    if (!(rise > largest)) continue;
+    largest = rise;
     raises = suspect;
   }
   return raises;
@@ -117,15 +119,16 @@ Listing list_effects(Search& search, const Hypothesis& judged, const ListedModel
     row.after = std::max(row.after, listing.after);
   }
   if (model.effects.empty()) return listing;
-  const double by_chance = search.policy().acceptance.worse_simulation_by_chance;
-  listing.number_raises = raising(far, complete, by_chance, [&](std::size_t number) {
+  const AcceptancePolicy& policy = search.policy().acceptance;
+  listing.number_raises = raising(far, complete, policy, [&](std::size_t number) {
     return simulation.settled(without(model.effects, number), number);
   });
   if (listing.number_raises || raised.empty()) return listing;
-  listing.raises = raising(raised, complete, by_chance, [&](std::size_t effect) {
+  listing.raises = raising(raised, complete, policy, [&](std::size_t effect) {
     return simulation.settled(without(model.effects, effect));
   });
-  if (!listing.raises && certain_rise(given, complete) > by_chance) listing.raises = raised.back();
+  if (!listing.raises && certain_rise(given, complete, policy) > policy.worse_simulation_by_chance)
+    listing.raises = raised.back();
   return listing;
 }
 

@@ -64,13 +64,15 @@ struct AcceptancePolicy {
   /// fit has not converged and is continued. A smaller ratio can come from noise that is not white. Chosen.
   double unconverged_evidence_ratio = 4.0;
   /// [ln of a ratio] The mean error of simulated held-out segments may grow by this. A tenth is not visible.
-  /// An effect goes if the error with it is larger by this and a standard error. So does the fitted value of
-  /// a number that moved further than believed. A curve that lowers the error by more shows that something is
-  /// missing. Chosen.
+  /// An effect goes if the error with it is larger by this and by what may be chance. So does the fitted value
+  /// of a number that moved further than believed. A curve that lowers the error by more shows that something
+  /// is missing. Chosen.
   double worse_simulation_by_chance = 0.1;
-  /// [ln of a ratio] It may also grow by one standard error of its scatter over the segments, which is taken
-  /// to be at least this: while another effect is missing, errors change by half in either direction.
-  double min_simulation_scatter = 0.5;
+  /// [1] The certainty that it grew by more than this. The usual level.
+  double worse_simulation_level = 0.95;
+  /// [ln of a ratio] The usual scatter of that growth over the segments: while another effect is missing,
+  /// errors change by half in either direction.
+  double usual_simulation_scatter = 0.5;
   /// [1] An effect that was found stays in the model while its t value is above this share of `min_t`. It
   /// is not dropped because other effects make it slightly less certain. Chosen.
   double kept_t_share = 0.7;
@@ -300,7 +302,7 @@ struct PriorPolicy {
   /// [m] The shortest pitch of a periodic force along the track. Chosen.
   double min_pitch_m = 5e-4;
   /// [crests] A force is periodic only if the run passes this many of its crests. A vibration of an attached
-  /// mass has so many periods in the longest run.
+  /// mass has so many periods in the longest run, and one in the longest segment.
   double crests_of_pitch = 3.0;
   /// [samples] Of a vibration of an attached mass, the fewest in a period. Two would do without noise.
   /// Chosen.

@@ -65,7 +65,7 @@ bool StepwiseSelection::find_attached_mass() {
                   [&](const ScreenedCandidate& s) { return !(s.hypothesis.train.objective < to_beat); });
     if (add_best_of(screened, round, false)) {
       converge(current_);
-      if (current_.train.objective < without_attached_mass_->hypothesis.train.objective) return true;
+      if (explains_more_than(without_attached_mass_->hypothesis)) return true;
     }
   } catch (...) {  // the search may end at any time: what was found before it counts
     give_up_attached_mass();
@@ -73,6 +73,15 @@ bool StepwiseSelection::find_attached_mass() {
   }
   give_up_attached_mass();
   return false;
+}
+
+/// Plain simulations show it as well: a resonance can account for a part of any noise.
+bool StepwiseSelection::explains_more_than(Hypothesis& other) {
+  if (!(current_.train.objective < other.train.objective)) return false;
+  const AcceptancePolicy& policy = search_.policy().acceptance;
+  const SimulationChange without = change_of_simulation(other, true);
+  return without.segments == 0 ||
+         without.mean > policy.worse_simulation_by_chance + without.by_chance(policy);
 }
 
 bool StepwiseSelection::has_attached_mass() const {

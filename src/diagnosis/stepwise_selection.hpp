@@ -128,6 +128,8 @@ class StepwiseSelection {
   /// By how much `h` simulates held-out segments worse than `current_` does, and training segments if these
   /// count too: while more is missing, one and the other come out better or worse by half.
   SimulationChange change_of_simulation(Hypothesis& h, bool of_training_too);
+  /// Whether the hypothesis of now does.
+  bool explains_more_than(Hypothesis& other);
   /// What held-out runs spoke against while more was missing must have them on its side in the end, or all
   /// that was added since goes.
   void resolve_doubt();

@@ -172,9 +172,11 @@ TEST(SimulationChange, IsTheMeanLogarithmOverTheSegments) {
   EXPECT_EQ(change.segments, 4u);
   EXPECT_NEAR(change.mean, std::log(2.0) / 2.0, 1e-12);
   EXPECT_NEAR(change.scatter, std::log(2.0) / 2.0, 1e-12);
-  EXPECT_NEAR(change.standard_error(), std::log(2.0) / 4.0, 1e-12);
-  EXPECT_EQ(change.standard_error(3.0), 1.5);
-  EXPECT_EQ(simulation_change({}, {}).standard_error(3.0), 0.0) << "no data are held out";
+  // 2.132 is the 95th percentile of Student's t with four degrees of freedom.
+  const double usual = p.usual_simulation_scatter;
+  const double standard_error = std::sqrt((usual * usual + 4.0 * change.scatter * change.scatter) / 16.0);
+  EXPECT_NEAR(change.by_chance(p), 2.132 * standard_error, 1e-3);
+  EXPECT_EQ(simulation_change({}, {}).by_chance(p), 0.0) << "no data are held out";
   const double diverged = std::numeric_limits<double>::infinity();
   EXPECT_EQ(simulation_change({diverged, diverged}, {diverged, diverged}).mean, 0.0);
   EXPECT_LT(simulation_change({diverged, diverged}, {1.0, 2.0}).mean, -10.0);
@@ -183,7 +185,7 @@ TEST(SimulationChange, IsTheMeanLogarithmOverTheSegments) {
 
 TEST(SimulationChange, OfOneSegmentDoesNotOutweighTheOthers) {
   const SimulationChange change = simulation_change({1.0, 1.0, 1.0, 1.0, 1.0}, {3.0, 0.8, 0.8, 0.8, 0.8});
-  EXPECT_LT(change.mean - change.standard_error(), 0.0);
+  EXPECT_LT(change.mean - change.by_chance(p), 0.0);
 }
 
 TEST(Addition, MustSimulateAsWellAsSegmentsCanShow) {
@@ -193,11 +195,14 @@ TEST(Addition, MustSimulateAsWellAsSegmentsCanShow) {
     return rule_of(e);
   };
   EXPECT_EQ(rule(0, 0.0, 100.0), Rule::shown_throughout) << "no data are held out";
-  const double by_four = p.worse_simulation_by_chance + 0.5 * p.min_simulation_scatter;
-  EXPECT_EQ(rule(4, 0.1, by_four), Rule::simulates_worse);
-  EXPECT_EQ(rule(4, 0.1, below(by_four)), Rule::shown_throughout);
-  EXPECT_EQ(rule(4, 2.0, by_four), Rule::shown_throughout) << "four segments that scatter show less";
-  EXPECT_EQ(rule(4, 2.0, p.worse_simulation_by_chance + 1.0), Rule::simulates_worse);
+  const auto limit = [](std::size_t segments, double scatter) {
+    return p.worse_simulation_by_chance + SimulationChange{segments, 0.0, scatter}.by_chance(p);
+  };
+  EXPECT_EQ(rule(4, 0.1, limit(4, 0.1)), Rule::simulates_worse);
+  EXPECT_EQ(rule(4, 0.1, below(limit(4, 0.1))), Rule::shown_throughout);
+  EXPECT_EQ(rule(4, 2.0, limit(4, 0.1)), Rule::shown_throughout) << "four segments that scatter show less";
+  EXPECT_EQ(rule(4, 2.0, limit(4, 2.0)), Rule::simulates_worse);
+  EXPECT_EQ(rule(1, 0.0, 1.0), Rule::shown_throughout) << "one segment shows little";
 }
 
 TEST(Addition, IsFollowedInDoubtWithOverwhelmingEvidenceOnly) {
