@@ -64,9 +64,9 @@ struct AcceptancePolicy {
   /// fit has not converged and is continued. A smaller ratio can come from noise that is not white. Chosen.
   double unconverged_evidence_ratio = 4.0;
   /// [ln of a ratio] The mean error of simulated held-out segments may grow by this. A tenth is not visible.
-  /// An effect goes if the error with it is larger by this and by what may be chance. So does the fitted value
-  /// of a number that moved further than believed. A curve that lowers the error by more shows that something
-  /// is missing. Chosen.
+  /// An effect goes if the error with it is larger by this and by what may be chance. So does the fitted
+  /// value of a number that moved further than believed. A curve that lowers the error by more shows that
+  /// something is missing. Chosen.
   double worse_simulation_by_chance = 0.1;
   /// [1] The certainty that it grew by more than this. The usual level.
   double worse_simulation_level = 0.95;
