@@ -85,8 +85,7 @@ Decision decide_simulation(const Evidence& e, Rule rule, const AcceptancePolicy&
   if (!e.simulated_segments) return waiting(MissingFit::simulated_segments);
   const SimulationChange& change = *e.simulated_segments;
   if (change.segments == 0) return accepted(rule);
-  return change.mean < p.worse_simulation_by_chance + change.by_chance(p) ? accepted(rule)
-                                                                          : rejected(Rule::simulates_worse);
+  return change.mean < change.limit(p) ? accepted(rule) : rejected(Rule::simulates_worse);
 }
 
 bool is_open(const Decision& decision) {
@@ -183,6 +182,10 @@ double SimulationChange::by_chance(const AcceptancePolicy& p) const {
   const double usual = p.usual_simulation_scatter;
   const double standard_error = std::sqrt((usual * usual / n + scatter * scatter) / n);
   return standard_error * quantile(boost::math::students_t(n), p.worse_simulation_level);
+}
+
+double SimulationChange::limit(const AcceptancePolicy& p) const {
+  return p.worse_simulation_by_chance + by_chance(p);
 }
 
 std::string_view name_of(Rule rule) {

@@ -26,6 +26,8 @@ struct SimulationChange {
   /// By how much the mean may be larger than its true value. A few segments say little of their scatter, so
   /// the usual one counts as one more of them (Student's t, with a scaled inverse chi-square prior).
   double by_chance(const AcceptancePolicy& policy) const;
+  /// The mean above which simulations count as worse.
+  double limit(const AcceptancePolicy& policy) const;
 };
 
 /// From the errors of the same segments before and now [any unit, one for both]. They may be infinite.

@@ -34,11 +34,11 @@ class HeldOutSimulation {
   const Noise noise_;
 };
 
-/// How far the error grew, less what may be chance [ln of a ratio].
+/// How far the error grew beyond what is not visible or may be chance [ln of a ratio].
 double certain_rise(const FreeRunSimulation& before, const FreeRunSimulation& now,
                     const AcceptancePolicy& policy) {
   const SimulationChange change = simulation_change(before.segment_gap, now.segment_gap);
-  return change.mean - change.by_chance(policy);
+  return change.mean - change.limit(policy);
 }
 
 std::vector<std::size_t> without(std::vector<std::size_t> effects, std::size_t gone) {
@@ -53,7 +53,7 @@ std::optional<std::size_t> raising(const std::vector<std::size_t>& suspects,
                                    const FreeRunSimulation& complete, const AcceptancePolicy& policy,
                                    Simulate&& simulated_without) {
   std::optional<std::size_t> raises;
-  double largest = policy.worse_simulation_by_chance;
+  double largest = 0.0;
   for (const std::size_t suspect : suspects) {
     const double rise = certain_rise(simulated_without(suspect), complete, policy);
     if (!(rise > largest)) continue;
@@ -127,8 +127,7 @@ Listing list_effects(Search& search, const Hypothesis& judged, const ListedModel
   listing.raises = raising(raised, complete, policy, [&](std::size_t effect) {
     return simulation.settled(without(model.effects, effect));
   });
-  if (!listing.raises && certain_rise(given, complete, policy) > policy.worse_simulation_by_chance)
-    listing.raises = raised.back();
+  if (!listing.raises && certain_rise(given, complete, policy) > 0.0) listing.raises = raised.back();
   return listing;
 }
 

@@ -78,10 +78,8 @@ bool StepwiseSelection::find_attached_mass() {
 /// Plain simulations show it as well: a resonance can account for a part of any noise.
 bool StepwiseSelection::explains_more_than(Hypothesis& other) {
   if (!(current_.train.objective < other.train.objective)) return false;
-  const AcceptancePolicy& policy = search_.policy().acceptance;
   const SimulationChange without = change_of_simulation(other, true);
-  return without.segments == 0 ||
-         without.mean > policy.worse_simulation_by_chance + without.by_chance(policy);
+  return without.segments == 0 || without.mean > without.limit(search_.policy().acceptance);
 }
 
 bool StepwiseSelection::has_attached_mass() const {

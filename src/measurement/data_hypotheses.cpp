@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
-#include <iterator>
 #include <limits>
 #include <span>
 
@@ -282,15 +281,15 @@ namespace {
 using Left = std::array<double, 1 + parts>;
 
 /// The lateness at which least is left: on a grid, on a finer one around its best, and by a parabola. It is
-/// compared with the best of those that are `no_mistake`, in each part of the record.
-Lateness best_lateness(const std::function<Left(double)>& lefts_at, std::span<const double> no_mistake) {
+/// compared with the best delay that the rig may have, in each part of the record.
+Lateness best_lateness(const std::function<Left(double)>& lefts_at, std::span<const double> rig_delays_s) {
   const auto left_at = [&](double later_s) { return lefts_at(later_s)[0]; };
   Lateness best;
   Left none;
   none.fill(infinity);
-  for (const double later_s : no_mistake) {
-    const Left left = lefts_at(later_s);
-    if (left[0] < none[0]) best.later_s = later_s;
+  for (const double delay_s : rig_delays_s) {
+    const Left left = lefts_at(-delay_s);
+    if (left[0] < none[0]) best.later_s = -delay_s;
     for (std::size_t part = 0; part <= parts; ++part) none[part] = std::min(none[part], left[part]);
   }
   best.left = best.left_at_best = none[0];
@@ -299,7 +298,7 @@ Lateness best_lateness(const std::function<Left(double)>& lefts_at, std::span<co
     const int steps = step_s == 0.02 ? 10 : 5;
     for (int i = -steps; i <= steps; ++i) {
       const double later_s = around_s + step_s * i;
-      if (std::abs(later_s) > longest_lateness_s) continue;
+      if (later_s == best.later_s || std::abs(later_s) > longest_lateness_s) continue;
       const double left = left_at(later_s);
       if (left < best.left_at_best) {
         best.left_at_best = left;
@@ -339,17 +338,16 @@ std::optional<Lateness> ReadingJudge::lateness_of_angle(const DataReading& readi
   const WindowedMotion cart =
       windows.motion(channel_of(reading, cart_channel), reading.later_s[cart_channel]);
   const std::vector<double> angle = channel_of(reading, theta_channel);
-  return best_lateness(
-      [&](double later_s) {
-        const WindowedMotion pendulum = windows.motion(angle, reading.later_s[theta_channel] + later_s);
-        Left left{};
-        for (std::size_t part = 0; part <= parts; ++part) {
-          const Share share = pendulum_share(reading, cart, pendulum, part_of(part, windows.size()));
-          left[part] = share.squares > 0.0 ? 1.0 - share.generously : part == 0 ? 1.0 : -1.0;
-        }
-        return left;
-      },
-      std::array{0.0});
+  const auto lefts_at = [&](double later_s) {
+    const WindowedMotion pendulum = windows.motion(angle, reading.later_s[theta_channel] + later_s);
+    Left left{};
+    for (std::size_t part = 0; part <= parts; ++part) {
+      const Share share = pendulum_share(reading, cart, pendulum, part_of(part, windows.size()));
+      left[part] = share.squares > 0.0 ? 1.0 - share.generously : part == 0 ? 1.0 : -1.0;
+    }
+    return left;
+  };
+  return best_lateness(lefts_at, std::array{0.0});
 }
 
 std::optional<Lateness> ReadingJudge::lateness_of_voltage(const DataReading& reading) const {
@@ -368,19 +366,16 @@ std::optional<Lateness> ReadingJudge::lateness_of_voltage(const DataReading& rea
   const std::vector<double>& volts = raw_[reading.column[voltage_channel]];
   // The motion follows the voltage with the delay of the motor. In a closed loop the voltage follows the
   // motion as well, so a later voltage must account for more than such a delay does.
-  std::array<double, std::size(delays_s)> by_motor;
-  std::transform(std::begin(delays_s), std::end(delays_s), by_motor.begin(), std::negate<>());
-  return best_lateness(
-      [&](double later_s) {
-        const std::vector<double> held = windows.held(volts, -reading.later_s[voltage_channel] - later_s);
-        Left left{};
-        for (std::size_t part = 0; part <= parts; ++part) {
-          const auto share = cart_share(reading, seen, held, part_of(part, windows.size()));
-          left[part] = share ? 1.0 - share->generously : part == 0 ? 1.0 : -1.0;
-        }
-        return left;
-      },
-      by_motor);
+  const auto lefts_at = [&](double later_s) {
+    const std::vector<double> held = windows.held(volts, -reading.later_s[voltage_channel] - later_s);
+    Left left{};
+    for (std::size_t part = 0; part <= parts; ++part) {
+      const auto share = cart_share(reading, seen, held, part_of(part, windows.size()));
+      left[part] = share ? 1.0 - share->generously : part == 0 ? 1.0 : -1.0;
+    }
+    return left;
+  };
+  return best_lateness(lefts_at, delays_s);
 }
 
 }  // namespace upright
