@@ -89,8 +89,13 @@ DataRange range_of(const std::vector<Measurement>& runs, const Plant& plant, con
     range.theta_measured = range.theta_measured || run.has_theta();
     range.theta_resolution_rad = std::max(range.theta_resolution_rad, run.theta_resolution_rad);
     range.shortest_period_s = std::min(range.shortest_period_s, run.median_period_s());
-    for (const double v : run.voltage_v)
+    double square = 0.0;
+    for (const double v : run.voltage_v) {
       range.largest_voltage_v = std::max(range.largest_voltage_v, std::abs(v));
+      square += v * v / static_cast<double>(run.size());
+    }
+    range.motor_force_rms_n =
+        std::max(range.motor_force_rms_n, plant.motor.force_per_volt_n * std::sqrt(square));
     if (!run.has_cart()) continue;
     range.cart_moves = true;
     const auto [low, high] = std::minmax_element(run.cart_m.begin(), run.cart_m.end());

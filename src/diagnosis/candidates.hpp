@@ -19,7 +19,8 @@ struct DataRange {
   bool theta_measured = false;
   double cart_mass_kg = 0.0;  ///< as in the plant file
   double largest_voltage_v = 0.0;
-  double largest_force_n = 0.0;  ///< of the motor at that voltage
+  double largest_force_n = 0.0;    ///< of the motor at that voltage
+  double motor_force_rms_n = 0.0;  ///< root mean square, in the run that the motor drives most
   double largest_speed_mps = 0.0;
   double cart_low_m = 0.0, cart_high_m = 0.0;
   double longest_travel_m = 0.0;   ///< of one run

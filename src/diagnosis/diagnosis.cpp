@@ -91,8 +91,8 @@ class Diagnostician {
       } else if (force && force->shows_on_held_out(lower, policy_.acceptance)) {
         diagnosis.verdict = Verdict::unexplained;
         diagnosis.residual = force->left_sentence();
-      } else if (const auto left = place_force_left(search_, fits_.known())) {
-        diagnosis.notes.push_back(*left);
+      } else if (const auto left = track_force_left(search_, fits_.known())) {
+        report_track_force(*left, search_.range(), policy_.prior, diagnosis);
       }
     } catch (const Interrupted&) {
       diagnosis.interrupted = true;
@@ -262,12 +262,15 @@ class Diagnostician {
     disturbed_ = false;
     options_.report_progress(0.945, "estimating a coloured disturbance");
     const FitResult coloured = search_.with_coloured_noise(fits_.known());
-    if (!(minus_log_likelihood(fits_.known().train) - minus_log_likelihood(coloured) >
-          policy_.acceptance.min_evidence))
-      return left;
-    ResidualTests beside = tests_of(coloured.point, coloured.point.noise);
-    if (beside.structured && !left.structured) return left;
-    noise_ = coloured.point.noise;
+    const double evidence = minus_log_likelihood(fits_.known().train) - minus_log_likelihood(coloured);
+    ResidualTests beside = left;
+    if (evidence > policy_.acceptance.min_evidence) {
+      const ResidualTests tests = tests_of(coloured.point, coloured.point.noise);
+      if (!tests.structured || left.structured) {
+        beside = tests;
+        noise_ = coloured.point.noise;
+      }
+    }
     disturbed_ = find_unusual_disturbance(noise_, search_.range(), policy_.prior, beside);
     return beside;
   }

@@ -230,16 +230,20 @@ std::optional<Withdrawal> trend_of_place(const Search& search, const Hypothesis&
   return std::nullopt;
 }
 
-std::optional<std::string> place_force_left(const Search& search, const Hypothesis& known) {
+std::optional<TrackForce> track_force_left(const Search& search, const Hypothesis& known) {
   if (!search.is_of_all_data(known.train.point)) return std::nullopt;
   const PlaceNull null(search, known);
   const RandomCurve* track = null.track_force();
   if (track == nullptr || !(-track->change() > search.policy().acceptance.min_evidence)) return std::nullopt;
+  return TrackForce{track->deviation(), track->length()};
+}
+
+std::string sentence_on(const TrackForce& left) {
   constexpr double mm_per_m = 1000.0;
   std::ostringstream text;
   text.precision(2);
   text << "the residual depends on the place: a random force of the track, with a standard deviation of "
-       << track->deviation() << " N and a correlation length of " << mm_per_m * track->length()
+       << left.deviation_n << " N and a correlation length of " << mm_per_m * left.correlation_m
        << " mm, accounts for a part of it";
   return text.str();
 }

@@ -32,7 +32,15 @@ std::optional<Withdrawal> outdone_by_place(Search& search, const Hypothesis& kno
 /// among many, so the square of the least t value is enough. `known`: a fit to all data.
 std::optional<Withdrawal> trend_of_place(const Search& search, const Hypothesis& known);
 
-/// A sentence on the random force of the place that is left, if there is one. `known`: a fit to all data.
-std::optional<std::string> place_force_left(const Search& search, const Hypothesis& known);
+/// A random force of the track, which belongs to the place.
+struct TrackForce {
+  double deviation_n;    ///< standard deviation
+  double correlation_m;  ///< correlation length
+};
+
+/// The one that is left, if there is one. `known`: a fit to all data.
+std::optional<TrackForce> track_force_left(const Search& search, const Hypothesis& known);
+
+std::string sentence_on(const TrackForce& left);
 
 }  // namespace upright

@@ -272,9 +272,11 @@ struct PriorPolicy {
   double rest_rad = 1e-3;
   /// [1] Relative priors refer to at least this share of the typical size of a parameter. Chosen.
   double min_share_of_typical = 0.2;
-  /// [1] The typical size of forces in a run, as a share of the motor's largest force. A random force that
-  /// remains and is larger leaves the data unexplained. Chosen.
+  /// [1] The typical size of forces in a run, as a share of the motor's largest force. Chosen.
   double share_of_motor_force = 0.03;
+  /// [1] The most that a usual random force is, as a share of the motor's force. Both are root mean squares,
+  /// the motor's in the run that it drives most. A larger one leaves the data unexplained. Chosen.
+  double max_random_share = 0.05;
   /// [1] The typical friction of a pivot, as a share of gravity's largest torque (at the natural rate, of
   /// what grows with the rate). A random torque that remains and is larger leaves the data unexplained.
   /// Chosen.

@@ -169,6 +169,8 @@ void describe_diagnosis(const Diagnosis& d, json& record) {
   record["gap_before"] = document.at("gap").at("before");
   record["gap_after"] = document.at("gap").at("after");
   record["residual"] = document.at("residual");
+  record["noise"] = document.at("noise");
+  record["notes"] = document.at("notes");
   record["residual_tests"] = document.at("residual_tests");
   record["bound_reached"] = document.value("bound_reached", false);
   record["found"] = json::array();
