@@ -283,6 +283,19 @@ std::vector<std::size_t> candidates_among(const Plant& plant, const DataRange& r
   return effects;
 }
 
+/// Soft and stiff bristles: under the motor's largest force, they bend over a fifth and an eightieth of the
+/// travel. Half of the critical damping of the cart on them.
+std::vector<std::vector<double>> bristle_starts(const EffectInfo& info, const DataRange& range) {
+  const double n_per_m = range.longest_travel_m > 0.0 ? range.largest_force_n / range.longest_travel_m : 0.0;
+  if (!(n_per_m > 0.0)) return {{info.parameters[0].typical, info.parameters[1].typical}};
+  std::vector<std::vector<double>> starts;
+  for (const double share : {0.2, 0.0125}) {
+    const double stiffness_n_per_m = n_per_m / share;
+    starts.push_back({stiffness_n_per_m, std::sqrt(stiffness_n_per_m * range.cart_mass_kg)});
+  }
+  return starts;
+}
+
 }  // namespace
 
 std::vector<std::size_t> candidate_effects(const Plant& plant, const DataRange& range) {
@@ -312,7 +325,7 @@ std::vector<std::vector<double>> search_starts(std::size_t effect, const DataRan
   }
   if (is_named(effect, "cable_spring"))
     return {{0.25 * order_of_magnitude(info.parameters[0], range, prior), range.cart_mean_m}};
-  if (is_named(effect, "bristle_friction")) return {{120.0, 20.0}, {2000.0, 20.0}};
+  if (is_named(effect, "bristle_friction")) return bristle_starts(info, range);
   if (is_named(effect, "input_delay")) return {{0.5 * range.shortest_period_s}, {0.01}};
   if (is_named(effect, "motor_lag")) return {{std::max(0.001, 0.5 * range.shortest_period_s)}, {0.01}};
   if (is_named(effect, "warming_friction")) {
