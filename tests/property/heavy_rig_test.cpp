@@ -18,6 +18,8 @@ Plant heavier(Plant plant, double factor) {
       values[0] *= factor;
       plant.set(effect->number, values);
     }
+  if (const PlantEffect* bristles = plant.find("bristle_friction"))
+    plant.set(bristles->number, std::array{factor * bristles->values[0], factor * bristles->values[1]});
   return plant;
 }
 
@@ -46,6 +48,10 @@ TEST(HeavyRig, HasTheSameSpring) {
 
 TEST(HeavyRig, HasTheSameDrag) {
   expect_alike("quadratic_drag", {15.0});
+}
+
+TEST(HeavyRig, HasTheSameBristles) {
+  expect_alike("bristle_friction", {2000.0, 50.0});
 }
 
 }  // namespace
