@@ -108,9 +108,9 @@ class Diagnostician {
                        [&](std::size_t effect) { return !search_.is_nuisance(effect); });
   }
   bool is_disturbed() const { return disturbed_; }  ///< by more than is usual
-  /// Of what is unexplained: whether held-out runs alone show it, or contradict the others to the end.
+  /// Of what is unexplained: whether held-out runs alone may show it, or contradict the others to the end.
   bool misses_held_out_excitation() const {
-    return selection_.contradicted() ||
+    return selection_.contradicted() || largest_voltage_is_held_out(data_) ||
            !examine_fit(data_.train, fits_.judged().train.point, policy_, budget_).structured;
   }
 

@@ -41,6 +41,14 @@ std::vector<std::size_t> choose_held_out(const std::vector<double>& excitation, 
   return held;
 }
 
+double largest_voltage_v(const FitData& data) {
+  double largest = 0.0;
+  for (const Segment& s : data.segments)
+    for (std::size_t k = s.first; k <= s.last; ++k)
+      largest = std::max(largest, std::abs((*data.runs)[s.run].voltage_v[k]));
+  return largest;
+}
+
 }  // namespace
 
 double sample_count(const FitData& data) {
@@ -77,6 +85,10 @@ DataSplit split(const std::vector<Measurement>& runs, HeldOut which, double arm_
     train.pop_back();
   }
   return result;
+}
+
+bool largest_voltage_is_held_out(const DataSplit& data) {
+  return !data.held_out_runs.empty() && largest_voltage_v(data.held) > largest_voltage_v(data.train);
 }
 
 std::array<std::vector<std::size_t>, 2> halves(const FitData& data, double arm_m, double speed_window_s) {

@@ -27,6 +27,10 @@ enum class HeldOut { middle, other, end };
 /// length `arm_m`, computed as differences over `speed_window_s`.
 DataSplit split(const std::vector<Measurement>& runs, HeldOut which, double arm_m, double speed_window_s);
 
+/// Whether the runs that are held out are driven by a larger voltage than all others. So they alone show what
+/// a large voltage does. False for a single run.
+bool largest_voltage_is_held_out(const DataSplit& data);
+
 /// The places of the segments of two disjoint parts of the data that excite the plant alike: every second
 /// run, sorted by excitation; of a single run every second segment. The second part is empty where there is
 /// one segment only.

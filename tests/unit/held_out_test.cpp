@@ -69,5 +69,19 @@ TEST(HeldOutRuns, LeaveTheMostExcitedOneToTheFit) {
   }
 }
 
+TEST(HeldOutRuns, AreComparedByTheirLargestVoltage) {
+  std::vector<Measurement> runs = runs_of({0, 1, 2});
+  const auto is_held_out = [&] {
+    return largest_voltage_is_held_out(split(runs, HeldOut::middle, 0.3, 0.02));
+  };
+  EXPECT_FALSE(is_held_out());
+  runs[1].voltage_v[200] = -3.0;
+  EXPECT_TRUE(is_held_out());
+  runs[2].voltage_v[100] = 3.0;
+  EXPECT_FALSE(is_held_out());
+  runs.resize(1);
+  EXPECT_FALSE(is_held_out());
+}
+
 }  // namespace
 }  // namespace upright
