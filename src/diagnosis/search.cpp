@@ -93,7 +93,6 @@ Search::Search(const Plant& plant, const std::vector<Measurement>& runs, const F
     nuisances_.push_back(effect);
     plant_.set(effect, std::vector<double>{effect_registry()[effect].parameters[0].neutral});
   }
-  // Runs differ, segments of a run are alike: take them in turn.
   const std::size_t stride = std::clamp<std::size_t>(train_.segments.size() / budget_.min_screening_segments,
                                                      1, budget_.max_screening_stride);
   choose_screening_subset(stride);
@@ -120,10 +119,15 @@ bool Search::can_hold(std::size_t effect) const {
 void Search::choose_screening_subset(std::size_t stride) {
   screening_subset_ = {train_.runs, {}, train_.bound};
   screening_places_.clear();
-  for (std::size_t s = 0; s < train_.segments.size(); s += stride) {
-    screening_subset_.segments.push_back(train_.segments[s]);
-    screening_places_.push_back(s);
-  }
+  const std::vector<Segment>& all = train_.segments;
+  const auto voltage = [&](const Segment& segment) { return largest_voltage_v(*train_.runs, segment); };
+  const auto most_driven = std::ranges::max_element(all, {}, voltage) - all.begin();
+  // Runs differ, segments of a run are alike: take them in turn. Only a few may have the largest voltage.
+  for (std::size_t s = 0; s < all.size(); ++s)
+    if (s % stride == 0 || static_cast<std::ptrdiff_t>(s) == most_driven) {
+      screening_subset_.segments.push_back(all[s]);
+      screening_places_.push_back(s);
+    }
 }
 
 void Search::screen_on_all() {

@@ -43,9 +43,7 @@ std::vector<std::size_t> choose_held_out(const std::vector<double>& excitation, 
 
 double largest_voltage_v(const FitData& data) {
   double largest = 0.0;
-  for (const Segment& s : data.segments)
-    for (std::size_t k = s.first; k <= s.last; ++k)
-      largest = std::max(largest, std::abs((*data.runs)[s.run].voltage_v[k]));
+  for (const Segment& s : data.segments) largest = std::max(largest, largest_voltage_v(*data.runs, s));
   return largest;
 }
 

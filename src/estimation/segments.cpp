@@ -67,4 +67,11 @@ std::vector<Segment> cut_segments(const std::vector<Measurement>& runs, double l
   return segments;
 }
 
+double largest_voltage_v(const std::vector<Measurement>& runs, const Segment& segment) {
+  double largest = 0.0;
+  for (std::size_t k = segment.first; k <= segment.last; ++k)
+    largest = std::max(largest, std::abs(runs[segment.run].voltage_v[k]));
+  return largest;
+}
+
 }  // namespace upright

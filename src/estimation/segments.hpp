@@ -24,6 +24,9 @@ std::vector<std::size_t> gaps_in(const Measurement& run);
 /// pendulum does not amplify a small error excessively.
 std::vector<Segment> cut_segments(const std::vector<Measurement>& runs, double longest_s = 2.0);
 
+/// The largest voltage within a segment, without its sign [V].
+double largest_voltage_v(const std::vector<Measurement>& runs, const Segment& segment);
+
 /// The data of a fit.
 struct FitData {
   const std::vector<Measurement>* runs = nullptr;  ///< they must outlive this
