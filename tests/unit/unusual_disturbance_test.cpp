@@ -48,7 +48,7 @@ TEST(UnusualDisturbance, ALargerTorqueIsStated) {
   EXPECT_NE(judged.tests.sentence.find("a random torque of 0.021 N m remains"), std::string::npos);
 }
 
-TEST(UnusualDisturbance, AWhiteForceCountsWithItsMeanOverATenthOfASecond) {
+TEST(UnusualDisturbance, AWhiteForceCountsWithItsMeanOverAPulse) {
   const double over_a_tenth = std::sqrt(0.1);
   EXPECT_FALSE(judge({.force = 0.29 * over_a_tenth, .torque = 0.019 * over_a_tenth}).found);
   EXPECT_TRUE(judge({.torque = 0.021 * over_a_tenth}).found);
@@ -84,7 +84,7 @@ TEST(UnusualDisturbance, WhatATestHasFoundIsKept) {
   EXPECT_EQ(judged.tests.sentence, "bursts");
 }
 
-TEST(UnusualDisturbance, ALargeForceOfTheTrackLeavesAnAnswerUnexplained) {
+TEST(UnusualDisturbance, ALargeForceOfTheTrackIsNotExplained) {
   Diagnosis diagnosis;
   diagnosis.verdict = Verdict::explained;
   report_track_force({0.29, 0.02}, usual_range(), PriorPolicy{}, diagnosis);
