@@ -54,9 +54,10 @@ double limit_of_force_n(const DataRange& range, const PriorPolicy& prior) {
 
 }  // namespace
 
-bool find_unusual_disturbance(const Noise& noise, const DataRange& range, const PriorPolicy& prior,
+bool find_unusual_disturbance(const Noise& fitted, const DataRange& range, const PriorPolicy& prior,
                               ResidualTests& tests) {
   if (tests.structured) return false;
+  const Noise noise = low_frequency_equivalent(fitted, tests);
   const double over_pulse = 1.0 / std::sqrt(pulse_s);
   const Disturbance force{"force", "N", noise.force * over_pulse, noise.coloured_force_n,
                           limit_of_force_n(range, prior)};

@@ -3,7 +3,8 @@
 // model does not explain the data then.
 //
 // A force is unusual above `max_random_share` of the motor's root mean square force, a torque above
-// usual_torque_nm(). The white part counts with its mean over a tenth of a second.
+// usual_torque_nm(). The white part counts with its mean over a tenth of a second, both with the size that
+// short pulses have.
 #pragma once
 
 #include "candidates.hpp"

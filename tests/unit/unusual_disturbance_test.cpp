@@ -63,6 +63,15 @@ TEST(UnusualDisturbance, AWhiteForceCountsWithItsMeanOverAPulse) {
   EXPECT_TRUE(judge({.force = 0.2 * over_a_tenth, .coloured_force_n = 0.25}).found);
 }
 
+TEST(UnusualDisturbance, CountsWithTheSizeThatPulsesHave) {
+  ResidualTests tests;
+  tests.statistics.pulse_size = {1.5, InnovationStatistics::not_shown};
+  EXPECT_FALSE(judge({.coloured_force_n = 0.19}, tests).found);
+  const Judged judged = judge({.coloured_force_n = 0.21, .correlation_s = 0.2}, tests);
+  EXPECT_TRUE(judged.found);
+  EXPECT_NE(judged.tests.sentence.find("a random force of 0.315 N remains"), std::string::npos);
+}
+
 TEST(UnusualDisturbance, AForceThatLastsTooLongDrifts) {
   const double just_shorter_s = std::nextafter(longest_correlation_s, 0.0);
   EXPECT_FALSE(judge({.coloured_force_n = 0.1, .correlation_s = just_shorter_s}).found);
