@@ -313,7 +313,7 @@ std::vector<std::vector<double>> search_starts(std::size_t effect, const DataRan
   if (attaches_mass(effect)) return attached_mass_starts(effect, range, prior);
   if (is_periodic(effect)) return periodic_starts(effect, {}, range, prior, budget);
   if (is_named(effect, "voltage_saturation"))
-    return {{0.9 * volts}, {0.7 * volts}, {0.5 * volts}, {0.3 * volts}};
+    return {{highest_saturation_start * volts}, {0.7 * volts}, {0.5 * volts}, {0.3 * volts}};
   if (is_named(effect, "voltage_dead_zone")) {
     const double usual_v = std::max(info.parameters[0].typical, prior.share_of_motor_force * volts);
     return {{usual_v / 3.0}, {4.0 * usual_v / 3.0}};

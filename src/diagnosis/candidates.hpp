@@ -39,6 +39,9 @@ DataRange range_of(const std::vector<Measurement>& runs, const Plant& plant, con
 double usual_force_n(const DataRange& range, const PriorPolicy& prior);
 double usual_torque_nm(const DataRange& range, const PriorPolicy& prior);
 
+/// [1] Of the largest voltage: the highest limit at which the search for a saturation starts. Chosen.
+inline constexpr double highest_saturation_start = 0.9;
+
 /// Whether anything moved far enough to show an effect: well beyond the sensors' steps.
 bool moves_enough(const std::vector<Measurement>& runs, const ExcitationPolicy& policy);
 

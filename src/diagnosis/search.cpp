@@ -93,6 +93,7 @@ Search::Search(const Plant& plant, const std::vector<Measurement>& runs, const F
     nuisances_.push_back(effect);
     plant_.set(effect, std::vector<double>{effect_registry()[effect].parameters[0].neutral});
   }
+  // Runs differ, segments of a run are alike: take them in turn.
   const std::size_t stride = std::clamp<std::size_t>(train_.segments.size() / budget_.min_screening_segments,
                                                      1, budget_.max_screening_stride);
   choose_screening_subset(stride);
@@ -108,30 +109,27 @@ bool Search::is_unknown_zero(std::size_t effect) const {
   return effect == effect_number("angle_offset") && given_.find(effect) == nullptr;
 }
 
-bool Search::is_plant_number(std::size_t effect) const {
-  return is_nuisance(effect) && !is_unknown_zero(effect);
-}
-
-bool Search::can_hold(std::size_t effect) const {
-  return is_plant_number(effect) && !held_numbers_.contains(effect);
-}
-
 void Search::choose_screening_subset(std::size_t stride) {
   screening_subset_ = {train_.runs, {}, train_.bound};
   screening_places_.clear();
-  const std::vector<Segment>& all = train_.segments;
-  const auto voltage = [&](const Segment& segment) { return largest_voltage_v(*train_.runs, segment); };
-  const auto most_driven = std::ranges::max_element(all, {}, voltage) - all.begin();
-  // Runs differ, segments of a run are alike: take them in turn. Only a few may have the largest voltage.
-  for (std::size_t s = 0; s < all.size(); ++s)
-    if (s % stride == 0 || static_cast<std::ptrdiff_t>(s) == most_driven) {
-      screening_subset_.segments.push_back(all[s]);
-      screening_places_.push_back(s);
-    }
+  for (std::size_t s = 0; s < train_.segments.size(); s += stride) {
+    screening_subset_.segments.push_back(train_.segments[s]);
+    screening_places_.push_back(s);
+  }
 }
 
 void Search::screen_on_all() {
   choose_screening_subset(1);
+}
+
+bool Search::screen_on_largest_voltage() {
+  const std::size_t place = most_driven_segment(train_);
+  const double largest_v = largest_voltage_v(*train_.runs, train_.segments[place]);
+  if (!(largest_voltage_v(screening_subset_) < highest_saturation_start * largest_v)) return false;
+  const auto before = std::ranges::lower_bound(screening_places_, place) - screening_places_.begin();
+  screening_places_.insert(screening_places_.begin() + before, place);
+  screening_subset_.segments.insert(screening_subset_.segments.begin() + before, train_.segments[place]);
+  return true;
 }
 
 std::vector<FreeParameter> Search::free_of(const std::set<std::size_t>& added) const {

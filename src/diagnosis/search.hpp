@@ -69,7 +69,7 @@ class Search {
   const std::vector<std::size_t>& nuisances() const { return nuisances_; }
   bool is_nuisance(std::size_t effect) const;
   /// Whether it corrects a number that stands in the plant file. The zero of the angle need not stand there.
-  bool is_plant_number(std::size_t effect) const;
+  bool is_plant_number(std::size_t effect) const { return is_nuisance(effect) && !is_unknown_zero(effect); }
   const FitData& train_data() const { return train_; }
   const FitData& held_data() const { return held_; }
   /// Both.
@@ -82,6 +82,9 @@ class Search {
 
   /// All of the training data are looked at from now on, not a part of them first.
   void screen_on_all();
+  /// The same of the segment with the largest voltage, if the part could not show a saturation without it.
+  /// False: it could.
+  bool screen_on_largest_voltage();
   /// How much of the training data is looked at first.
   double screening_share() const {
     return static_cast<double>(screening_subset_.segments.size()) /
@@ -116,7 +119,9 @@ class Search {
   void hold(std::size_t number) { held_numbers_.insert(number); }
   /// Whether a number of the plant file, or an effect of it, can be held and is not yet. The zero of the
   /// angle cannot: it is known to a count only, whatever else is.
-  bool can_hold(std::size_t effect) const;
+  bool can_hold(std::size_t effect) const {
+    return is_plant_number(effect) && !held_numbers_.contains(effect);
+  }
   const std::set<std::size_t>& held_numbers() const { return held_numbers_; }
   /// What these add to the covariance of a fit to the data, in the order of its free parameters. A number
   /// that is held is not certain: it is as uncertain as it was believed to be.

@@ -29,9 +29,8 @@ struct SearchBudget {
 
   // Screening: the part of the training data that is used first.
   /// [segments] The least number of screening segments. Runs differ, but the segments of a run are similar,
-  /// so only every few are used, and the one with the largest voltage. From twelve segments on this saves
-  /// half of the work: six 10 s runs with two effects took 35 s of processor time instead of 62 s (with two
-  /// more changes, seed 41/3).
+  /// so only every few are used. From twelve segments on this saves half of the work: six 10 s runs with two
+  /// effects took 35 s of processor time instead of 62 s (with two more changes, seed 41/3).
   std::size_t min_screening_segments = 6;
   /// [segments] The largest stride between screening segments. Chosen.
   std::size_t max_screening_stride = 3;

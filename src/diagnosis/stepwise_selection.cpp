@@ -50,12 +50,14 @@ bool StepwiseSelection::find_thoroughly(bool certainly_missing) {
   const std::vector<std::size_t> before = found_;
   const double objective = current_.train.objective;
   select_forward(budget_.max_rounds, 2 * budget_.max_rounds, true);
-  // What certainly is missing shows on a part of many data too.
   const double share = search_.screening_share();
-  if (share < 1.0 && !(certainly_missing && share < budget_.certain_screening_share)) {
+  bool more = share < 1.0;
+  // What certainly is missing shows on a part of many data too, but for a limit that only a few reach.
+  if (more && certainly_missing && share < budget_.certain_screening_share)
+    more = search_.screen_on_largest_voltage();
+  else if (more)
     search_.screen_on_all();
-    select_forward(2 * budget_.max_rounds, 3 * budget_.max_rounds, false);
-  }
+  if (more) select_forward(2 * budget_.max_rounds, 3 * budget_.max_rounds, false);
   // On the way a better place may have been found for the noise alone.
   if (found_ == before) return is_better_optimum(objective - current_.train.objective, policy_.acceptance);
   eliminate_backward();

@@ -41,12 +41,6 @@ std::vector<std::size_t> choose_held_out(const std::vector<double>& excitation, 
   return held;
 }
 
-double largest_voltage_v(const FitData& data) {
-  double largest = 0.0;
-  for (const Segment& s : data.segments) largest = std::max(largest, largest_voltage_v(*data.runs, s));
-  return largest;
-}
-
 }  // namespace
 
 double sample_count(const FitData& data) {

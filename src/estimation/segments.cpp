@@ -74,4 +74,16 @@ double largest_voltage_v(const std::vector<Measurement>& runs, const Segment& se
   return largest;
 }
 
+double largest_voltage_v(const FitData& data) {
+  double largest = 0.0;
+  for (const Segment& s : data.segments) largest = std::max(largest, largest_voltage_v(*data.runs, s));
+  return largest;
+}
+
+std::size_t most_driven_segment(const FitData& data) {
+  const auto voltage = [&](const Segment& segment) { return largest_voltage_v(*data.runs, segment); };
+  return static_cast<std::size_t>(std::ranges::max_element(data.segments, {}, voltage) -
+                                  data.segments.begin());
+}
+
 }  // namespace upright

@@ -34,4 +34,10 @@ struct FitData {
   WorkBound* bound = nullptr;                      ///< of the search to which the fit belongs; null: none
 };
 
+/// The largest voltage within all segments, without its sign [V]; 0 without a segment.
+double largest_voltage_v(const FitData& data);
+
+/// The place of a segment with this voltage. There must be a segment.
+std::size_t most_driven_segment(const FitData& data);
+
 }  // namespace upright
