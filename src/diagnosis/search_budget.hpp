@@ -40,7 +40,8 @@ struct SearchBudget {
   /// few, because a part of the data can give slightly different values. Chosen.
   int screening_reference_steps = 2;
   /// [1] If something is certainly missing, screening segments that are less than this share of the training
-  /// data suffice: the candidates are not screened again on all of them. Chosen.
+  /// data suffice: the candidates are not screened again on all of them. Only the segment with the largest
+  /// voltage is added, where the others could not show a saturation. Chosen.
   double certain_screening_share = 0.5;
 
   // Candidates: which are fitted completely.
