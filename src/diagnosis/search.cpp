@@ -123,9 +123,9 @@ void Search::screen_on_all() {
 }
 
 bool Search::screen_on_largest_voltage() {
+  const double start_v = highest_saturation_start * largest_voltage_v(train_);
+  if (!(largest_voltage_v(screening_subset_) < start_v)) return false;
   const std::size_t place = most_driven_segment(train_);
-  const double largest_v = largest_voltage_v(*train_.runs, train_.segments[place]);
-  if (!(largest_voltage_v(screening_subset_) < highest_saturation_start * largest_v)) return false;
   const auto before = std::ranges::lower_bound(screening_places_, place) - screening_places_.begin();
   screening_places_.insert(screening_places_.begin() + before, place);
   screening_subset_.segments.insert(screening_subset_.segments.begin() + before, train_.segments[place]);

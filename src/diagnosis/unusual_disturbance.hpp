@@ -13,9 +13,9 @@
 
 namespace upright {
 
-/// Whether tests that pass beside `noise` do so beside a force or torque that is larger than this, or whose
-/// coloured part lasts for longest_correlation_s. `tests` becomes structured and says so then.
-bool find_unusual_disturbance(const Noise& noise, const DataRange& range, const PriorPolicy& prior,
+/// Whether tests that pass beside the `fitted` noise do so beside a force or torque that is larger than this,
+/// or whose coloured part lasts for longest_correlation_s. `tests` becomes structured and says so then.
+bool find_unusual_disturbance(const Noise& fitted, const DataRange& range, const PriorPolicy& prior,
                               ResidualTests& tests);
 
 /// Adds a force of the track to an answer. A usual one is a note, since every track is a little rough. Beside
