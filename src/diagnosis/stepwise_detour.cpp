@@ -34,12 +34,18 @@ bool StepwiseSelection::find_without(std::size_t effect) {
     exchange_paths();
   };
   try {
-    find_again();
+    const double to_beat = other.hypothesis.train.objective;
+    select_forward(3 * budget_.max_rounds, 4 * budget_.max_rounds, false, to_beat);
+    if (current_.train.objective < to_beat) eliminate_backward();
   } catch (...) {  // the search may end at any time: what was found before it counts
     return_to_path();
     throw;
   }
   return_to_path();
+  if (!(other.hypothesis.train.objective < current_.train.objective)) {
+    record_step();
+    return false;
+  }
   std::vector<std::size_t> brought;
   std::copy_if(other.found.begin(), other.found.end(), std::back_inserter(brought),
                [&](std::size_t of) { return !is_found(of); });

@@ -5,6 +5,7 @@
 #include <limits>
 #include <numeric>
 #include <sstream>
+#include <utility>
 
 #include "residual_location.hpp"
 #include "upright/base/error.hpp"
@@ -289,8 +290,11 @@ void StepwiseSelection::record_step() {
   record_.steps.push_back(std::move(step));
 }
 
-void StepwiseSelection::select_forward(int first_round, int last_round, bool with_low_noise) {
+void StepwiseSelection::select_forward(int first_round, int last_round, bool with_low_noise, double to_beat) {
+  double before = current_.train.objective;
   for (int round = first_round; round < last_round && add_best(round, with_low_noise); ++round) {
+    const double gain = before - std::exchange(before, current_.train.objective);
+    if (before - to_beat > gain * (last_round - round - 1)) break;
   }
   resolve_doubt();
 }

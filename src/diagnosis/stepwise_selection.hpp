@@ -2,6 +2,7 @@
 // what resembles them, tried in pairs, and dropped when they are not needed.
 #pragma once
 
+#include <limits>
 #include <map>
 #include <optional>
 #include <set>
@@ -142,8 +143,10 @@ class StepwiseSelection {
   void record_step();
 
   /// Adds effects one at a time, the best first, for as long as the data ask for one. `with_low_noise`: as
-  /// they show with little noise, for much noise can account for the whole of an effect.
-  void select_forward(int first_round, int last_round, bool with_low_noise);
+  /// they show with little noise, for much noise can account for the whole of an effect. `to_beat`: given up
+  /// where the rounds that are left, with the gain of the last one each, would not reach this objective.
+  void select_forward(int first_round, int last_round, bool with_low_noise,
+                      double to_beat = std::numeric_limits<double>::infinity());
   /// One round: whether an effect was added.
   bool add_best(int round, bool with_low_noise);
   /// The same, of these.
