@@ -11,10 +11,7 @@ namespace {
 /// The objective after a step, were residuals linear. A step that is cut short may promise to be worse.
 double predicted_objective(const FitData& data, const FitPoint& point,
                            const std::vector<FreeParameter>& free) {
-  FitOptions linearise_only;
-  linearise_only.max_iterations = 0;
-  linearise_only.noise_rounds = 0;
-  const FitResult seen = fit(data, point, free, linearise_only);
+  const FitResult seen = fit(data, point, free, steps_with_fixed_noise(0));
   return seen.objective - std::max(0.0, seen.bounded_reduction);
 }
 

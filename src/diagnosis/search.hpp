@@ -45,6 +45,9 @@ struct Hypothesis {
   }
 };
 
+/// The effects that either has.
+std::set<std::size_t> effects_of_both(const Hypothesis& first, const Hypothesis& second);
+
 /// How much better the richer one is, if the data count `dispersion` times less than the likelihood says.
 Improvement compare(const Hypothesis& simpler, const Hypothesis& richer, double dispersion);
 /// The same with the dispersion that the richer one leaves.
@@ -181,6 +184,8 @@ class Search {
   bool bristles_are_short(const Hypothesis& h) const;
   /// The zero of the angle where the plant file does not state it.
   bool is_unknown_zero(std::size_t effect) const;
+  /// Of the screening subset after a step, were residuals linear; minus infinity where that says nothing.
+  double predicted_objective(const FitPoint& point, const std::vector<FreeParameter>& free) const;
   /// A hypothesis's point on the screening subset alone.
   FitPoint screening_point(const Hypothesis& base) const;
   std::vector<FreeParameter> free_of(const std::set<std::size_t>& added) const;

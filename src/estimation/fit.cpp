@@ -110,6 +110,13 @@ FitResult failed_at(const FitPoint& start, std::size_t segments, std::size_t fre
 
 }  // namespace
 
+FitOptions steps_with_fixed_noise(int steps) {
+  FitOptions options;
+  options.max_iterations = steps;
+  options.noise_rounds = 0;
+  return options;
+}
+
 std::size_t max_free_parameters(const Plant& plant) {
   return max_derivatives - static_cast<std::size_t>(estimated_states(plant));
 }

@@ -87,6 +87,9 @@ struct FitOptions {
   double tolerance = 1e-4;                   ///< stop at this relative reduction of the objective per sample
 };
 
+/// Of a fit whose noise stays. Without steps it says how the data depend on the parameters.
+FitOptions steps_with_fixed_noise(int steps);
+
 /// The most derivatives that a fit takes: with respect to the states of the plant and the free parameters.
 inline constexpr std::size_t max_derivatives = 32;
 /// The most parameters that a fit of this plant can free.

@@ -131,9 +131,7 @@ std::vector<PlantState<double>> estimate_initial_states(const std::vector<Measur
 }
 
 FitResult fit_initial_states(const FitData& data, const FitPoint& start, int max_iterations) {
-  FitOptions options;
-  options.noise_rounds = 0;
-  options.max_iterations = max_iterations;
+  const FitOptions options = steps_with_fixed_noise(max_iterations);
   if (data.bound != nullptr) data.bound->check();
   std::vector<FitResult> found(data.segments.size());
   parallel_for(found.size(), [&](std::size_t s) {
