@@ -2,7 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
+#include <limits>
 #include <numbers>
+#include <utility>
 
 #include "candidates.hpp"
 
@@ -40,7 +43,8 @@ double force_of_unit_size(std::size_t effect, const PlaceForce& at) {
 
 /// A sine over the track, fitted to the residual force.
 struct FittedSine {
-  double explained;  ///< of the sum of squares of the residual force [N^2]
+  double
+      explained;  ///< of the sum of squares of the residual force [N^2]; in a ranking, of what is usual [1]
   double size, frequency_per_m, phase_rad;
 };
 
@@ -88,6 +92,43 @@ std::vector<FittedSine> periodogram(const std::vector<PlaceForce>& residual,
   return found;
 }
 
+/// What sines explain by chance about a frequency: a median, over a range of which a peak is a small part.
+/// `sines`: of rising frequency, `place`: of one of them.
+double usually_explained(const std::vector<FittedSine>& sines, std::size_t place) {
+  constexpr double reach = 3.0;             // of the range, times the frequency
+  constexpr std::size_t on_each_side = 16;  // at least, for a median
+  const auto place_of = [&](double frequency_per_m) {
+    return static_cast<std::size_t>(
+        std::ranges::lower_bound(sines, frequency_per_m, {}, &FittedSine::frequency_per_m) - sines.begin());
+  };
+  const double middle_per_m = sines[place].frequency_per_m;
+  const std::size_t first = std::min(place_of(middle_per_m / reach), place - std::min(place, on_each_side));
+  const std::size_t end =
+      std::max(place_of(middle_per_m * reach), std::min(place + on_each_side, sines.size()));
+  std::vector<double> explained;
+  for (std::size_t i = first; i < end; ++i) explained.push_back(sines[i].explained);
+  const auto middle = explained.begin() + std::ssize(explained) / 2;
+  std::nth_element(explained.begin(), middle, explained.end());
+  return std::max(*middle, std::numeric_limits<double>::min());
+}
+
+/// Puts first what explains most, compared with others of about its frequency: the residual force is not
+/// white, for the noise of a position grows as a force with the square of its frequency.
+void rank(std::vector<FittedSine>& sines) {
+  constexpr double band = 1.2;  // of frequencies with the same comparison, which takes time
+  std::vector<FittedSine> compared = sines;
+  double usual_n2 = 1.0, to_per_m = 0.0;
+  for (std::size_t i = 0; i < sines.size(); ++i) {
+    if (sines[i].frequency_per_m >= to_per_m) {
+      usual_n2 = usually_explained(sines, i);
+      to_per_m = band * sines[i].frequency_per_m;
+    }
+    compared[i].explained /= usual_n2;
+  }
+  std::ranges::sort(compared, std::greater{}, &FittedSine::explained);
+  sines = std::move(compared);
+}
+
 }  // namespace
 
 /// An effect counts as one that repeats when a run passes some of its crests. Several runs at different
@@ -110,8 +151,7 @@ std::vector<std::vector<double>> periodic_starts(std::size_t effect, const std::
   const double spacing = 0.25 / travel;
   const double shortest = std::max(0.001, 1.0 / (1.0 / longest + budget.max_frequencies * spacing));
   std::vector<FittedSine> found = periodogram(residual, unit_n, 1.0 / longest, 1.0 / shortest, spacing);
-  std::sort(found.begin(), found.end(),
-            [](const FittedSine& a, const FittedSine& b) { return a.explained > b.explained; });
+  rank(found);
   std::vector<std::vector<double>> starts;
   for (const FittedSine& sine : found) {
     const bool near = std::any_of(starts.begin(), starts.end(), [&](const std::vector<double>& start) {

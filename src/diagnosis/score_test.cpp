@@ -8,13 +8,6 @@ namespace upright {
 
 namespace {
 
-/// The objective after a step, were residuals linear. A step that is cut short may promise to be worse.
-double predicted_objective(const FitData& data, const FitPoint& point,
-                           const std::vector<FreeParameter>& free) {
-  const FitResult seen = fit(data, point, free, steps_with_fixed_noise(0));
-  return seen.objective - std::max(0.0, seen.bounded_reduction);
-}
-
 /// A parameter at an end of its range cannot follow, and a step that it would make says nothing.
 std::vector<FreeParameter> within_range(std::vector<FreeParameter> free, const Plant& plant) {
   std::erase_if(free, [&](const FreeParameter& p) {
@@ -32,7 +25,7 @@ ScoreTestResult best_by_score_test(const FitData& data, const FitResult& fitted,
   ScoreTestResult best;
   const DataRange& range = search.range();
   const std::vector<FreeParameter> free = within_range(fitted_free, fitted.point.plant);
-  const double without = predicted_objective(data, fitted.point, free);
+  const double without = objective_after_step(data, fitted.point, free);
   for (const std::size_t effect : candidate_effects(fitted.point.plant, range)) {
     if (std::find(tried_already.begin(), tried_already.end(), effect_registry()[effect].kind) !=
         tried_already.end())
@@ -44,7 +37,7 @@ ScoreTestResult best_by_score_test(const FitData& data, const FitResult& fitted,
       FitPoint point = fitted.point;
       point.plant.set(effect, values);
       convert_initial_states(point.starts, fitted.point.plant, point.plant);
-      const double fall = without - predicted_objective(data, point, with);
+      const double fall = without - objective_after_step(data, point, with);
       if (fall > best.fall) best = {effect, fall};
     }
   }

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <vector>
 
 #include "search.hpp"
 
@@ -65,13 +66,23 @@ std::vector<double> Search::predicted_gains(const Hypothesis& base,
   return gains;
 }
 
+std::vector<FitPoint> Search::screening_points(const Hypothesis& base, std::size_t effect,
+                                               const std::vector<FreeParameter>& free) const {
+  std::vector<FitPoint> points = points_with(screening_point(base), effect, base);
+  if (!is_periodic(effect) || points.size() < 2) return points;
+  std::vector<double> promised;
+  for (const FitPoint& point : points)
+    promised.push_back(objective_after_step(screening_subset_, point, free));
+  return {points[static_cast<std::size_t>(std::ranges::min_element(promised) - promised.begin())]};
+}
+
 Hypothesis Search::screened(const Hypothesis& base, std::size_t effect, double to_reach) const {
   Hypothesis h;
   h.added = base.added;
   h.added.insert(effect);
   h.free = free_of(h.added);
   h.train.objective = std::numeric_limits<double>::infinity();
-  for (const FitPoint& point : points_with(screening_point(base), effect, base)) {
+  for (const FitPoint& point : screening_points(base, effect, h.free)) {
     FitResult reached =
         fit(screening_subset_, point, h.free, steps_with_fixed_noise(budget_.screening_steps));
     if (reached.objective < h.train.objective) h.train = std::move(reached);

@@ -186,6 +186,10 @@ class Search {
   bool is_unknown_zero(std::size_t effect) const;
   /// Of the screening subset after a step, were residuals linear; minus infinity where that says nothing.
   double predicted_objective(const FitPoint& point, const std::vector<FreeParameter>& free) const;
+  /// Where fits of an effect to the screening subset begin: of several pitches, at the one from which the
+  /// derivatives promise the lowest objective.
+  std::vector<FitPoint> screening_points(const Hypothesis& base, std::size_t effect,
+                                         const std::vector<FreeParameter>& free) const;
   /// A hypothesis's point on the screening subset alone.
   FitPoint screening_point(const Hypothesis& base) const;
   std::vector<FreeParameter> free_of(const std::set<std::size_t>& added) const;

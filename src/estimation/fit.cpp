@@ -133,6 +133,12 @@ FitResult fit(const FitData& data, const FitPoint& start, const std::vector<Free
   return result;
 }
 
+double objective_after_step(const FitData& data, const FitPoint& point,
+                            const std::vector<FreeParameter>& free) {
+  const FitResult seen = fit(data, point, free, steps_with_fixed_noise(0));
+  return seen.objective - std::max(0.0, seen.bounded_reduction);
+}
+
 std::vector<std::vector<LinearStep>> linearise(const FitData& data, const FitPoint& point) {
   std::vector<std::vector<LinearStep>> steps(data.segments.size());
   parallel_for(data.segments.size(),

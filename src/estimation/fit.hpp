@@ -101,6 +101,11 @@ std::size_t max_free_parameters(const Plant& plant);
 FitResult fit(const FitData& data, const FitPoint& start, const std::vector<FreeParameter>& free,
               const FitOptions& options = {});
 
+/// The objective after one step within the ranges of the parameters, were residuals linear. A step that is
+/// cut short may promise to be worse: then the present one.
+double objective_after_step(const FitData& data, const FitPoint& point,
+                            const std::vector<FreeParameter>& free);
+
 /// Fits the initial states only, with fixed plant and noise. Throws as `fit` does.
 FitResult fit_initial_states(const FitData& data, const FitPoint& start,
                              int max_iterations = FitOptions{}.max_iterations);
