@@ -33,10 +33,11 @@ double combined_t(const Improvement& improvement, const AcceptancePolicy& p) {
   return std::sqrt(improvement.t_value * improvement.t_value + std::max(improvement.held, 0.0));
 }
 
-/// Whether training and held-out runs both speak for it, and together beyond doubt.
+/// Whether training and held-out runs both speak for it, and together as clearly as training runs alone have
+/// to: what is predicted of held-out runs counts as much.
 bool is_borne_out(double saving, const Improvement& improvement, const AcceptancePolicy& p) {
   return std::min(saving, improvement.held) > p.min_evidence_of_each &&
-         saving + improvement.held > p.min_evidence_together;
+         saving + improvement.held > p.min_evidence;
 }
 
 /// Evidence on the training runs that only something missing can hold against: held-out runs may excite what

@@ -44,12 +44,9 @@ struct AcceptancePolicy {
   /// speak against an effect by this much, since runs that do not excite it carry no information. Odds of 7
   /// to 1. Chosen.
   double equally_good_evidence = 4.0;
-  /// [evidence] If training and held-out runs both support an effect, each needs at least this. Without this
-  /// rule, weak effects in one short run were missed (new seeds of the matrix).
+  /// [evidence] Training and held-out runs that both support an effect need `min_evidence` together, and this
+  /// each. Without this rule, weak effects in one short run were missed (new seeds of the matrix).
   double min_evidence_of_each = 8.0;
-  /// [evidence] The sum that both need. It is larger than `min_evidence` because it replaces it. Same
-  /// origin.
-  double min_evidence_together = 40.0;
   /// [standard errors] Below this t value, held-out evidence is not added to its square: one standard error
   /// is what chance produces. Chosen. (Held-out evidence of 25 confirmed a t of 1.5: seeds 181/83 and
   /// 182/114.)

@@ -100,7 +100,7 @@ TEST(Addition, IsBorneOutByTrainingAndHeldOutRuns) {
   EXPECT_EQ(rule_of(addition(above(p.min_evidence_of_each), 1000.0, 5.0)), Rule::borne_out);
   EXPECT_EQ(rule_of(addition(1000.0, p.min_evidence_of_each, 5.0)), Rule::shown_throughout);
   EXPECT_EQ(rule_of(addition(1000.0, above(p.min_evidence_of_each), 5.0)), Rule::borne_out);
-  const double half = 0.5 * p.min_evidence_together;
+  const double half = 0.5 * p.min_evidence;
   EXPECT_EQ(rule_of(addition(half, half, 5.0)), Rule::too_little_evidence);
   EXPECT_EQ(rule_of(addition(half, half + 0.1, 5.0)), Rule::borne_out);
 }
