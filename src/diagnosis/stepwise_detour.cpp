@@ -42,10 +42,6 @@ bool StepwiseSelection::find_without(std::size_t effect) {
     throw;
   }
   return_to_path();
-  if (!(other.hypothesis.train.objective < current_.train.objective)) {
-    record_step();
-    return false;
-  }
   std::vector<std::size_t> brought;
   std::copy_if(other.found.begin(), other.found.end(), std::back_inserter(brought),
                [&](std::size_t of) { return !is_found(of); });
