@@ -255,6 +255,10 @@ Decision decide(const Evidence& evidence, const SelectionPolicy& policy) {
   return {};
 }
 
+bool is_out_of_reach(double lacks, double last_gain, int rounds_left) {
+  return lacks > last_gain * rounds_left;
+}
+
 bool is_better_optimum(double fall, const AcceptancePolicy& policy) {
   return fall > policy.equally_good_evidence;
 }

@@ -106,6 +106,10 @@ struct Decision {
 
 Decision decide(const Evidence& evidence, const SelectionPolicy& policy);
 
+/// Whether a search without one effect is given up: it still lacks so much evidence, and would not make up
+/// for it if each of the rounds that are left gained what the last one did.
+bool is_out_of_reach(double lacks, double last_gain, int rounds_left);
+
 /// Whether a fit from elsewhere, whose objective is lower by `fall`, is in a better place.
 bool is_better_optimum(double fall, const AcceptancePolicy& policy);
 

@@ -5,7 +5,6 @@
 #include <limits>
 #include <numeric>
 #include <sstream>
-#include <utility>
 
 #include "residual_location.hpp"
 #include "upright/base/error.hpp"
@@ -293,8 +292,9 @@ void StepwiseSelection::record_step() {
 void StepwiseSelection::select_forward(int first_round, int last_round, bool with_low_noise, double to_beat) {
   double before = current_.train.objective;
   for (int round = first_round; round < last_round && add_best(round, with_low_noise); ++round) {
-    const double gain = before - std::exchange(before, current_.train.objective);
-    if (before - to_beat > gain * (last_round - round - 1)) break;
+    const double reached = current_.train.objective;
+    if (is_out_of_reach(reached - to_beat, before - reached, last_round - round - 1)) break;
+    before = reached;
   }
   resolve_doubt();
 }

@@ -144,7 +144,7 @@ class StepwiseSelection {
 
   /// Adds effects one at a time, the best first, for as long as the data ask for one. `with_low_noise`: as
   /// they show with little noise, for much noise can account for the whole of an effect. `to_beat`: given up
-  /// where the rounds that are left, with the gain of the last one each, would not reach this objective.
+  /// where this objective is out of reach.
   void select_forward(int first_round, int last_round, bool with_low_noise,
                       double to_beat = std::numeric_limits<double>::infinity());
   /// One round: whether an effect was added.

@@ -44,20 +44,5 @@ TEST(StepwiseDetour, KeepsAModelThatNothingBeats) {
   EXPECT_EQ(s.selection.current().train.objective, objective);
 }
 
-// A delay is no lag of the motor: what stands in its place falls further behind than more effects can mend.
-TEST(StepwiseDetour, EndsEarlyWhereItsModelStaysOutOfReach) {
-  Plant plant = cart_with_friction();
-  plant.set("input_delay", {0.03});
-  plant.set("quadratic_drag", {3.0});
-  Selected s(plant);
-  ASSERT_EQ(s.selection.found().front(), effect_number("input_delay"));
-  const std::size_t before = s.record.trials.size();
-  EXPECT_FALSE(s.selection.find_without_each());
-  ASSERT_GT(s.record.trials.size(), before);
-  const std::size_t only_round = s.record.trials[before].round;
-  EXPECT_TRUE(s.record.trials[before].taken);
-  EXPECT_EQ(s.record.trials.back().round, only_round);
-}
-
 }  // namespace
 }  // namespace upright
