@@ -370,7 +370,7 @@ TEST(Alternative, TakesTheCertaintyOfAnEffectAway) {
   EXPECT_FALSE(reduces_certainty(3.0, 3.0 / d.min_loss, d));
 }
 
-TEST(SearchWithoutAnEffect, IsGivenUpWhereItsRoundsCannotMakeUpForIt) {
+TEST(SearchWithoutAnEffect, EndsWhereItIsOutOfReach) {
   EXPECT_FALSE(is_out_of_reach(30.0, 10.0, 3));
   EXPECT_TRUE(is_out_of_reach(30.1, 10.0, 3));
   EXPECT_FALSE(is_out_of_reach(-0.1, 0.0, 2));
