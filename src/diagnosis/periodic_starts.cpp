@@ -43,8 +43,7 @@ double force_of_unit_size(std::size_t effect, const PlaceForce& at) {
 
 /// A sine over the track, fitted to the residual force.
 struct FittedSine {
-  double
-      explained;  ///< of the sum of squares of the residual force [N^2]; in a ranking, of what is usual [1]
+  double explained;  ///< of the sum of squares of the residual force [N^2]; when ranked, of the usual [1]
   double size, frequency_per_m, phase_rad;
 };
 
