@@ -71,6 +71,7 @@ std::vector<FitPoint> Search::screening_points(const Hypothesis& base, std::size
   std::vector<FitPoint> points = points_with(screening_point(base), effect, base);
   if (!is_periodic(effect) || points.size() < 2) return points;
   std::vector<double> promised;
+  promised.reserve(points.size());
   for (const FitPoint& point : points)
     promised.push_back(objective_after_step(screening_subset_, point, free));
   return {points[static_cast<std::size_t>(std::ranges::min_element(promised) - promised.begin())]};
