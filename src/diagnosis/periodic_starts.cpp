@@ -7,6 +7,7 @@
 #include <numbers>
 #include <utility>
 
+#include "base/median.hpp"
 #include "candidates.hpp"
 
 namespace upright {
@@ -106,14 +107,12 @@ double usually_explained(const std::vector<FittedSine>& sines, std::size_t place
       std::max(place_of(middle_per_m * reach), std::min(place + on_each_side, sines.size()));
   std::vector<double> explained;
   for (std::size_t i = first; i < end; ++i) explained.push_back(sines[i].explained);
-  const auto middle = explained.begin() + std::ssize(explained) / 2;
-  std::nth_element(explained.begin(), middle, explained.end());
-  return std::max(*middle, std::numeric_limits<double>::min());
+  return std::max(median_of(std::move(explained)), std::numeric_limits<double>::min());
 }
 
-/// Puts first what explains most, compared with others of about its frequency: the residual force is not
-/// white, for the noise of a position grows as a force with the square of its frequency.
-void rank(std::vector<FittedSine>& sines) {
+/// First what explains most, compared with others of about its frequency: the residual force is not white,
+/// for the noise of a position grows as a force with the square of its frequency.
+std::vector<FittedSine> ranked(const std::vector<FittedSine>& sines) {
   constexpr double band = 1.2;  // of frequencies with the same comparison, which takes time
   std::vector<FittedSine> compared = sines;
   double usual_n2 = 1.0, to_per_m = 0.0;
@@ -125,7 +124,7 @@ void rank(std::vector<FittedSine>& sines) {
     compared[i].explained /= usual_n2;
   }
   std::ranges::sort(compared, std::greater{}, &FittedSine::explained);
-  sines = std::move(compared);
+  return compared;
 }
 
 }  // namespace
@@ -149,10 +148,9 @@ std::vector<std::vector<double>> periodic_starts(std::size_t effect, const std::
   // Frequencies over the track one half-cycle apart, so that no crest is missed.
   const double spacing = 0.25 / travel;
   const double shortest = std::max(0.001, 1.0 / (1.0 / longest + budget.max_frequencies * spacing));
-  std::vector<FittedSine> found = periodogram(residual, unit_n, 1.0 / longest, 1.0 / shortest, spacing);
-  rank(found);
+  const std::vector<FittedSine> found = periodogram(residual, unit_n, 1.0 / longest, 1.0 / shortest, spacing);
   std::vector<std::vector<double>> starts;
-  for (const FittedSine& sine : found) {
+  for (const FittedSine& sine : ranked(found)) {
     const bool near = std::any_of(starts.begin(), starts.end(), [&](const std::vector<double>& start) {
       return std::abs(1.0 / start[1] - sine.frequency_per_m) < 4.0 * spacing;
     });

@@ -34,9 +34,7 @@ bool StepwiseSelection::find_without(std::size_t effect) {
     exchange_paths();
   };
   try {
-    const double to_beat = other.hypothesis.train.objective;
-    select_forward(3 * budget_.max_rounds, 4 * budget_.max_rounds, false, to_beat);
-    if (current_.train.objective < to_beat) eliminate_backward();
+    find_again(other.hypothesis.train.objective);
   } catch (...) {  // the search may end at any time: what was found before it counts
     return_to_path();
     throw;

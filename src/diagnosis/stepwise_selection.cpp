@@ -64,9 +64,9 @@ bool StepwiseSelection::find_thoroughly(bool certainly_missing) {
   return true;
 }
 
-void StepwiseSelection::find_again() {
-  select_forward(3 * budget_.max_rounds, 4 * budget_.max_rounds, false);
-  eliminate_backward();
+void StepwiseSelection::find_again(double to_beat) {
+  select_forward(3 * budget_.max_rounds, 4 * budget_.max_rounds, false, to_beat);
+  if (current_.train.objective <= to_beat) eliminate_backward();
 }
 
 std::vector<std::size_t> StepwiseSelection::withdraw(std::size_t effect) {

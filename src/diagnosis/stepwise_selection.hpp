@@ -49,8 +49,9 @@ class StepwiseSelection {
   /// Back to what stood before it was sought.
   void give_up_attached_mass();
 
-  /// After something was taken out for good: looks for what can stand in its place.
-  void find_again();
+  /// After something was taken out for good: looks for what can stand in its place. `to_beat`: given
+  /// up where this objective is out of reach.
+  void find_again(double to_beat = std::numeric_limits<double>::infinity());
   /// No candidate from now on.
   void exclude(const std::vector<std::size_t>& effects) { withdrawn_.insert(effects.begin(), effects.end()); }
 
@@ -143,8 +144,8 @@ class StepwiseSelection {
   void record_step();
 
   /// Adds effects one at a time, the best first, for as long as the data ask for one. `with_low_noise`: as
-  /// they show with little noise, for much noise can account for the whole of an effect. `to_beat`: given up
-  /// where this objective is out of reach.
+  /// they show with little noise, for much noise can account for the whole of an effect. `to_beat`: as in
+  /// find_again().
   void select_forward(int first_round, int last_round, bool with_low_noise,
                       double to_beat = std::numeric_limits<double>::infinity());
   /// One round: whether an effect was added.
