@@ -16,12 +16,12 @@ ResidualTests examine_fit(const FitData& data, const FitPoint& fitted, const Sel
   point.noise = sensors_only(fitted.noise);
   const FitResult plain = fit_initial_states(data, point);
   tests.noise_ratio = whitened_rms(plain);
-  if (is_beyond_sensors(tests, policy.residual))
-    tests.p_values = residual_p_values(innovations, tests.statistics, policy.residual);
+  if (is_beyond_sensors(tests, policy))
+    tests.p_values = residual_p_values(innovations, tests.statistics, policy);
   point = plain.point;
   point.noise = low_frequency_equivalent(fitted.noise, tests);
   tests.excess = tests.noise_ratio / simulation_floor(data, point, budget.floor_draws).highest;
-  conclude_tests(tests, policy.residual);
+  conclude_tests(tests, policy);
   return tests;
 }
 
@@ -41,7 +41,7 @@ void compare_held_out(const Search& search, const Hypothesis& judged, const Nois
   // held-out ones by as much again.
   const double excess =
       search.simulate(conditioned).gap / held_out_floor(search, conditioned, noise, tests).highest;
-  if (!is_held_out_too_far_off(excess, tests.excess, search.policy().residual)) return;
+  if (!is_held_out_too_far_off(excess, tests.excess, search.policy().significance)) return;
   tests.structured = true;
   std::ostringstream text;
   text.precision(3);

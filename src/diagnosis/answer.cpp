@@ -34,7 +34,7 @@ double share_of(const RunEvidence& run, const std::vector<RunEvidence>& all) {
 }
 
 NextBest next_best(const Diagnosis& diagnosis, const FoundEffect& effect) {
-  const double near = SelectionPolicy{}.distinction.next_best_share;
+  const double near = SearchBudget{}.resembling_share;
   const std::size_t max_others = SearchBudget{}.max_next_best;
   NextBest best;
   for (const Trial& trial : diagnosis.trials)

@@ -44,6 +44,7 @@ class ColouredNull {
 std::optional<std::size_t> outdone_by_coloured_noise(const Search& search, const Hypothesis& known,
                                                      const std::vector<Reproduction>& effects) {
   const AcceptancePolicy& policy = search.policy().acceptance;
+  const double certain_z = search.policy().significance.certain_z;
   std::optional<ColouredNull> null;
   std::optional<std::size_t> worst;
   double least = std::numeric_limits<double>::infinity();
@@ -56,8 +57,7 @@ std::optional<std::size_t> outdone_by_coloured_noise(const Search& search, const
     if (search.is_plant_number(found.effect) || overwhelming) continue;
     if (!null) null.emplace(search, known);
     const double evidence = null->evidence_of(found.effect);
-    const bool holds =
-        evidence > policy.min_evidence && null->certainty_of(found.effect) > policy.min_certainty;
+    const bool holds = evidence > policy.min_evidence && null->certainty_of(found.effect) > certain_z;
     if (holds || !(evidence < least)) continue;
     least = evidence;
     worst = found.effect;

@@ -25,9 +25,9 @@ struct SimulationChange {
   double mean = 0.0, scatter = 0.0;
   /// By how much the mean may be larger than its true value. A few segments say little of their scatter, so
   /// the usual one counts as one more of them (Student's t, with a scaled inverse chi-square prior).
-  double by_chance(const AcceptancePolicy& policy) const;
+  double by_chance(const SelectionPolicy& policy) const;
   /// The mean above which simulations count as worse.
-  double limit(const AcceptancePolicy& policy) const;
+  double limit(const SelectionPolicy& policy) const;
 };
 
 /// From the errors of the same segments before and now [any unit, one for both]. They may be infinite.
@@ -58,29 +58,27 @@ struct Evidence {
 
   // From fits that only some rules ask for.
   std::optional<Improvement> at_equal_noise;  ///< over the model from the same noise
-  std::optional<double> simulated_gap;        ///< of held-out data [sensor noise]
   std::optional<SimulationChange> simulated_segments;
   std::optional<double> certainty_of_all_runs;
   std::optional<double> certainty_converged;  ///< once more fits gain nothing
 };
 
 /// A fit that a decision waits for.
-enum class MissingFit { none, equal_noise, simulation, simulated_segments, all_runs, converged };
+enum class MissingFit { none, equal_noise, simulated_segments, all_runs, converged };
 
 /// Why a change was accepted, or why not.
 enum class Rule {
   undecided,
   // Accepted.
-  shown_throughout,    ///< evidence on the training runs, all along them
-  borne_out,           ///< training and held-out runs both say so
-  overwhelming,        ///< evidence that no coloured noise makes
-  plant_numbers,       ///< numbers of the plant need not be so far off
-  sensors_noise_left,  ///< nothing else is left that could have made it
-  better,              ///< than what it stands for
-  plainer,             ///< as good, and fewer words
-  still_shown,         ///< beside the others
-  needed_by_another,   ///< without it another becomes what cannot be
-  held_out_agree,      ///< in the end
+  shown_throughout,   ///< evidence on the training runs, all along them
+  borne_out,          ///< training and held-out runs both say so
+  overwhelming,       ///< evidence that no coloured noise makes
+  plant_numbers,      ///< numbers of the plant need not be so far off
+  better,             ///< than what it stands for
+  plainer,            ///< as good, and fewer words
+  still_shown,        ///< beside the others
+  needed_by_another,  ///< without it another becomes what cannot be
+  held_out_agree,     ///< in the end
   // Not accepted.
   cannot_be,
   bends_another,
@@ -111,7 +109,7 @@ Decision decide(const Evidence& evidence, const SelectionPolicy& policy);
 bool is_out_of_reach(double lacks, double last_gain, int rounds_left);
 
 /// Whether a fit from elsewhere, whose objective is lower by `fall`, is in a better place.
-bool is_better_optimum(double fall, const AcceptancePolicy& policy);
+bool is_better_optimum(double fall, const SignificancePolicy& policy);
 
 /// An effect that may be taken.
 struct Contender {
@@ -122,6 +120,6 @@ struct Contender {
 
 /// The place of the one with the largest score. Scores that are equal leave it to the held-out runs, and
 /// where those say the same, to the plainer effect. There must be one.
-std::size_t best_of(const std::vector<Contender>& contenders, const AcceptancePolicy& policy);
+std::size_t best_of(const std::vector<Contender>& contenders, const SignificancePolicy& policy);
 
 }  // namespace upright

@@ -1,6 +1,7 @@
 #include "detectable.hpp"
 
 #include <algorithm>
+#include <boost/math/distributions/normal.hpp>
 #include <cmath>
 #include <limits>
 #include <sstream>
@@ -32,12 +33,14 @@ double usual_size(std::size_t effect, const Search& search) {
 }  // namespace
 
 double standard_errors_to_be_shown(std::size_t effect, bool is_correction, const SelectionPolicy& policy) {
-  if (is_correction) return policy.correction.min_z + policy.power.power_z;
+  // One that is so much larger is shown with a probability of one minus the level.
+  const double margin = quantile(boost::math::normal(), 1.0 - policy.significance.level);
+  if (is_correction) return policy.significance.certain_z + margin;
   const AcceptancePolicy& p = policy.acceptance;
   const auto more = static_cast<double>(effect_registry()[effect].parameters.size() - 1);
   // The evidence of an effect is the square of its size in standard errors.
-  return std::max(p.min_certainty, std::sqrt(p.min_evidence + p.parameter_penalty * more)) +
-         policy.power.power_z;
+  return std::max(policy.significance.certain_z, std::sqrt(p.min_evidence + p.parameter_penalty * more)) +
+         margin;
 }
 
 std::vector<Detectable> detectable_sizes(const Search& search, const Hypothesis& h,

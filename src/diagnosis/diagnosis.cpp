@@ -86,9 +86,9 @@ class Diagnostician {
       const auto force = describe_force(search_, fits_.judged(), fits_.known(), without_trend_);
       const double named = std::min(listing_.numbers_moved.value_or(listing_.after), listing_.after);
       const double lower = force ? named / force->held_out_error : 1.0;
-      if (lower > policy_.power.clear_gap) {
+      if (lower > policy_.significance.clear_ratio) {
         add_curve(*force, named, diagnosis);
-      } else if (force && force->shows_on_held_out(lower, policy_.acceptance)) {
+      } else if (force && force->shows_on_held_out(lower, policy_)) {
         diagnosis.verdict = Verdict::unexplained;
         diagnosis.residual = force->left_sentence();
       } else if (const auto left = track_force_left(search_, fits_.known())) {
@@ -147,7 +147,7 @@ class Diagnostician {
     diagnosis.noise = force.known.train.point.noise;
     const ResidualTests left = examine_fit(search_.all_data(), force.known.train.point, policy_, budget_);
     diagnosis.residual = left.sentence;
-    diagnosis.residual_tests = reported_tests(left, policy_.residual);
+    diagnosis.residual_tests = reported_tests(left, policy_);
     diagnosis.residual_after = smooth_residuals(data_.held, force.judged.held.point, policy_.location.walk);
   }
 
@@ -306,14 +306,14 @@ class Diagnostician {
     if (options_.quick && withdraw_doubtful()) return true;
     const Reproduction* worst = nullptr;
     for (const Reproduction& r : reproductions_)
-      if (is_contradicted(r, policy_.reproducibility) && (worst == nullptr || r.t_value < worst->t_value))
+      if (is_contradicted(r, policy_.significance) && (worst == nullptr || r.t_value < worst->t_value))
         worst = &r;
     if (worst != nullptr) {
       withdraw(worst->effect, worst->where);
       return true;
     }
     differences_ = run_differences(search_, fits_.known(), fits_.effects());
-    if (const RunDifference* differs = most_certain_of_single_runs(differences_, policy_.reproducibility)) {
+    if (const RunDifference* differs = most_certain_of_single_runs(differences_, policy_.significance)) {
       withdraw(differs->effect, sentence_on(*differs, runs_));
       result_.helps_here_only.back().by_run = differs->sizes;
       selection_.exclude(same_force_as(differs->effect));
@@ -395,7 +395,7 @@ class Diagnostician {
     const double usual = held_out_floor(search_, fits_.judged(), noise_, tests).usual;
     // Without an effect the numbers of the file stand, unless they are what is clearly off.
     const bool numbers_only = all.empty() && listing_.numbers_moved < listing_.before &&
-                              listing_.before > policy_.power.clear_gap * usual;
+                              listing_.before > policy_.significance.clear_ratio * usual;
     if (numbers_only) listing_.after = *listing_.numbers_moved;
     floor_ = std::max(std::min(usual, listing_.after), std::numeric_limits<double>::min());
     result_.gap_before = listing_.before / floor_;
@@ -417,7 +417,7 @@ class Diagnostician {
     }
     result_.gap_after = listing_.after / floor_;
     result_.residual = tests.sentence;
-    result_.residual_tests = reported_tests(tests, policy_.residual);
+    result_.residual_tests = reported_tests(tests, policy_);
     const Plant& fitted = fits_.reported().train.point.plant;
     result_.model =
         all.empty() && !numbers_only ? plant_ : model_with(plant_, fitted, search_.nuisances(), all);
@@ -435,7 +435,7 @@ class Diagnostician {
     for (const std::size_t number : search_.held_numbers())
       result_.notes.push_back("the value of the plant file stays: with a fitted " + kind_of(number) +
                               ", held-out data are simulated worse");
-    for (const std::string& note : notes_on_doubtful_numbers(fits_.reported(), all, policy_.correction))
+    for (const std::string& note : notes_on_doubtful_numbers(fits_.reported(), all, policy_.prior))
       result_.notes.push_back(note);
     beyond_sensors_ = tests.beyond_sensors;
     freed_effects_ = freed_effects(search_, fits_.judged(), all);
@@ -456,9 +456,9 @@ class Diagnostician {
 
   void decide(const ResidualTests& tests) {
     const std::vector<Detectable> hidden = may_hide(result_.detectable, plant_, policy_.power);
-    const VerdictGrounds grounds{tests.structured, result_.gap_after > policy_.power.clear_gap,
+    const VerdictGrounds grounds{tests.structured, result_.gap_after > policy_.significance.clear_ratio,
                                  !hidden.empty(), moves_enough(runs_, policy_.excitation)};
-    result_.verdict = verdict_of(result_, grounds, policy_.power);
+    result_.verdict = verdict_of(result_, grounds);
     if (result_.verdict == Verdict::not_excited) {
       const std::string reason = why_not_excited(result_, grounds, hidden);
       if (!reason.empty()) result_.notes.push_back(reason);

@@ -40,7 +40,7 @@ std::optional<std::string> sentence_on_impossible_scale(const Hypothesis& known,
 
 std::vector<std::string> notes_on_doubtful_numbers(const Hypothesis& known,
                                                    const std::vector<std::size_t>& effects,
-                                                   const CorrectionPolicy& policy) {
+                                                   const PriorPolicy& policy) {
   std::vector<std::string> notes;
   for (const std::size_t effect : effects) {
     const double scale = scale_of(known, effect).first;

@@ -17,6 +17,6 @@ std::optional<std::string> sentence_on_impossible_scale(const Hypothesis& known,
 /// On numbers of the plant file that are off by more than a data sheet is.
 std::vector<std::string> notes_on_doubtful_numbers(const Hypothesis& known,
                                                    const std::vector<std::size_t>& effects,
-                                                   const CorrectionPolicy& policy);
+                                                   const PriorPolicy& policy);
 
 }  // namespace upright

@@ -31,7 +31,7 @@ void FinalFits::settle(const std::set<std::size_t>& withdrawn) {
                             selection_.found().end());
   }
   std::vector<std::size_t> corrections;
-  for (const std::size_t j : certain_parameters(posterior, is_correction, policy_.correction))
+  for (const std::size_t j : certain_parameters(posterior, is_correction, policy_.significance))
     if (is_correction[j] && !keeps_prior(h, j) && !withdrawn.contains(h.free[j].effect) &&
         search_.is_plausible(h, h.free[j].effect) &&
         std::find(corrections.begin(), corrections.end(), h.free[j].effect) == corrections.end())
@@ -52,7 +52,7 @@ void FinalFits::fit_last(std::vector<std::size_t>& corrections) {
     options_.report_progress(0.9, "final fit to all runs");
     known_ = search_.fitted_to_all_runs(judged_);
     const auto includes_nothing = [&](std::size_t effect) {
-      return !is_certain_of_all_runs(search_.certainty(known_, effect), policy_.correction);
+      return !is_certain_of_all_runs(search_.certainty(known_, effect), policy_.significance);
     };
     const auto gone = std::remove_if(corrections.begin(), corrections.end(), includes_nothing);
     if (gone == corrections.end()) return;
@@ -65,7 +65,7 @@ bool FinalFits::keeps_prior(const Hypothesis& h, std::size_t j) const {
   if (effect_registry()[p.effect].enters == Enters::parameter || search_.given().find(p.effect) == nullptr)
     return false;
   const double value = h.train.point.plant.find(p.effect)->values[p.index];
-  return is_within_prior(value, p.prior_mean, p.prior_sigma, policy_.correction);
+  return is_within_prior(value, p.prior_mean, p.prior_sigma, policy_.significance);
 }
 
 void FinalFits::order_corrections(const std::vector<std::size_t>& corrections) {
@@ -110,7 +110,7 @@ std::optional<std::size_t> FinalFits::effect_with_open_size() const {
   };
   std::optional<std::size_t> least;
   for (const std::size_t effect : effects()) {
-    if (is_certain_of_all_runs(certainty_of(effect), policy_.correction)) continue;
+    if (is_certain_of_all_runs(certainty_of(effect), policy_.significance)) continue;
     if (!least || certainty_of(effect) < certainty_of(*least)) least = effect;
   }
   return least;

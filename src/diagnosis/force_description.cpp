@@ -302,9 +302,9 @@ void fit_table(const Search& search, const Curve& curve, ForceDescription& force
 
 }  // namespace
 
-bool ForceDescription::shows_on_held_out(double lower, const AcceptancePolicy& policy) const {
-  return lower > std::exp(policy.worse_simulation_by_chance) ||
-         (is_of_velocity && held_evidence > policy.min_evidence);
+bool ForceDescription::shows_on_held_out(double lower, const SelectionPolicy& policy) const {
+  return lower > std::exp(policy.significance.visible_change) ||
+         (is_of_velocity && held_evidence > policy.acceptance.min_evidence);
 }
 
 bool ForceDescription::moved(std::size_t effect) const {

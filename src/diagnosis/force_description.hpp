@@ -20,7 +20,7 @@ struct ForceDescription {
 
   /// Whether held-out data show the force too. Of the position, their simulation must say so, since every
   /// track is a little rough. `lower`: by which factor the curve lowers the error of that simulation.
-  bool shows_on_held_out(double lower, const AcceptancePolicy& policy) const;
+  bool shows_on_held_out(double lower, const SelectionPolicy& policy) const;
   /// Whether the fits moved the parameters of this effect too.
   bool moved(std::size_t effect) const;
   /// What is left without the curve.

@@ -55,13 +55,14 @@ bool grows_from_nothing(std::size_t effect) {
 
 }  // namespace
 
-bool reduces_certainty(double distance_with_other, double distance_alone, const DistinctionPolicy& policy) {
-  return distance_with_other < policy.min_distance && distance_with_other < policy.min_loss * distance_alone;
+bool reduces_certainty(double distance_with_other, double distance_alone, const SignificancePolicy& policy) {
+  return distance_with_other < policy.certain_z && distance_with_other < distance_alone - distance_with_other;
 }
 
-bool is_indistinguishable(double evidence_lost, double t_value, const DistinctionPolicy& policy) {
-  return evidence_lost < policy.indistinguishable_evidence ||
-         (evidence_lost < policy.max_scattered_evidence && t_value < policy.scattered_t);
+bool is_indistinguishable(double evidence_lost, double t_value, const SelectionPolicy& policy) {
+  return evidence_lost < evidence_at(policy.significance.certain_z) ||
+         (evidence_lost < policy.acceptance.overwhelming_evidence &&
+          t_value < policy.significance.interval_z);
 }
 
 std::vector<FreedEffect> freed_effects(const Search& search, const Hypothesis& h,
@@ -80,11 +81,11 @@ std::vector<FreedEffect> freed_effects(const Search& search, const Hypothesis& h
 
 std::optional<Plant> fitted_alternative(Search& search, const Hypothesis& current, const Hypothesis& without,
                                         std::size_t effect, double objective_on_subset) {
-  const DistinctionPolicy& policy = search.policy().distinction;
+  const SelectionPolicy& policy = search.policy();
   Hypothesis alternative = search.screened(without, effect);
   search.converge_on_subset(alternative);
   // So much worse on a part, it is no better on the whole.
-  if (!(alternative.train.objective - objective_on_subset < policy.max_scattered_evidence))
+  if (!(alternative.train.objective - objective_on_subset < policy.acceptance.overwhelming_evidence))
     return std::nullopt;
   alternative.train.point.noise = current.train.point.noise;
   search.refit(without, alternative);
@@ -104,7 +105,7 @@ std::vector<Alternative> linear_alternatives(const Search& search, const Hypothe
       const Eigen::Index before = size_place(h, effect), after = size_place(fit, effect);
       if (before < 0 || after < 0 || !std::isfinite(absent_value(h, before))) continue;
       const double doubt = distance(fit, after);
-      if (reduces_certainty(doubt, distance(h, before), search.policy().distinction))
+      if (reduces_certainty(doubt, distance(h, before), search.policy().significance))
         alternatives.push_back({effect, other, without(fit, after)});
     }
   }

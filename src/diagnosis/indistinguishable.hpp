@@ -29,11 +29,11 @@ std::vector<FreedEffect> freed_effects(const Search& search, const Hypothesis& h
 
 /// Whether an effect that is so many standard errors from nothing may be another, which leaves it fewer once
 /// it is left open too.
-bool reduces_certainty(double distance_with_other, double distance_alone, const DistinctionPolicy& policy);
+bool reduces_certainty(double distance_with_other, double distance_alone, const SignificancePolicy& policy);
 
 /// Whether an effect that was fitted in the place of another does as well: by the evidence that is lost, and
 /// the t value of the loss.
-bool is_indistinguishable(double evidence_lost, double t_value, const DistinctionPolicy& policy);
+bool is_indistinguishable(double evidence_lost, double t_value, const SelectionPolicy& policy);
 
 /// The plant with an effect fitted in the place of the one that `without` lacks; none if the data distinguish
 /// it from `current`, whose objective on the screening subset is given.

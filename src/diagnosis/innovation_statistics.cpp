@@ -296,8 +296,8 @@ struct EstimatedDisturbance {
 };
 
 Innovations::Innovations(const FitData& data, const FitPoint& point, const SelectionPolicy& policy)
-    : min_sensor_share_(policy.residual.min_sensor_share),
-      min_dependence_(policy.residual.min_dependence),
+    : min_sensor_share_(policy.adequacy.min_sensor_share),
+      min_dependence_(policy.significance.noticeable_z),
       large_block_percentile_(policy.residual.large_block_percentile) {
   const std::vector<std::vector<LinearStep>> steps = linearise(data, point);
   for (std::size_t s = 0; s < steps.size(); ++s)

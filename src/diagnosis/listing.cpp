@@ -36,7 +36,7 @@ class HeldOutSimulation {
 
 /// How far the error grew beyond what is not visible or may be chance [ln of a ratio].
 double certain_rise(const FreeRunSimulation& before, const FreeRunSimulation& now,
-                    const AcceptancePolicy& policy) {
+                    const SelectionPolicy& policy) {
   const SimulationChange change = simulation_change(before.segment_gap, now.segment_gap);
   return change.mean - change.limit(policy);
 }
@@ -50,7 +50,7 @@ std::vector<std::size_t> without(std::vector<std::size_t> effects, std::size_t g
 /// `simulated_without(suspect)`: the simulation to compare.
 template <class Simulate>
 std::optional<std::size_t> raising(const std::vector<std::size_t>& suspects,
-                                   const FreeRunSimulation& complete, const AcceptancePolicy& policy,
+                                   const FreeRunSimulation& complete, const SelectionPolicy& policy,
                                    Simulate&& simulated_without) {
   std::optional<std::size_t> raises;
   double largest = 0.0;
@@ -119,7 +119,7 @@ Listing list_effects(Search& search, const Hypothesis& judged, const ListedModel
     row.after = std::max(row.after, listing.after);
   }
   if (model.effects.empty()) return listing;
-  const AcceptancePolicy& policy = search.policy().acceptance;
+  const SelectionPolicy& policy = search.policy();
   listing.number_raises = raising(far, complete, policy, [&](std::size_t number) {
     return simulation.settled(without(model.effects, number), number);
   });

@@ -180,7 +180,7 @@ Needed how_needed(Search& search, const Hypothesis& judged, const std::vector<Re
     all.push_back(other.effect);
     if (other.effect != effect) others.push_back(other.effect);
   }
-  const double far_worse = search.policy().power.clear_gap * held_out_error(search, judged, all);
+  const double far_worse = search.policy().significance.clear_ratio * held_out_error(search, judged, all);
   if (held_out_error(search, judged, others) <= far_worse) return Needed::no;
   const std::size_t constant = effect_number("constant_force");
   if (judged.train.point.plant.find(constant) != nullptr) return Needed::by_itself;
@@ -218,14 +218,14 @@ std::optional<Withdrawal> outdone_by_place(Search& search, const Hypothesis& kno
 
 std::optional<Withdrawal> trend_of_place(const Search& search, const Hypothesis& known) {
   if (!search.is_of_all_data(known.train.point)) return std::nullopt;
-  const double min_t = search.policy().acceptance.min_t;
+  const double min_evidence = evidence_at(search.policy().significance.noticeable_z);
   std::optional<PlaceNull> null;
   for (const PlantEffect& effect : known.train.point.plant.effects) {
     const Shape shape = shape_of(effect, search);
     if (search.is_nuisance(effect.number) || !goes_last(shape)) continue;
     if (!null) null.emplace(search, known);
     if (null->track_force() == nullptr) return std::nullopt;
-    if (null->evidence_of(effect, shape) < min_t * min_t) return Withdrawal{effect.number, as_well};
+    if (null->evidence_of(effect, shape) < min_evidence) return Withdrawal{effect.number, as_well};
   }
   return std::nullopt;
 }

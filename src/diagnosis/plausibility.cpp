@@ -27,7 +27,7 @@ void set_back(ParameterPosterior& posterior, Eigen::Index place) {
 
 std::vector<std::size_t> certain_parameters(ParameterPosterior posterior,
                                             const std::vector<bool>& is_correction,
-                                            const CorrectionPolicy& policy) {
+                                            const SignificancePolicy& policy) {
   std::vector<std::size_t> open(is_correction.size());
   std::iota(open.begin(), open.end(), std::size_t{0});
   for (;;) {
@@ -43,18 +43,18 @@ std::vector<std::size_t> certain_parameters(ParameterPosterior posterior,
         place = a;
       }
     }
-    if (!(min_z < policy.min_z)) return open;
+    if (!(min_z < policy.certain_z)) return open;
     set_back(posterior, static_cast<Eigen::Index>(place));
     open.erase(open.begin() + static_cast<std::ptrdiff_t>(place));
   }
 }
 
-bool is_certain_of_all_runs(double certainty, const CorrectionPolicy& policy) {
-  return !(certainty < policy.min_certainty_of_all_runs);
+bool is_certain_of_all_runs(double certainty, const SignificancePolicy& policy) {
+  return !(certainty < policy.interval_z);
 }
 
-bool is_within_prior(double value, double prior_mean, double prior_sigma, const CorrectionPolicy& policy) {
-  return std::abs(value - prior_mean) < policy.within_prior * prior_sigma;
+bool is_within_prior(double value, double prior_mean, double prior_sigma, const SignificancePolicy& policy) {
+  return std::abs(value - prior_mean) < policy.noticeable_z * prior_sigma;
 }
 
 EndOfRange end_of_range(double scale, double low, double high, const CorrectionPolicy& policy) {
@@ -63,21 +63,21 @@ EndOfRange end_of_range(double scale, double low, double high, const CorrectionP
   return EndOfRange::high;
 }
 
-bool is_doubtful(double scale, const CorrectionPolicy& policy) {
+bool is_doubtful(double scale, const PriorPolicy& policy) {
   return !(std::abs(std::log(scale)) < policy.doubtful_scale);
 }
 
-bool shows_on_encoder(double offset_rad, double resolution_rad, const CorrectionPolicy& policy) {
-  return !(std::abs(offset_rad) < policy.min_angle_offset_steps * resolution_rad);
+bool shows_on_encoder(double offset_rad, double resolution_rad) {
+  return !(std::abs(offset_rad) < resolution_rad);
 }
 
 bool are_bristles_short(double breakaway_n, double stiffness_n_per_m, double travel_m,
-                        const CorrectionPolicy& policy) {
+                        const PriorPolicy& policy) {
   return breakaway_n < stiffness_n_per_m * policy.bristle_share_of_travel * travel_m;
 }
 
-bool is_held_out_too_far_off(double held_out_excess, double excess, const ResidualPolicy& policy) {
-  return held_out_excess > policy.max_excess * std::max(1.0, excess);
+bool is_held_out_too_far_off(double held_out_excess, double excess, const SignificancePolicy& policy) {
+  return held_out_excess > policy.clear_ratio * std::max(1.0, excess);
 }
 
 }  // namespace upright

@@ -251,15 +251,15 @@ std::vector<std::size_t> doubtful_effects(const std::vector<Reproduction>& repro
   const SelectionPolicy& policy = search.policy();
   std::vector<std::size_t> doubtful;
   for (const Reproduction& r : reproductions) {
-    const bool borne_out = std::isfinite(r.t_value) && r.t_value > policy.reproducibility.min_t;
+    const bool borne_out = std::isfinite(r.t_value) && r.t_value > policy.significance.noticeable_z;
     const bool certain = borne_out && white_evidence(r) > policy.acceptance.overwhelming_evidence;
     if (!certain && !search.is_nuisance(r.effect)) doubtful.push_back(r.effect);
   }
   return doubtful;
 }
 
-bool is_contradicted(const Reproduction& reproduction, const ReproducibilityPolicy& policy) {
-  return reproduction.t_value < -policy.min_t;
+bool is_contradicted(const Reproduction& reproduction, const SignificancePolicy& policy) {
+  return reproduction.t_value < -policy.noticeable_z;
 }
 
 }  // namespace upright

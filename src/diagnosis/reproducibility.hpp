@@ -30,7 +30,7 @@ struct Reproduction {
 std::vector<Reproduction> reproduce(const Search& search, const Hypothesis& h,
                                     const std::vector<std::size_t>& effects);
 
-bool is_contradicted(const Reproduction& reproduction, const ReproducibilityPolicy& policy);
+bool is_contradicted(const Reproduction& reproduction, const SignificancePolicy& policy);
 /// The effects that are not beyond doubt: of overwhelming evidence, and borne out by each part as surely as
 /// an effect can be contradicted. Not numbers of the plant file.
 std::vector<std::size_t> doubtful_effects(const std::vector<Reproduction>& reproductions,

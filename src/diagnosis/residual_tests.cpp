@@ -74,8 +74,8 @@ std::string is_too_quick(const Statistics& s) {
               " times as large as noise that accounts for single samples makes it, so it is in what the "
               "sensors show");
 }
-bool is_excessive(const ResidualTests& tests, const ResidualPolicy& policy) {
-  return tests.excess > policy.max_excess;
+bool is_excessive(const ResidualTests& tests, const SelectionPolicy& policy) {
+  return tests.excess > policy.significance.clear_ratio;
 }
 std::string simulates_too_far_off(const ResidualTests& tests) {
   return text("a plain simulation is ", tests.excess,
@@ -96,23 +96,39 @@ std::string is_a_disturbance(const ResidualTests& tests) {
       tests.excess, " times as far off as such noise makes it at most)");
 }
 
-using P = ResidualPolicy;
+double min_dependence(const SelectionPolicy& policy) {
+  return policy.significance.noticeable_z;
+}
+double clearly_larger(const SelectionPolicy& policy) {
+  return policy.significance.clear_ratio;
+}
+double clearly_smaller(const SelectionPolicy& policy) {
+  return 1.0 / policy.significance.clear_ratio;
+}
+template <double AdequacyPolicy::*Limit>
+double limit(const SelectionPolicy& policy) {
+  return policy.adequacy.*Limit;
+}
+
+using P = AdequacyPolicy;
 constexpr auto above = ResidualTest::Beyond::above, below = ResidualTest::Beyond::below;
 
 constexpr std::array table = {
-    ResidualTest{"dependence on motion, voltage or time", largest_dependence, above, &P::min_dependence,
+    ResidualTest{"dependence on motion, voltage or time", largest_dependence, above, min_dependence,
                  depends_on},
-    ResidualTest{"dispersion of blocks", dispersion, above, &P::min_dispersion, comes_in_bursts},
-    ResidualTest{"kurtosis of pulses of force", kurtosis<0>, above, &P::min_kurtosis, has_heavy_tails<0>},
-    ResidualTest{"kurtosis of pulses of torque", kurtosis<1>, above, &P::min_kurtosis, has_heavy_tails<1>},
-    ResidualTest{"kurtosis of slow force", disturbance_kurtosis<0>, above, &P::min_kurtosis,
+    ResidualTest{"dispersion of blocks", dispersion, above, limit<&P::min_dispersion>, comes_in_bursts},
+    ResidualTest{"kurtosis of pulses of force", kurtosis<0>, above, limit<&P::min_kurtosis>,
+                 has_heavy_tails<0>},
+    ResidualTest{"kurtosis of pulses of torque", kurtosis<1>, above, limit<&P::min_kurtosis>,
+                 has_heavy_tails<1>},
+    ResidualTest{"kurtosis of slow force", disturbance_kurtosis<0>, above, limit<&P::min_kurtosis>,
                  comes_and_goes<0>},
-    ResidualTest{"kurtosis of slow torque", disturbance_kurtosis<1>, above, &P::min_kurtosis,
+    ResidualTest{"kurtosis of slow torque", disturbance_kurtosis<1>, above, limit<&P::min_kurtosis>,
                  comes_and_goes<1>},
-    ResidualTest{"size of slow force, too large", pulse_size<0>, above, &P::slowest, is_too_slow<0>},
-    ResidualTest{"size of slow torque, too large", pulse_size<1>, above, &P::slowest, is_too_slow<1>},
-    ResidualTest{"size of slow force, too small", pulse_size<0>, below, &P::quickest, is_too_quick<0>},
-    ResidualTest{"size of slow torque, too small", pulse_size<1>, below, &P::quickest, is_too_quick<1>}};
+    ResidualTest{"size of slow force, too large", pulse_size<0>, above, clearly_larger, is_too_slow<0>},
+    ResidualTest{"size of slow torque, too large", pulse_size<1>, above, clearly_larger, is_too_slow<1>},
+    ResidualTest{"size of slow force, too small", pulse_size<0>, below, clearly_smaller, is_too_quick<0>},
+    ResidualTest{"size of slow torque, too small", pulse_size<1>, below, clearly_smaller, is_too_quick<1>}};
 
 /// For each test that the data allow, how many draws are as extreme as what was measured.
 class Exceedances {
@@ -126,8 +142,9 @@ class Exceedances {
         if (table[i].is_as_extreme(table[i].statistic(draw), table[i].statistic(measured_))) ++counts_[i];
     draws_ += draws.size();
   }
-  bool may_be_significant(std::size_t test, const ResidualPolicy& policy) const {
-    return static_cast<double>(counts_[test] + 1) <= policy.level * static_cast<double>(policy.draws + 1);
+  bool may_be_significant(std::size_t test, const SelectionPolicy& policy) const {
+    return static_cast<double>(counts_[test] + 1) <=
+           policy.significance.level * static_cast<double>(policy.residual.draws + 1);
   }
   std::vector<double> p_values() const {
     std::vector<double> values;
@@ -150,9 +167,9 @@ bool ResidualTest::is_as_extreme(double value, double as) const {
   return beyond == Beyond::above ? value >= as : value <= as;
 }
 
-bool ResidualTest::is_beyond(const InnovationStatistics& statistics, const ResidualPolicy& policy) const {
+bool ResidualTest::is_beyond(const InnovationStatistics& statistics, const SelectionPolicy& policy) const {
   const double value = statistic(statistics);
-  return beyond == Beyond::above ? value > policy.*limit : value < policy.*limit;
+  return beyond == Beyond::above ? value > limit(policy) : value < limit(policy);
 }
 
 std::span<const ResidualTest> residual_test_table() {
@@ -160,15 +177,15 @@ std::span<const ResidualTest> residual_test_table() {
 }
 
 std::vector<double> residual_p_values(const Innovations& innovations, const InnovationStatistics& measured,
-                                      const ResidualPolicy& policy) {
+                                      const SelectionPolicy& policy) {
   std::vector<std::size_t> beyond;
   for (std::size_t i = 0; i < table.size(); ++i)
     if (table[i].is_beyond(measured, policy)) beyond.push_back(i);
   if (beyond.empty()) return {};
   constexpr std::size_t batch = 100;
   Exceedances exceedances(measured);
-  for (std::size_t done = 0; done < policy.draws; done += batch) {
-    std::vector<InnovationStatistics> draws(std::min(batch, policy.draws - done));
+  for (std::size_t done = 0; done < policy.residual.draws; done += batch) {
+    std::vector<InnovationStatistics> draws(std::min(batch, policy.residual.draws - done));
     parallel_for(draws.size(), [&](std::size_t i) { draws[i] = innovations.drawn(done + i + 1); });
     exceedances.add(draws);
     if (std::none_of(beyond.begin(), beyond.end(),
@@ -192,21 +209,21 @@ std::vector<bool> rejected_by_holm(const std::vector<double>& p_values, double l
   return rejected;
 }
 
-std::vector<bool> failed_tests(const ResidualTests& tests, const ResidualPolicy& policy) {
-  std::vector<bool> failed = rejected_by_holm(tests.p_values, policy.level);
+std::vector<bool> failed_tests(const ResidualTests& tests, const SelectionPolicy& policy) {
+  std::vector<bool> failed = rejected_by_holm(tests.p_values, policy.significance.level);
   failed.resize(table.size(), false);
   for (std::size_t i = 0; i < table.size(); ++i)
     failed[i] = failed[i] && table[i].is_beyond(tests.statistics, policy);
   return failed;
 }
 
-const ResidualTest* failed_test(const ResidualTests& tests, const ResidualPolicy& policy) {
+const ResidualTest* failed_test(const ResidualTests& tests, const SelectionPolicy& policy) {
   const std::vector<bool> failed = failed_tests(tests, policy);
   const auto first = std::find(failed.begin(), failed.end(), true);
   return first != failed.end() ? &table[static_cast<std::size_t>(first - failed.begin())] : nullptr;
 }
 
-std::vector<ResidualStatistic> reported_tests(const ResidualTests& tests, const ResidualPolicy& policy) {
+std::vector<ResidualStatistic> reported_tests(const ResidualTests& tests, const SelectionPolicy& policy) {
   if (!tests.beyond_sensors) return {};
   const std::vector<bool> failed = failed_tests(tests, policy);
   std::vector<ResidualStatistic> reported;
@@ -214,7 +231,7 @@ std::vector<ResidualStatistic> reported_tests(const ResidualTests& tests, const 
     ResidualStatistic statistic;
     statistic.name = table[i].name;
     statistic.value = table[i].statistic(tests.statistics);
-    statistic.limit = policy.*table[i].limit;
+    statistic.limit = table[i].limit(policy);
     statistic.counts_above = table[i].beyond == above;
     if (!tests.p_values.empty()) statistic.p_value = tests.p_values[i];
     statistic.fails = failed[i];
@@ -222,18 +239,18 @@ std::vector<ResidualStatistic> reported_tests(const ResidualTests& tests, const 
   }
   reported.push_back({"error of an open-loop simulation",
                       tests.excess,
-                      policy.max_excess,
+                      policy.significance.clear_ratio,
                       true,
                       {},
                       is_excessive(tests, policy)});
   return reported;
 }
 
-bool is_beyond_sensors(const ResidualTests& tests, const ResidualPolicy& policy) {
-  return tests.noise_ratio > policy.sensors_noise_ratio;
+bool is_beyond_sensors(const ResidualTests& tests, const SelectionPolicy& policy) {
+  return tests.noise_ratio > std::exp(policy.significance.visible_change);
 }
 
-void conclude_tests(ResidualTests& tests, const ResidualPolicy& policy) {
+void conclude_tests(ResidualTests& tests, const SelectionPolicy& policy) {
   tests.beyond_sensors = is_beyond_sensors(tests, policy);
   if (!tests.beyond_sensors) {
     tests.sentence = "what is left is the sensors' own noise";

@@ -40,12 +40,12 @@ struct ResidualTest {
   std::string_view name;
   double (*statistic)(const InnovationStatistics&);
   Beyond beyond;
-  double ResidualPolicy::*limit;
+  double (*limit)(const SelectionPolicy&);
   std::string (*sentence)(const InnovationStatistics&);
 
   /// Whether the first of two values is as far in the direction of the limit as the second, or further.
   bool is_as_extreme(double value, double as) const;
-  bool is_beyond(const InnovationStatistics& statistics, const ResidualPolicy& policy) const;
+  bool is_beyond(const InnovationStatistics& statistics, const SelectionPolicy& policy) const;
 };
 
 /// In the order in which they are asked: the first that fails says what is left.
@@ -55,26 +55,26 @@ std::span<const ResidualTest> residual_test_table();
 /// its limit can become significant. NaN: the data do not show the statistic. Empty: none is beyond its
 /// limit.
 std::vector<double> residual_p_values(const Innovations& innovations, const InnovationStatistics& measured,
-                                      const ResidualPolicy& policy);
+                                      const SelectionPolicy& policy);
 
 /// Which of several hypotheses are rejected at a level for all of them together; NaN: there is no hypothesis.
 /// S. Holm, Scandinavian Journal of Statistics 6 (1979) 65.
 std::vector<bool> rejected_by_holm(const std::vector<double>& p_values, double level);
 
 /// Which tests of the table fail.
-std::vector<bool> failed_tests(const ResidualTests& tests, const ResidualPolicy& policy);
+std::vector<bool> failed_tests(const ResidualTests& tests, const SelectionPolicy& policy);
 
 /// The first test that fails; null where none does.
-const ResidualTest* failed_test(const ResidualTests& tests, const ResidualPolicy& policy);
+const ResidualTest* failed_test(const ResidualTests& tests, const SelectionPolicy& policy);
 
 /// Whether what is left is more than the sensors' own noise; within that, nothing is tested.
-bool is_beyond_sensors(const ResidualTests& tests, const ResidualPolicy& policy);
+bool is_beyond_sensors(const ResidualTests& tests, const SelectionPolicy& policy);
 
 /// Whether what is left is more than noise, in a sentence, once p-values and excess are known.
-void conclude_tests(ResidualTests& tests, const ResidualPolicy& policy);
+void conclude_tests(ResidualTests& tests, const SelectionPolicy& policy);
 
 /// The tests as they are reported; empty within the sensors' own noise.
-std::vector<ResidualStatistic> reported_tests(const ResidualTests& tests, const ResidualPolicy& policy);
+std::vector<ResidualStatistic> reported_tests(const ResidualTests& tests, const SelectionPolicy& policy);
 
 /// White noise that moves a plain simulation as what is left does.
 Noise low_frequency_equivalent(Noise noise, const ResidualTests& tests);

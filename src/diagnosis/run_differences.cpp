@@ -103,14 +103,14 @@ std::vector<RunDifference> run_differences(const Search& search, const Hypothesi
   return result;
 }
 
-bool is_of_single_runs(const RunDifference& difference, const ReproducibilityPolicy& policy) {
+bool is_of_single_runs(const RunDifference& difference, const SignificancePolicy& policy) {
   const auto runs = static_cast<double>(difference.sizes.size());
-  const bool differs = upper_tail(difference.certainty) < upper_tail(policy.min_t) / runs;
-  return differs && difference.certainty_of_help < normal_95;
+  const bool differs = upper_tail(difference.certainty) < upper_tail(policy.noticeable_z) / runs;
+  return differs && difference.certainty_of_help < policy.interval_z;
 }
 
 const RunDifference* most_certain_of_single_runs(const std::vector<RunDifference>& differences,
-                                                 const ReproducibilityPolicy& policy) {
+                                                 const SignificancePolicy& policy) {
   const RunDifference* most = nullptr;
   for (const RunDifference& difference : differences)
     if (is_of_single_runs(difference, policy) && (most == nullptr || difference.certainty > most->certainty))

@@ -36,11 +36,11 @@ std::vector<RunDifference> run_differences(const Search& search, const Hypothesi
                                            const std::vector<std::size_t>& effects);
 
 /// Whether the sizes differ so that the effect need not help on a further run.
-bool is_of_single_runs(const RunDifference& difference, const ReproducibilityPolicy& policy);
+bool is_of_single_runs(const RunDifference& difference, const SignificancePolicy& policy);
 
 /// The one of these that is so and is the most certain; else null.
 const RunDifference* most_certain_of_single_runs(const std::vector<RunDifference>& differences,
-                                                 const ReproducibilityPolicy& policy);
+                                                 const SignificancePolicy& policy);
 
 /// A sentence for the listing of effects that help here only.
 std::string sentence_on(const RunDifference& difference, const std::vector<Measurement>& runs);

@@ -160,8 +160,7 @@ bool Search::is_plausible(const Hypothesis& h, std::size_t effect) const {
     if (p.effect != effect) continue;
     const double value = h.train.point.plant.find(effect)->values[p.index];
     if (p.index == 0 && value == effect_registry()[effect].parameters[0].neutral) return false;
-    if (kind_of(effect).starts_with("angle_offset") &&
-        !shows_on_encoder(value, range_.theta_resolution_rad, policy_.correction))
+    if (kind_of(effect).starts_with("angle_offset") && !shows_on_encoder(value, range_.theta_resolution_rad))
       return false;
   }
   return is_admissible(h, effect);
@@ -184,7 +183,7 @@ bool Search::bristles_are_short(const Hypothesis& h) const {
   const double breakaway_n = dynamics.cart_dry_level(range_.cart_mean_m, 0.0, 1.0);
   const double stiffness_n_per_m = plant.find(effect_number("bristle_friction"))->values[0];
   return are_bristles_short(breakaway_n, stiffness_n_per_m, range_.cart_high_m - range_.cart_low_m,
-                            policy_.correction);
+                            policy_.prior);
 }
 
 double Search::certainty(const Hypothesis& h, std::size_t effect) const {

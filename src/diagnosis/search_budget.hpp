@@ -63,6 +63,13 @@ struct SearchBudget {
   /// because a complete fit would not close the difference. Twelve matrix cases gave the same results with
   /// and without this limit.
   double min_gain_share = 0.05;
+  /// [1] Candidates that gain this share of the gain of the best one are similar to it: they may be the same
+  /// force, or a part of it. They are tried in its place. One with this share of its evidence is named as
+  /// next best. Chosen.
+  double resembling_share = 0.3;
+  /// [1] If the scores of two effects differ by less than this share, both fits are completed before one is
+  /// chosen, because a fit that stopped early must not decide. Chosen.
+  double close_score_share = 0.05;
   /// [candidates] The most that are fitted completely in each round. Chosen.
   std::size_t max_finalists = 4;
   /// [candidates] If nothing else explains the data, the pairs of this many candidates of the first round are

@@ -22,132 +22,72 @@
 
 namespace upright {
 
+/// The levels of significance: one set for all rules. An evidence is compared with the square of a level in
+/// standard errors.
+struct SignificancePolicy {
+  /// [standard errors] The half-width of a 95 % interval: two values that are closer may be the same, and an
+  /// effect that is closer to nothing may be nothing. Two fits whose evidence differs by less than its square
+  /// fit equally well: odds of 7 to 1.
+  double interval_z = 2.0;
+  /// [standard errors] A larger difference counts. By chance it occurs once in 700 times. In a prior, the
+  /// unit is its standard deviation.
+  double noticeable_z = 3.0;
+  /// [standard errors] A larger difference is certain. Its square as evidence is odds of 3000 to 1.
+  double certain_z = 4.0;
+  /// [1] The probability that chance makes a residual test fail, or simulations look worse. A size that the
+  /// data would have shown would be shown with one minus this probability. The usual level.
+  double level = 0.05;
+  /// [1] What is so many times as large is clearly larger, and what is smaller by this factor clearly
+  /// smaller. It is the limit of the gap of held-out data, of a simulation beside the largest of the noise
+  /// draws, of the slow residual beside white noise (a disturbance of 10 Hz reaches 1.8, measured on the
+  /// matrix), and of the standard error beside the one that the evidence of an effect suggests. An effect
+  /// stays, even if a force of the place accounts for it, if the held-out error is so many times larger
+  /// without it and with a constant force in its place. Chosen.
+  double clear_ratio = 2.0;
+  /// [ln of a ratio] A change of an error by less is not visible: a tenth. A simulation that is further off
+  /// than the sensor noise by less leaves nothing to be tested. An effect goes if the simulations of held-out
+  /// segments are further off with it by this and by what may be chance. So does the fitted value of a number
+  /// that moved further than believed. Chosen.
+  double visible_change = 0.1;
+};
+
+/// The evidence of what is so many standard errors from nothing.
+constexpr double evidence_at(double z) {
+  return z * z;
+}
+
 /// When an effect is added to the model.
 struct AcceptancePolicy {
   /// [evidence] The least evidence on the training runs, after the penalty of the parameters. About 30
   /// candidates with up to three parameters are tried. With white noise, 25 keeps a chance result below one
   /// in a thousand diagnoses. Computed from that number of candidates.
   double min_evidence = 25.0;
-  /// [standard errors] The least t value of the saving per quarter of a second. It remains reliable if the
-  /// noise is not white. By chance, three occurs once in 700 times. The same size of a constant force is
-  /// enough beside a random force of the place. Chosen.
-  double min_t = 3.0;
   /// [evidence] Coloured noise cannot produce this much, even if few segments contain it. Chosen.
   double overwhelming_evidence = 1000.0;
-  /// [robust standard errors] The least certainty of the size of an effect. Equivalent to an evidence of 16.
-  /// Chosen.
-  double min_certainty = 4.0;
   /// [evidence] Each parameter beyond the first must save this in addition, so a simpler effect that fits
   /// nearly as well is preferred. Chosen.
   double parameter_penalty = 10.0;
-  /// [evidence] Two effects that differ by less fit equally well; the simpler one is taken. Held-out runs may
-  /// speak against an effect by this much, since runs that do not excite it carry no information. Odds of 7
-  /// to 1. Chosen.
-  double equally_good_evidence = 4.0;
-  /// [evidence] Training and held-out runs that both support an effect need `min_evidence` together, and this
-  /// each. Without this rule, weak effects in one short run were missed (new seeds of the matrix).
-  double min_evidence_of_each = 8.0;
   /// [standard errors] Below this t value, held-out evidence is not added to its square: one standard error
   /// is what chance produces. Chosen. (Held-out evidence of 25 confirmed a t of 1.5: seeds 181/83 and
   /// 182/114.)
   double chance_t = 1.0;
-  /// [standard errors] The least t value if only sensor noise remains, because then nothing else can have
-  /// produced the evidence. Chosen.
-  double min_t_of_sensors = 1.5;
-  /// [sensor noise] A plain simulation of held-out runs with a smaller error leaves only sensor noise. This
-  /// is the matrix's limit for the error of a right model relative to the floor.
-  double sensors_gap = 1.05;
-  /// [1] The evidence of an effect is about the square of its certainty. If it is this many times larger, the
-  /// fit has not converged and is continued. A smaller ratio can come from noise that is not white. Chosen.
-  double unconverged_evidence_ratio = 4.0;
-  /// [ln of a ratio] The mean error of simulated held-out segments may grow by this. A tenth is not visible.
-  /// An effect goes if the error with it is larger by this and by what may be chance. So does the fitted
-  /// value of a number that moved further than believed. A curve that lowers the error by more shows that
-  /// something is missing. Chosen.
-  double worse_simulation_by_chance = 0.1;
-  /// [1] The certainty that it grew by more than this. The usual level.
-  double worse_simulation_level = 0.95;
-  /// [ln of a ratio] The usual scatter of that growth over the segments: while another effect is missing,
-  /// errors change by half in either direction.
+  /// [ln of a ratio] The usual scatter, over the simulated segments, of the change of their errors: while
+  /// another effect is missing, errors change by half in either direction.
   double usual_simulation_scatter = 0.5;
-  /// [1] An effect that was found stays in the model while its t value is above this share of `min_t`. It
-  /// is not dropped because other effects make it slightly less certain. Chosen.
-  double kept_t_share = 0.7;
-
-  /// [1] Effects that gain this share of the gain of the best one are similar to it: they may be the same
-  /// force, or a part of it. Chosen.
-  double resembling_share = 0.3;
-  /// [1] If the scores of two effects differ by less than this share, both fits are completed before one is
-  /// chosen, because a fit that stopped early must not decide. Chosen.
-  double close_score_share = 0.05;
 };
 
-/// When a number of the plant file is wrong, and which sizes are impossible.
+/// What becomes of the numbers of the plant file.
 struct CorrectionPolicy {
-  /// [standard errors] A correction of the plant file is listed from here on. As `min_certainty`. Chosen.
-  double min_z = 4.0;
-  /// [standard errors] A correction or an effect with less than this after the final fit to all runs is
-  /// removed, because its 95 % interval would include nothing.
-  double min_certainty_of_all_runs = 2.0;
-  /// [prior standard deviations] A coefficient of the plant file that moved by less counts as unchanged: its
-  /// number is adjusted, but nothing was missing. Such coefficients change this much from day to day. Chosen.
-  double within_prior = 3.0;
   /// [1] The factor by which priors are widened in the final fits. The plant file still has weight there, but
   /// less, where the data correct it. Chosen.
   double prior_widening = 4.0;
-  /// [encoder steps] A smaller offset of the angle is not visible in the encoder's counts. Chosen.
-  double min_angle_offset_steps = 1.5;
-  /// [1] Bristles that bend over more than this share of the travel before they slide act as a spring and are
-  /// rejected. Bristles of 14 N/m with 5 N of friction had been found in place of a spring (canterbury data).
-  double bristle_share_of_travel = 0.1;
   /// [1] A scale within this relative distance of the end of its range is at the end, so it stands for
   /// something else. Far larger than the distance that the last optimiser step leaves. Chosen.
   double end_of_range = 1e-3;
-  /// [ln of a scale] A number of the plant file that is further off is named in a note, because no data sheet
-  /// is so wrong. Chosen.
-  double doubtful_scale = 0.2;
-};
-
-/// When two effects are confusable.
-struct DistinctionPolicy {
-  /// [evidence] Two effects that differ by less are confusable. Odds of 3000 to 1, or four standard errors.
-  /// Chosen.
-  double indistinguishable_evidence = 16.0;
-  /// [evidence] The most that a difference within its own scatter may be. Ten times the limit above. Chosen.
-  double max_scattered_evidence = 160.0;
-  /// [standard errors] A difference is within its own scatter if its t value is below this: a 95 % interval.
-  double scattered_t = 2.0;
-  /// [standard errors] An effect whose certainty falls below this once another effect is left open may be
-  /// that other effect. Equivalent to an evidence of 16.
-  double min_distance = 4.0;
-  /// [1] The other effect must reduce the certainty to less than this share of it. Chosen.
-  double min_loss = 0.5;
-  /// [1] An effect with this share of the evidence of the effect that was added, and not confusable with it,
-  /// is named as next best. Chosen for the reader; it decides nothing.
-  double next_best_share = 1.0 / 3.0;
-};
-
-/// When an effect does not reproduce.
-struct ReproducibilityPolicy {
-  /// [standard errors] An effect is contradicted if what one part of the data says of it costs another part
-  /// more than this, compared with no such effect. By chance, three occurs once in 700 times. Chosen.
-  double min_t = 3.0;
 };
 
 /// What the data would have shown.
 struct PowerPolicy {
-  /// [standard errors] An effect of the size that is stated would be accepted with a probability of 95 %: so
-  /// far above the least accepted size.
-  double power_z = 1.645;
-  /// [noise floors] A larger gap is clearly above the floor: "no discrepancy" would be wrong, and what was
-  /// found explains the data only if it closes most of the excess. An effect stays, even if a force of the
-  /// place accounts for it, if the held-out error is so many times larger without it and with a constant
-  /// force in its place. A curve that lowers this error by more than this factor becomes part of the model.
-  /// Chosen.
-  double clear_gap = 2.0;
-  /// [1] The share of the excess above the floor that it must close then. Less than half explains less than
-  /// it leaves.
-  double min_share_closed = 0.5;
   /// [kinds] Every rig has this friction. If the data would not have shown it at its usual size, they do not
   /// show that nothing is missing.
   std::array<std::string_view, 4> everywhere = {"viscous_friction", "coulomb_friction",
@@ -175,7 +115,20 @@ struct MotionPolicy {
   double fading_after_pendulum_s = 0.1;
 };
 
-/// What the tests of the innovations measure, and what they accept as noise.
+/// What a residual must reach to count, however certain it is that chance does not make it.
+struct AdequacyPolicy {
+  /// [1] No sensor is perfect, so a shift of a sensor counts only if it accounts for this share of the
+  /// residual. A flexible drive accounted for 27 to 31 percent (aau data).
+  double min_sensor_share = 0.05;
+  /// [1] A smaller dispersion (95th percentile of block RMS over the median) is too little to count, however
+  /// certain. Chosen.
+  double min_dispersion = 1.3;
+  /// [kurtosis] The same for the kurtosis of short pulses, and of the slow force or torque that a filter
+  /// estimates. It is 3 for a Gaussian. Chosen.
+  double min_kurtosis = 4.0;
+};
+
+/// How the statistics of the innovations are measured.
 struct ResidualPolicy {
   /// [s] The length of the blocks of innovations that are compared: longer than single samples, shorter than
   /// a stroke of the cart. Chosen.
@@ -193,38 +146,9 @@ struct ResidualPolicy {
   /// encoder steps. Its pulses are not tested. Chosen.
   double visible_push = 0.1;
 
-  /// [sensor noise] If a plain simulation has a smaller error, only sensor noise remains and nothing is
-  /// tested. Chosen.
-  double sensors_noise_ratio = 1.15;
-  /// [1] The probability that chance makes any of the tests significant (Holm). The usual level. A test fails
-  /// only if its statistic is beyond its limit below as well.
-  double level = 0.05;
   /// [draws] From the fitted model, for the p-values of the tests. The smallest p-value is 1/500 then, less
   /// than half of the level divided by the ten tests.
   std::size_t draws = 499;
-  /// [standard errors] A smaller dependence of the residual is not looked at: by chance, the largest of a
-  /// dozen exceeds three in one diagnosis of thirty. Chosen.
-  double min_dependence = 3.0;
-  /// [1] No sensor is perfect, so a shift of a sensor counts only if it accounts for this share of the
-  /// residual. A flexible drive accounted for 27 to 31 percent (aau data).
-  double min_sensor_share = 0.05;
-  /// [1] A smaller dispersion (95th percentile of block RMS over the median) is too little to count, however
-  /// certain. Chosen.
-  double min_dispersion = 1.3;
-  /// [kurtosis] The same for the kurtosis of short pulses, and of the slow force or torque that a filter
-  /// estimates. It is 3 for a Gaussian. Chosen.
-  double min_kurtosis = 4.0;
-  /// [1] Over a tenth of a second and more, the residual may be this many times as large as white noise that
-  /// accounts for single samples. A disturbance of 10 Hz, which is not white, reaches at most 1.8 (measured
-  /// on the matrix); forces that depend on the motion reach more.
-  double slowest = 2.5;
-  /// [1] If the residual is less than this many times as large, it comes from the sensor and not from a
-  /// force, because a force is the second derivative of the sensor's value. Backlash gives 0.2 to 0.6, right
-  /// models of laboratory cases 0.52 and more (seed 9935).
-  double quickest = 0.5;
-  /// [1] A plain simulation may be this many times as far off as the largest of the noise draws, and held-out
-  /// runs this many times further. Chosen.
-  double max_excess = 2.0;
 };
 
 /// How the residual is located: the regression of the residual force on measured quantities. Its result is
@@ -265,6 +189,9 @@ struct PriorPolicy {
   double friction = 0.10;
   /// [1] The same for a scale of a sensor or a gain, which may be wrong, but not by any amount. Chosen.
   double scale = 0.25;
+  /// [ln of a scale] A number of the plant file that is further off is named in a note, because no data sheet
+  /// is so wrong. Chosen.
+  double doubtful_scale = 0.2;
   /// [rad] How accurately a pendulum at rest shows the vertical. Chosen.
   double rest_rad = 1e-3;
   /// [1] Relative priors refer to at least this share of the typical size of a parameter. Chosen.
@@ -311,6 +238,9 @@ struct PriorPolicy {
   /// [m] Half a track: the standard deviation of the centre of a spring about the mean position of the cart.
   /// For the track of a small cart, and scaled to other plants. Chosen.
   double spring_center_m = 0.5;
+  /// [1] Bristles that bend over more than this share of the travel before they slide act as a spring and are
+  /// rejected. Bristles of 14 N/m with 5 N of friction had been found in place of a spring (canterbury data).
+  double bristle_share_of_travel = 0.1;
   /// [N/m] The softest bristles. Softer ones act as a spring. For a small cart, and scaled to other plants.
   /// Chosen.
   double min_bristle_stiffness_n_per_m = 5.0;
@@ -348,12 +278,12 @@ struct ExcitationPolicy {
 };
 
 struct SelectionPolicy {
+  SignificancePolicy significance;
   AcceptancePolicy acceptance;
   CorrectionPolicy correction;
-  DistinctionPolicy distinction;
-  ReproducibilityPolicy reproducibility;
   PowerPolicy power;
   MotionPolicy motion;
+  AdequacyPolicy adequacy;
   ResidualPolicy residual;
   LocationPolicy location;
   CurvePolicy curve;

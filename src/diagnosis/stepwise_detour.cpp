@@ -79,7 +79,7 @@ bool StepwiseSelection::find_attached_mass() {
 bool StepwiseSelection::explains_more_than(Hypothesis& other) {
   if (!(current_.train.objective < other.train.objective)) return false;
   const SimulationChange without = change_of_simulation(other, true);
-  return without.segments == 0 || without.mean > without.limit(search_.policy().acceptance);
+  return without.segments == 0 || without.mean > without.limit(search_.policy());
 }
 
 bool StepwiseSelection::has_attached_mass() const {

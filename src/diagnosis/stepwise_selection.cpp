@@ -35,7 +35,7 @@ void StepwiseSelection::find() {
 bool StepwiseSelection::renew_initial_states() {
   options_.report_progress(0.83, "fitting again from new initial states");
   Hypothesis h = search_.with_new_initial_states(current_);
-  if (!is_better_optimum(current_.train.objective - h.train.objective, policy_.acceptance)) return false;
+  if (!is_better_optimum(current_.train.objective - h.train.objective, policy_.significance)) return false;
   current_ = std::move(h);
   return true;
 }
@@ -59,7 +59,7 @@ bool StepwiseSelection::find_thoroughly(bool certainly_missing) {
     search_.screen_on_all();
   if (more) select_forward(2 * budget_.max_rounds, 3 * budget_.max_rounds, false);
   // On the way a better place may have been found for the noise alone.
-  if (found_ == before) return is_better_optimum(objective - current_.train.objective, policy_.acceptance);
+  if (found_ == before) return is_better_optimum(objective - current_.train.objective, policy_.significance);
   eliminate_backward();
   return true;
 }
@@ -175,9 +175,6 @@ Decision StepwiseSelection::decided(Evidence& e, Hypothesis& h, std::size_t effe
       case MissingFit::equal_noise:
         equalise_noise(h);
         e.at_equal_noise = compare(current_, h, 1.0);
-        break;
-      case MissingFit::simulation:
-        e.simulated_gap = search_.simulate(h).gap;
         break;
       case MissingFit::simulated_segments:
         // What stands in the place of something else is compared where both were fitted, too.
@@ -354,7 +351,7 @@ std::vector<StepwiseSelection::Finalist> StepwiseSelection::fit_finalists(
   if (round == 0)
     for (const ScreenedCandidate* s : ranking)
       if (resembling_.size() < budget_.max_resembling &&
-          s->gain > policy_.acceptance.resembling_share * ranking[0]->gain)
+          s->gain > budget_.resembling_share * ranking[0]->gain)
         resembling_.emplace_back(s->effect, s->hypothesis);
   std::vector<Finalist> accepted, doubtful;
   const double min_gain =
@@ -406,7 +403,7 @@ std::size_t StepwiseSelection::choose(std::vector<Finalist>& accepted) {
     for (const Finalist& b : accepted) score = std::max(score, b.score);
     return score;
   };
-  const double to_reach = (1.0 - policy_.acceptance.close_score_share) * largest();
+  const double to_reach = (1.0 - budget_.close_score_share) * largest();
   if (std::count_if(accepted.begin(), accepted.end(), [&](const Finalist& b) { return b.score > to_reach; }) >
       1)
     for (Finalist& b : accepted) {
@@ -423,7 +420,7 @@ std::size_t StepwiseSelection::choose(std::vector<Finalist>& accepted) {
   contenders.reserve(accepted.size());
   for (const Finalist& b : accepted)
     contenders.push_back({b.effect, b.score, compare(current_, b.hypothesis, 1.0).held});
-  return best_of(contenders, policy_.acceptance);
+  return best_of(contenders, policy_.significance);
 }
 
 void StepwiseSelection::take(int round, Finalist& best, const std::vector<ScreenedCandidate>& screened) {
@@ -437,7 +434,7 @@ void StepwiseSelection::take(int round, Finalist& best, const std::vector<Screen
                                    [&](const ScreenedCandidate& s) { return s.effect == effect; });
   for (const ScreenedCandidate& s : screened)
     if (s.effect != effect &&
-        (s.gain > policy_.acceptance.resembling_share * winner->gain || is_contained_in(s.effect, effect)))
+        (s.gain > budget_.resembling_share * winner->gain || is_contained_in(s.effect, effect)))
       similar_effects_[effect].push_back(s.effect);
   record_step();
 }
@@ -467,7 +464,7 @@ bool StepwiseSelection::exchange() {
       // What was found beside the one is of the wrong size for the other: the way is longer than a few steps.
       if (h.train.objective + penalty_of(other) < to_beat + budget_.exchange_share * worth)
         search_.converge_on_subset(h);
-      if (!(h.train.objective + penalty_of(other) < to_beat + policy_.distinction.indistinguishable_evidence))
+      if (!(h.train.objective + penalty_of(other) < to_beat + evidence_at(policy_.significance.certain_z)))
         continue;
       search_.refine(without, h);
       Evidence e = evidence_of(Change::exchange, current_, h, {other});

@@ -8,19 +8,20 @@ namespace upright {
 
 namespace {
 
-/// Whether what was found closes most of what the plant file as given has above the noise floor.
-bool closes_excess(const Diagnosis& diagnosis, const PowerPolicy& policy) {
+/// Whether what was found closes more than it leaves of what the plant file as given has above the noise
+/// floor.
+bool closes_excess(const Diagnosis& diagnosis) {
   const double before = diagnosis.gap_before - 1.0, after = diagnosis.gap_after - 1.0;
-  return after < (1.0 - policy.min_share_closed) * before;
+  return after < before - after;
 }
 
 }  // namespace
 
-Verdict verdict_of(const Diagnosis& diagnosis, const VerdictGrounds& grounds, const PowerPolicy& policy) {
+Verdict verdict_of(const Diagnosis& diagnosis, const VerdictGrounds& grounds) {
   if (grounds.structured) return Verdict::unexplained;
   const bool found = !diagnosis.effects.empty();
   if (found || !diagnosis.numbers.empty()) {
-    if (!grounds.clear_gap || closes_excess(diagnosis, policy)) return Verdict::explained;
+    if (!grounds.clear_gap || closes_excess(diagnosis)) return Verdict::explained;
     if (found) return Verdict::unexplained;
   }
   if (!diagnosis.helps_here_only.empty()) return Verdict::unexplained;

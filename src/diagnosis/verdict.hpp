@@ -18,7 +18,7 @@ struct VerdictGrounds {
 };
 
 /// Every verdict but `described`. Uses effects, numbers, gaps and effects that help here only.
-Verdict verdict_of(const Diagnosis& diagnosis, const VerdictGrounds& grounds, const PowerPolicy& policy);
+Verdict verdict_of(const Diagnosis& diagnosis, const VerdictGrounds& grounds);
 
 /// Why data in which nothing is found do not show that nothing is missing. `hidden`: the friction that may
 /// hide.

@@ -350,7 +350,7 @@ class Identifier {
       names += (names.empty() ? "" : " and ") + std::string(kind);
       const std::size_t effect = effect_number(kind);
       sized = sized && best.plant.find(effect)->values[0] >
-                           policy_.acceptance.min_certainty * sigma_of(best, effect, 0);
+                           policy_.significance.certain_z * sigma_of(best, effect, 0);
     }
     const bool kept = evidence > policy_.acceptance.min_evidence && sized;
     const std::string size =

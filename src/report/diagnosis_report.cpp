@@ -478,7 +478,6 @@ constexpr RuleReason rules[] = {
     {"borne_out", "accepted: training runs and held-out runs both support it"},
     {"overwhelming", "accepted: the evidence is above 1000"},
     {"plant_numbers", "accepted: with it, numbers of the plant file move less"},
-    {"sensors_noise_left", "accepted: with it, only sensor noise remains"},
     {"held_out_in_doubt", "accepted only if no other effect is: the held-out runs speak against it"},
     {"simulation_in_doubt", "accepted only if no other effect is: held-out segments simulate worse with it"},
     {"cannot_be", "rejected: its size is zero or physically impossible"},

@@ -14,6 +14,9 @@ namespace {
 
 constexpr SelectionPolicy policy;
 constexpr AcceptancePolicy p = policy.acceptance;
+constexpr SignificancePolicy levels = policy.significance;
+constexpr double noticeable = evidence_at(levels.noticeable_z);
+constexpr double equally_good = evidence_at(levels.interval_z);
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
 double above(double value) {
@@ -72,18 +75,17 @@ TEST(Addition, NeedsEvidenceBeyondItsPrice) {
 }
 
 TEST(Addition, IsRefusedWhereHeldOutRunsSpeakAgainstIt) {
-  EXPECT_EQ(rule_of(addition(500.0, -p.equally_good_evidence, 5.0)), Rule::held_out_against);
-  EXPECT_EQ(rule_of(addition(500.0, above(-p.equally_good_evidence), 5.0)), Rule::shown_throughout);
+  EXPECT_EQ(rule_of(addition(500.0, -equally_good, 5.0)), Rule::held_out_against);
+  EXPECT_EQ(rule_of(addition(500.0, above(-equally_good), 5.0)), Rule::shown_throughout);
 }
 
 TEST(Addition, MustShowAllAlongTheTrainingRuns) {
-  EXPECT_EQ(rule_of(addition(500.0, 0.0, p.min_t)), Rule::chance);
-  EXPECT_EQ(rule_of(addition(500.0, 0.0, above(p.min_t))), Rule::shown_throughout);
+  EXPECT_EQ(rule_of(addition(500.0, 0.0, levels.noticeable_z)), Rule::chance);
+  EXPECT_EQ(rule_of(addition(500.0, 0.0, above(levels.noticeable_z))), Rule::shown_throughout);
 }
 
 TEST(Addition, HasHeldOutRunsAsAWitnessOfItsT) {
   Evidence e = addition(500.0, 5.0, 2.0);  // 2^2 + 5 = 3^2
-  e.simulated_gap = 2.0;
   EXPECT_EQ(rule_of(e), Rule::chance);
   e.improvement.held = 5.01;
   e.at_equal_noise = e.improvement;
@@ -96,10 +98,10 @@ TEST(Addition, HasNoWitnessWhereTrainingRunsSayNoMoreThanChance) {
 }
 
 TEST(Addition, IsBorneOutByTrainingAndHeldOutRuns) {
-  EXPECT_EQ(rule_of(addition(p.min_evidence_of_each, 1000.0, 5.0)), Rule::too_little_evidence);
-  EXPECT_EQ(rule_of(addition(above(p.min_evidence_of_each), 1000.0, 5.0)), Rule::borne_out);
-  EXPECT_EQ(rule_of(addition(1000.0, p.min_evidence_of_each, 5.0)), Rule::shown_throughout);
-  EXPECT_EQ(rule_of(addition(1000.0, above(p.min_evidence_of_each), 5.0)), Rule::borne_out);
+  EXPECT_EQ(rule_of(addition(noticeable, 1000.0, 5.0)), Rule::too_little_evidence);
+  EXPECT_EQ(rule_of(addition(above(noticeable), 1000.0, 5.0)), Rule::borne_out);
+  EXPECT_EQ(rule_of(addition(1000.0, noticeable, 5.0)), Rule::shown_throughout);
+  EXPECT_EQ(rule_of(addition(1000.0, above(noticeable), 5.0)), Rule::borne_out);
   const double half = 0.5 * p.min_evidence;
   EXPECT_EQ(rule_of(addition(half, half, 5.0)), Rule::too_little_evidence);
   EXPECT_EQ(rule_of(addition(half, half + 0.1, 5.0)), Rule::borne_out);
@@ -120,37 +122,23 @@ TEST(Addition, NeedsNoTWhereNumbersOfThePlantNeedNotBeSoFarOff) {
   EXPECT_EQ(rule_of(e), Rule::plant_numbers);
 }
 
-TEST(Addition, NeedsALittleTWhereTheSensorsNoiseIsLeft) {
-  const auto rule = [](double held, double t_value, double gap) {
-    Evidence e = addition(500.0, held, t_value);
-    e.simulated_gap = gap;
-    return rule_of(e);
-  };
-  EXPECT_EQ(rule(4.5, p.min_t_of_sensors, 1.0), Rule::chance);
-  EXPECT_EQ(rule(4.5, above(p.min_t_of_sensors), 1.0), Rule::sensors_noise_left);
-  EXPECT_EQ(rule(p.equally_good_evidence, 1.6, 1.0), Rule::chance);
-  EXPECT_EQ(rule(above(p.equally_good_evidence), 1.6, 1.0), Rule::sensors_noise_left);
-  EXPECT_EQ(rule(4.5, 1.6, p.sensors_gap), Rule::chance);
-  EXPECT_EQ(rule(4.5, 1.6, below(p.sensors_gap)), Rule::sensors_noise_left);
-}
-
 TEST(Addition, MustBeOfACertainSize) {
   Evidence e = addition(60.0, 0.0, 5.0);  // less than four times the square of the certainty
-  e.certainty = p.min_certainty;
+  e.certainty = levels.certain_z;
   EXPECT_EQ(rule_of(e), Rule::shown_throughout);
-  e.certainty = below(p.min_certainty);
+  e.certainty = below(levels.certain_z);
   EXPECT_EQ(rule_of(e), Rule::uncertain_size);
   e.is_correction = true;
   EXPECT_EQ(rule_of(e), Rule::shown_throughout);
 }
 
 TEST(Addition, GoesOnWhereItsFitIsLessCertainThanItsEvidence) {
-  Evidence e = addition(9.0 * p.unconverged_evidence_ratio, 0.0, 5.0);
+  Evidence e = addition(evidence_at(3.0 * levels.clear_ratio), 0.0, 5.0);
   e.certainty = 3.0;
   EXPECT_EQ(missing_of(e), MissingFit::converged);
-  e.certainty_converged = below(p.min_certainty);
+  e.certainty_converged = below(levels.certain_z);
   EXPECT_EQ(rule_of(e), Rule::uncertain_size);
-  e.certainty_converged = p.min_certainty;
+  e.certainty_converged = levels.certain_z;
   EXPECT_EQ(rule_of(e), Rule::shown_throughout);
   e.certainty = above(3.0);
   e.certainty_converged.reset();
@@ -161,9 +149,9 @@ TEST(Addition, MayBeMadeCertainByAllRuns) {
   Evidence e = addition(21.0, 20.0, 5.0);
   e.certainty = 3.0;
   EXPECT_EQ(missing_of(e), MissingFit::all_runs);
-  e.certainty_of_all_runs = p.min_certainty;
+  e.certainty_of_all_runs = levels.certain_z;
   EXPECT_EQ(rule_of(e), Rule::borne_out);
-  e.certainty_of_all_runs = below(p.min_certainty);
+  e.certainty_of_all_runs = below(levels.certain_z);
   EXPECT_EQ(rule_of(e), Rule::uncertain_size);
 }
 
@@ -175,8 +163,8 @@ TEST(SimulationChange, IsTheMeanLogarithmOverTheSegments) {
   // 2.132 is the 95th percentile of Student's t with four degrees of freedom.
   const double usual = p.usual_simulation_scatter;
   const double standard_error = std::sqrt((usual * usual + 4.0 * change.scatter * change.scatter) / 16.0);
-  EXPECT_NEAR(change.by_chance(p), 2.132 * standard_error, 1e-3);
-  EXPECT_EQ(simulation_change({}, {}).by_chance(p), 0.0) << "no data are held out";
+  EXPECT_NEAR(change.by_chance(policy), 2.132 * standard_error, 1e-3);
+  EXPECT_EQ(simulation_change({}, {}).by_chance(policy), 0.0) << "no data are held out";
   const double diverged = std::numeric_limits<double>::infinity();
   EXPECT_EQ(simulation_change({diverged, diverged}, {diverged, diverged}).mean, 0.0);
   EXPECT_LT(simulation_change({diverged, diverged}, {1.0, 2.0}).mean, -10.0);
@@ -185,7 +173,7 @@ TEST(SimulationChange, IsTheMeanLogarithmOverTheSegments) {
 
 TEST(SimulationChange, OfOneSegmentDoesNotOutweighTheOthers) {
   const SimulationChange change = simulation_change({1.0, 1.0, 1.0, 1.0, 1.0}, {3.0, 0.8, 0.8, 0.8, 0.8});
-  EXPECT_LT(change.mean - change.by_chance(p), 0.0);
+  EXPECT_LT(change.mean - change.by_chance(policy), 0.0);
 }
 
 TEST(Addition, MustSimulateAsWellAsSegmentsCanShow) {
@@ -196,7 +184,7 @@ TEST(Addition, MustSimulateAsWellAsSegmentsCanShow) {
   };
   EXPECT_EQ(rule(0, 0.0, 100.0), Rule::shown_throughout) << "no data are held out";
   const auto limit = [](std::size_t segments, double scatter) {
-    return p.worse_simulation_by_chance + SimulationChange{segments, 0.0, scatter}.by_chance(p);
+    return levels.visible_change + SimulationChange{segments, 0.0, scatter}.by_chance(policy);
   };
   EXPECT_EQ(rule(4, 0.1, limit(4, 0.1)), Rule::simulates_worse);
   EXPECT_EQ(rule(4, 0.1, below(limit(4, 0.1))), Rule::shown_throughout);
@@ -209,8 +197,8 @@ TEST(Addition, IsFollowedInDoubtWithOverwhelmingEvidenceOnly) {
   const auto against = [](double train, double t_value) { return rule_of(addition(train, -5.0, t_value)); };
   EXPECT_EQ(against(p.overwhelming_evidence, 5.0), Rule::held_out_against);
   EXPECT_EQ(against(above(p.overwhelming_evidence), 5.0), Rule::held_out_in_doubt);
-  EXPECT_EQ(against(2000.0, p.min_t), Rule::held_out_against);
-  EXPECT_EQ(against(2000.0, above(p.min_t)), Rule::held_out_in_doubt);
+  EXPECT_EQ(against(2000.0, levels.noticeable_z), Rule::held_out_against);
+  EXPECT_EQ(against(2000.0, above(levels.noticeable_z)), Rule::held_out_in_doubt);
   Evidence uncertain = addition(2000.0, -5.0, 5.0);
   uncertain.certainty = 1.0;
   uncertain.certainty_converged = 1.0;
@@ -240,14 +228,13 @@ TEST(Addition, CountsOverTheModelWithTheSameNoise) {
 }
 
 TEST(Addition, WaitsForTheSimulationsThatARuleAsksFor) {
-  EXPECT_EQ(missing_of(addition(500.0, 4.5, 1.6)), MissingFit::simulation);
   Evidence e = addition(500.0, 0.0, 5.0);
   e.simulated_segments.reset();
   EXPECT_EQ(missing_of(e), MissingFit::simulated_segments);
 }
 
 TEST(Exchange, IsForWhatIsBetter) {
-  const double threshold = policy.distinction.indistinguishable_evidence;
+  const double threshold = evidence_at(levels.certain_z);
   EXPECT_EQ(rule_of(evidence(Change::exchange, threshold, 1.0, 0.0)), Rule::no_better);
   EXPECT_EQ(rule_of(evidence(Change::exchange, above(threshold), 1.0, 0.0)), Rule::better);
   EXPECT_EQ(rule_of(evidence(Change::exchange, 100.0, 0.0, 0.0)), Rule::no_better);
@@ -263,19 +250,19 @@ TEST(Exchange, IsForWhatIsAsGoodAndPlainer) {
     e.is_plainer = true;
     return rule_of(e);
   };
-  EXPECT_EQ(rule(-p.equally_good_evidence, 1.0), Rule::no_better);
-  EXPECT_EQ(rule(above(-p.equally_good_evidence), 1.0), Rule::plainer);
-  EXPECT_EQ(rule(1.0, -p.equally_good_evidence), Rule::no_better);
-  EXPECT_EQ(rule(1.0, above(-p.equally_good_evidence)), Rule::plainer);
-  EXPECT_EQ(rule(-0.5 * p.equally_good_evidence, -0.5 * p.equally_good_evidence), Rule::no_better);
-  EXPECT_EQ(rule(-0.5 * p.equally_good_evidence, 0.1 - 0.5 * p.equally_good_evidence), Rule::plainer);
+  EXPECT_EQ(rule(-equally_good, 1.0), Rule::no_better);
+  EXPECT_EQ(rule(above(-equally_good), 1.0), Rule::plainer);
+  EXPECT_EQ(rule(1.0, -equally_good), Rule::no_better);
+  EXPECT_EQ(rule(1.0, above(-equally_good)), Rule::plainer);
+  EXPECT_EQ(rule(-0.5 * equally_good, -0.5 * equally_good), Rule::no_better);
+  EXPECT_EQ(rule(-0.5 * equally_good, 0.1 - 0.5 * equally_good), Rule::plainer);
 }
 
 TEST(Exchange, AsksThatTheSubstituteIsPossibleAndCertain) {
   Evidence e = evidence(Change::exchange, 100.0, 1.0, 0.0);
-  e.certainty = p.min_certainty;
+  e.certainty = levels.certain_z;
   EXPECT_EQ(rule_of(e), Rule::better);
-  e.certainty = below(p.min_certainty);
+  e.certainty = below(levels.certain_z);
   EXPECT_EQ(rule_of(e), Rule::uncertain_size);
   e.plausible = false;
   EXPECT_EQ(rule_of(e), Rule::cannot_be);
@@ -290,9 +277,9 @@ TEST(Simplification, MustSaveWhatItsParametersCost) {
   EXPECT_EQ(rule_of(e), Rule::no_better);
   e.improvement.train = above(10.0);
   EXPECT_EQ(rule_of(e), Rule::plainer);
-  e.improvement.held = -p.equally_good_evidence;
+  e.improvement.held = -equally_good;
   EXPECT_EQ(rule_of(e), Rule::held_out_against);
-  e.improvement.held = above(-p.equally_good_evidence);
+  e.improvement.held = above(-equally_good);
   EXPECT_EQ(rule_of(e), Rule::plainer);
 }
 
@@ -303,7 +290,7 @@ TEST(Pair, NeedsEvidenceAndNoHeldOutRunsAgainstIt) {
 }
 
 TEST(Keeping, NeedsALittleLessTThanAdding) {
-  const double min_t = p.kept_t_share * p.min_t;
+  const double min_t = levels.interval_z;
   EXPECT_EQ(rule_of(evidence(Change::keep, 100.0, 0.0, min_t)), Rule::chance);
   EXPECT_EQ(rule_of(evidence(Change::keep, 100.0, 0.0, above(min_t))), Rule::still_shown);
   EXPECT_EQ(rule_of(evidence(Change::keep, p.min_evidence, 0.0, 2.5)), Rule::chance);
@@ -326,6 +313,14 @@ TEST(WhatWasAddedInDoubt, MustHaveHeldOutRunsOnItsSideInTheEnd) {
   EXPECT_EQ(rule_of(e), Rule::simulates_worse);
 }
 
+TEST(Numbers, ThatDecideAreFewerThanTwenty) {
+  constexpr std::size_t of_levels = sizeof(SignificancePolicy) + sizeof(AcceptancePolicy) +
+                                    sizeof(CorrectionPolicy) + sizeof(AdequacyPolicy);
+  // The largest usual disturbances (two members of PriorPolicy), and the least motion (of ExcitationPolicy).
+  constexpr std::size_t others = 3;
+  EXPECT_LT(of_levels / sizeof(double) + others, 20u);
+}
+
 TEST(Rules, HaveNamesOfTheirOwn) {
   std::set<std::string_view> names;
   const int count = static_cast<int>(Rule::simulation_in_doubt) + 1;
@@ -335,39 +330,38 @@ TEST(Rules, HaveNamesOfTheirOwn) {
 }
 
 TEST(Place, IsBetterByMoreThanIsEquallyGood) {
-  EXPECT_FALSE(is_better_optimum(p.equally_good_evidence, p));
-  EXPECT_TRUE(is_better_optimum(above(p.equally_good_evidence), p));
+  EXPECT_FALSE(is_better_optimum(equally_good, levels));
+  EXPECT_TRUE(is_better_optimum(above(equally_good), levels));
 }
 
 /// A spring has two parameters, a force one: it is the plainer.
 const std::size_t force = effect_number("constant_force"), spring = effect_number("cable_spring");
 
 TEST(BestContender, HasTheLargestScoreUnlessOthersAreEqual) {
-  EXPECT_EQ(best_of({{spring, 104.0, 0.0}, {force, 100.0, 0.0}}, p), 0u);
-  EXPECT_EQ(best_of({{spring, below(104.0), 0.0}, {force, 100.0, 0.0}}, p), 1u);
+  EXPECT_EQ(best_of({{spring, 104.0, 0.0}, {force, 100.0, 0.0}}, levels), 0u);
+  EXPECT_EQ(best_of({{spring, below(104.0), 0.0}, {force, 100.0, 0.0}}, levels), 1u);
 }
 
 TEST(BestContender, IsChosenByHeldOutRunsAmongEquals) {
-  EXPECT_EQ(best_of({{spring, 100.0, 4.1}, {force, 100.0, 0.0}}, p), 0u);
-  EXPECT_EQ(best_of({{spring, 100.0, 4.0}, {force, 100.0, 0.0}}, p), 1u);
+  EXPECT_EQ(best_of({{spring, 100.0, 4.1}, {force, 100.0, 0.0}}, levels), 0u);
+  EXPECT_EQ(best_of({{spring, 100.0, 4.0}, {force, 100.0, 0.0}}, levels), 1u);
 }
 
 TEST(Indistinguishable, IsWhatLosesLittleEvidence) {
-  const DistinctionPolicy& d = policy.distinction;
-  EXPECT_TRUE(is_indistinguishable(below(d.indistinguishable_evidence), 100.0, d));
-  EXPECT_FALSE(is_indistinguishable(d.indistinguishable_evidence, 100.0, d));
-  EXPECT_TRUE(is_indistinguishable(100.0, below(d.scattered_t), d));
-  EXPECT_FALSE(is_indistinguishable(100.0, d.scattered_t, d));
-  EXPECT_TRUE(is_indistinguishable(below(d.max_scattered_evidence), 0.0, d));
-  EXPECT_FALSE(is_indistinguishable(d.max_scattered_evidence, 0.0, d));
+  const double certain = evidence_at(levels.certain_z);
+  EXPECT_TRUE(is_indistinguishable(below(certain), 100.0, policy));
+  EXPECT_FALSE(is_indistinguishable(certain, 100.0, policy));
+  EXPECT_TRUE(is_indistinguishable(100.0, below(levels.interval_z), policy));
+  EXPECT_FALSE(is_indistinguishable(100.0, levels.interval_z, policy));
+  EXPECT_TRUE(is_indistinguishable(below(p.overwhelming_evidence), 0.0, policy));
+  EXPECT_FALSE(is_indistinguishable(p.overwhelming_evidence, 0.0, policy));
 }
 
 TEST(Alternative, TakesTheCertaintyOfAnEffectAway) {
-  const DistinctionPolicy& d = policy.distinction;
-  EXPECT_TRUE(reduces_certainty(below(d.min_distance), 100.0, d));
-  EXPECT_FALSE(reduces_certainty(d.min_distance, 100.0, d));
-  EXPECT_TRUE(reduces_certainty(below(3.0), 3.0 / d.min_loss, d));
-  EXPECT_FALSE(reduces_certainty(3.0, 3.0 / d.min_loss, d));
+  EXPECT_TRUE(reduces_certainty(below(levels.certain_z), 100.0, levels));
+  EXPECT_FALSE(reduces_certainty(levels.certain_z, 100.0, levels));
+  EXPECT_TRUE(reduces_certainty(below(3.0), 6.0, levels)) << "it takes more than it leaves";
+  EXPECT_FALSE(reduces_certainty(3.0, 6.0, levels));
 }
 
 TEST(SearchWithoutAnEffect, EndsWhereItIsOutOfReach) {

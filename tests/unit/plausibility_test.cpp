@@ -11,6 +11,7 @@ namespace upright {
 namespace {
 
 constexpr CorrectionPolicy policy;
+constexpr SignificancePolicy levels;
 
 double above(double value) {
   return std::nextafter(value, 1e9);
@@ -23,12 +24,12 @@ double below(double value) {
 std::vector<std::size_t> certain(double value, bool is_correction) {
   return certain_parameters(
       {Eigen::VectorXd::Constant(1, value), Eigen::VectorXd::Zero(1), Eigen::MatrixXd::Identity(1, 1)},
-      {is_correction}, policy);
+      {is_correction}, levels);
 }
 
 TEST(Correction, IsThereFromItsMinimumCertaintyOn) {
-  EXPECT_TRUE(certain(below(policy.min_z), true).empty());
-  EXPECT_EQ(certain(policy.min_z, true).size(), 1u);
+  EXPECT_TRUE(certain(below(levels.certain_z), true).empty());
+  EXPECT_EQ(certain(levels.certain_z, true).size(), 1u);
   EXPECT_EQ(certain(0.0, false).size(), 1u) << "what is no correction stays";
 }
 
@@ -37,22 +38,22 @@ TEST(Correction, FollowsWhereOneThatIsAlikeIsSetBack) {
   ParameterPosterior posterior{Eigen::Vector2d(3.9, 5.0), Eigen::Vector2d::Zero(),
                                Eigen::Matrix2d::Identity()};
   posterior.covariance(0, 1) = posterior.covariance(1, 0) = -0.9;
-  EXPECT_EQ(certain_parameters(posterior, {true, true}, policy), std::vector<std::size_t>{1});
+  EXPECT_EQ(certain_parameters(posterior, {true, true}, levels), std::vector<std::size_t>{1});
   // The other way round the second gives way as the first is set back.
   posterior.covariance(0, 1) = posterior.covariance(1, 0) = 0.9;
-  EXPECT_EQ(certain_parameters(posterior, {true, true}, policy), std::vector<std::size_t>{});
+  EXPECT_EQ(certain_parameters(posterior, {true, true}, levels), std::vector<std::size_t>{});
 }
 
 TEST(Correction, MustIncludeNothingOnAllRunsNoLonger) {
-  EXPECT_FALSE(is_certain_of_all_runs(below(policy.min_certainty_of_all_runs), policy));
-  EXPECT_TRUE(is_certain_of_all_runs(policy.min_certainty_of_all_runs, policy));
+  EXPECT_FALSE(is_certain_of_all_runs(below(levels.interval_z), levels));
+  EXPECT_TRUE(is_certain_of_all_runs(levels.interval_z, levels));
 }
 
 TEST(Correction, IsAsBelievedWithinWhatCoefficientsMove) {
-  const double sigma = 0.5, far = policy.within_prior * sigma;
-  EXPECT_TRUE(is_within_prior(below(far), 0.0, sigma, policy));
-  EXPECT_FALSE(is_within_prior(far, 0.0, sigma, policy));
-  EXPECT_FALSE(is_within_prior(-far, 0.0, sigma, policy));
+  const double sigma = 0.5, far = levels.noticeable_z * sigma;
+  EXPECT_TRUE(is_within_prior(below(far), 0.0, sigma, levels));
+  EXPECT_FALSE(is_within_prior(far, 0.0, sigma, levels));
+  EXPECT_FALSE(is_within_prior(-far, 0.0, sigma, levels));
 }
 
 TEST(Scale, IsAtAnEndOfItsRangeJustBeforeIt) {
@@ -64,31 +65,32 @@ TEST(Scale, IsAtAnEndOfItsRangeJustBeforeIt) {
 }
 
 TEST(Scale, IsDoubtfulBeyondADataSheet) {
-  EXPECT_FALSE(is_doubtful(std::exp(policy.doubtful_scale - 1e-9), policy));
-  EXPECT_TRUE(is_doubtful(std::exp(policy.doubtful_scale + 1e-9), policy));
-  EXPECT_TRUE(is_doubtful(std::exp(-policy.doubtful_scale - 1e-9), policy));
+  constexpr PriorPolicy prior;
+  EXPECT_FALSE(is_doubtful(std::exp(prior.doubtful_scale - 1e-9), prior));
+  EXPECT_TRUE(is_doubtful(std::exp(prior.doubtful_scale + 1e-9), prior));
+  EXPECT_TRUE(is_doubtful(std::exp(-prior.doubtful_scale - 1e-9), prior));
 }
 
-TEST(AngleOffset, ShowsFromAStepAndAHalfOn) {
-  const double step = 0.001, min_offset = policy.min_angle_offset_steps * step;
-  EXPECT_FALSE(shows_on_encoder(below(min_offset), step, policy));
-  EXPECT_TRUE(shows_on_encoder(min_offset, step, policy));
-  EXPECT_TRUE(shows_on_encoder(-min_offset, step, policy));
+TEST(AngleOffset, ShowsFromAStepOn) {
+  const double step = 0.001;
+  EXPECT_FALSE(shows_on_encoder(below(step), step));
+  EXPECT_TRUE(shows_on_encoder(step, step));
+  EXPECT_TRUE(shows_on_encoder(-step, step));
 }
 
 TEST(Bristles, AreShortWithinATenthOfTheTravel) {
+  constexpr PriorPolicy prior;
   const double travel_m = 0.5, stiffness = 20.0,
-               longest = stiffness * policy.bristle_share_of_travel * travel_m;
-  EXPECT_TRUE(are_bristles_short(below(longest), stiffness, travel_m, policy));
-  EXPECT_FALSE(are_bristles_short(longest, stiffness, travel_m, policy));
+               longest = stiffness * prior.bristle_share_of_travel * travel_m;
+  EXPECT_TRUE(are_bristles_short(below(longest), stiffness, travel_m, prior));
+  EXPECT_FALSE(are_bristles_short(longest, stiffness, travel_m, prior));
 }
 
 TEST(HeldOutRuns, MayBeAsFarOffAgainAsAllRunsAre) {
-  constexpr ResidualPolicy residual;
-  EXPECT_FALSE(is_held_out_too_far_off(residual.max_excess, 0.5, residual));
-  EXPECT_TRUE(is_held_out_too_far_off(above(residual.max_excess), 0.5, residual));
-  EXPECT_FALSE(is_held_out_too_far_off(1.5 * residual.max_excess, 1.5, residual));
-  EXPECT_TRUE(is_held_out_too_far_off(above(1.5 * residual.max_excess), 1.5, residual));
+  EXPECT_FALSE(is_held_out_too_far_off(levels.clear_ratio, 0.5, levels));
+  EXPECT_TRUE(is_held_out_too_far_off(above(levels.clear_ratio), 0.5, levels));
+  EXPECT_FALSE(is_held_out_too_far_off(1.5 * levels.clear_ratio, 1.5, levels));
+  EXPECT_TRUE(is_held_out_too_far_off(above(1.5 * levels.clear_ratio), 1.5, levels));
 }
 
 TEST(Runs, MoveEnoughBeyondTheStepsOfASensor) {

@@ -13,8 +13,8 @@
 namespace upright {
 namespace {
 
-constexpr ResidualPolicy policy;
-const double smallest_p_value = 1.0 / (static_cast<double>(policy.draws) + 1.0);
+constexpr SelectionPolicy policy;
+const double smallest_p_value = 1.0 / (static_cast<double>(policy.residual.draws) + 1.0);
 
 /// Beyond the sensors' noise, and like white noise in every other way.
 ResidualTests disturbed() {
@@ -40,25 +40,25 @@ struct Limit {
 
 const Limit limits[] = {
     {"dependence on motion, voltage or time", [](InnovationStatistics& s, double v) { s.dependence[3] = v; },
-     policy.min_dependence, 1},
+     policy.significance.noticeable_z, 1},
     {"dispersion of blocks", [](InnovationStatistics& s, double v) { s.dispersion = v; },
-     policy.min_dispersion, 1},
+     policy.adequacy.min_dispersion, 1},
     {"kurtosis of pulses of force", [](InnovationStatistics& s, double v) { s.kurtosis[0] = v; },
-     policy.min_kurtosis, 1},
+     policy.adequacy.min_kurtosis, 1},
     {"kurtosis of pulses of torque", [](InnovationStatistics& s, double v) { s.kurtosis[1] = v; },
-     policy.min_kurtosis, 1},
+     policy.adequacy.min_kurtosis, 1},
     {"kurtosis of slow force", [](InnovationStatistics& s, double v) { s.disturbance_kurtosis[0] = v; },
-     policy.min_kurtosis, 1},
+     policy.adequacy.min_kurtosis, 1},
     {"kurtosis of slow torque", [](InnovationStatistics& s, double v) { s.disturbance_kurtosis[1] = v; },
-     policy.min_kurtosis, 1},
+     policy.adequacy.min_kurtosis, 1},
     {"size of slow force, too large", [](InnovationStatistics& s, double v) { s.pulse_size[0] = v; },
-     policy.slowest, 1},
+     policy.significance.clear_ratio, 1},
     {"size of slow torque, too large", [](InnovationStatistics& s, double v) { s.pulse_size[1] = v; },
-     policy.slowest, 1},
+     policy.significance.clear_ratio, 1},
     {"size of slow force, too small", [](InnovationStatistics& s, double v) { s.pulse_size[0] = v; },
-     policy.quickest, -1},
+     1.0 / policy.significance.clear_ratio, -1},
     {"size of slow torque, too small", [](InnovationStatistics& s, double v) { s.pulse_size[1] = v; },
-     policy.quickest, -1},
+     1.0 / policy.significance.clear_ratio, -1},
 };
 
 TEST(ResidualTestTable, EachTestFailsJustBeyondItsLimitOnly) {
@@ -83,7 +83,7 @@ TEST(ResidualTestTable, WhatChanceMakesDoesNotFail) {
     limits[i].set(beyond.statistics, limits[i].direction > 0 ? 100.0 : 0.0);
     beyond.p_values.assign(residual_test_table().size(), 0.5);
     EXPECT_EQ(failed_name(beyond), "") << limits[i].name;
-    beyond.p_values[i] = policy.level / static_cast<double>(residual_test_table().size());
+    beyond.p_values[i] = policy.significance.level / static_cast<double>(residual_test_table().size());
     EXPECT_EQ(failed_name(beyond), limits[i].name);
   }
 }
@@ -98,10 +98,10 @@ TEST(ResidualTestTable, EveryTestOfItIsHeldOnBothSides) {
 TEST(ResidualTestTable, ExcessFailsWithoutDraws) {
   ResidualTests left = disturbed();
   left.p_values.clear();
-  left.excess = policy.max_excess;
+  left.excess = policy.significance.clear_ratio;
   conclude_tests(left, policy);
   EXPECT_FALSE(left.structured);
-  left.excess = std::nextafter(policy.max_excess, 10.0);
+  left.excess = std::nextafter(policy.significance.clear_ratio, 10.0);
   conclude_tests(left, policy);
   EXPECT_TRUE(left.structured);
 }
@@ -109,11 +109,11 @@ TEST(ResidualTestTable, ExcessFailsWithoutDraws) {
 TEST(ResidualTestTable, NothingIsTestedWithinTheSensorsNoise) {
   ResidualTests left = disturbed();
   left.statistics.dispersion = 100.0;
-  left.noise_ratio = policy.sensors_noise_ratio;
+  left.noise_ratio = std::exp(policy.significance.visible_change);
   conclude_tests(left, policy);
   EXPECT_FALSE(left.beyond_sensors);
   EXPECT_FALSE(left.structured);
-  left.noise_ratio = std::nextafter(policy.sensors_noise_ratio, 2.0);
+  left.noise_ratio = std::nextafter(std::exp(policy.significance.visible_change), 2.0);
   conclude_tests(left, policy);
   EXPECT_TRUE(left.beyond_sensors);
   EXPECT_TRUE(left.structured);

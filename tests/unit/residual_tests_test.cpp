@@ -186,14 +186,14 @@ TEST(Bootstrap, FindsGustsThatASlowForceAccountsFor) {
   rig.unknown = blind::Unknown::gusts;
   rig.gust_force_n = 1.0;
   const ResidualTests gusts = beside_coloured_force(rig, force_n, correlation_s);
-  EXPECT_GT(gusts.statistics.disturbance_kurtosis[0], 2.0 * ResidualPolicy{}.min_kurtosis);
+  EXPECT_GT(gusts.statistics.disturbance_kurtosis[0], 2.0 * AdequacyPolicy{}.min_kurtosis);
   EXPECT_NE(failed_test(gusts, {}), nullptr);
 }
 
 // Where dry friction holds and lets go, a filter of the right model is far off for a moment.
 TEST(Bootstrap, TakesStickingForNoBursts) {
   constexpr double force_n = 0.3, correlation_s = 0.15;
-  constexpr ResidualPolicy policy;
+  constexpr AdequacyPolicy policy;
   blind::Rig rig{.plant = cart(), .coloured = {.force_n = force_n, .force_time_s = correlation_s}};
   for (const blind::Experiment experiment : {blind::Experiment::multisine, blind::Experiment::coast})
     for (const double level_n : {1.0, 1.5}) {
@@ -212,12 +212,12 @@ TEST(Bootstrap, EndsEarlyWhereChanceIsPlain) {
   const Innovations innovations = of_white_force(runs, rig);
   const InnovationStatistics usual = innovations.drawn(12345);
   EXPECT_TRUE(residual_p_values(innovations, usual, {}).empty()) << "nothing is beyond a limit";
-  ResidualPolicy strict;
-  strict.min_kurtosis = 0.0;
+  SelectionPolicy strict;
+  strict.adequacy.min_kurtosis = 0.0;
   const std::vector<double> p_values = residual_p_values(innovations, usual, strict);
   ASSERT_EQ(p_values.size(), residual_test_table().size());
   std::vector<double> kurtosis;
-  for (std::uint64_t seed = 1; seed <= strict.draws; ++seed)
+  for (std::uint64_t seed = 1; seed <= strict.residual.draws; ++seed)
     kurtosis.push_back(innovations.drawn(seed).kurtosis[0]);
   EXPECT_NEAR(p_values[2], share_as_large(kurtosis, usual.kurtosis[0]), 0.15) << "of fewer draws";
 }

@@ -60,7 +60,7 @@ class Fitted {
     known_ = search_->fitted_to_all_runs(final_);
   }
   Reproduction reproduction() const { return reproduce(*search_, known_, {force}).front(); }
-  bool is_contradicted() const { return upright::is_contradicted(reproduction(), policy_.reproducibility); }
+  bool is_contradicted() const { return upright::is_contradicted(reproduction(), policy_.significance); }
   Listing listing() {
     return list_effects(*search_, final_, {.effects = {force}, .corrections = corrections_});
   }
@@ -230,11 +230,12 @@ TEST(Phase, OpenAtTheZeroOfTheCartIsNotNamed) {
 
 TEST(Power, GrowsWithTheParametersThatHaveToBePaidFor) {
   const SelectionPolicy policy;
+  const double of_95_percent = 1.6448536269514722;  // the quantile of a Gaussian
   const double one = standard_errors_to_be_shown(force, false, policy);
-  EXPECT_DOUBLE_EQ(one, std::sqrt(policy.acceptance.min_evidence) + policy.power.power_z);
+  EXPECT_DOUBLE_EQ(one, std::sqrt(policy.acceptance.min_evidence) + of_95_percent);
   EXPECT_GT(standard_errors_to_be_shown(effect_number("cogging_force"), false, policy), one);
   EXPECT_DOUBLE_EQ(standard_errors_to_be_shown(effect_number("cart_mass"), true, policy),
-                   policy.correction.min_z + policy.power.power_z);
+                   policy.significance.certain_z + of_95_percent);
 }
 
 TEST(Power, LetsHideOnlyTheFrictionThatThePlantLacks) {

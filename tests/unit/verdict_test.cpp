@@ -6,8 +6,6 @@
 namespace upright {
 namespace {
 
-constexpr PowerPolicy policy;
-
 Diagnosis with_effect(double gap_before, double gap_after) {
   Diagnosis d;
   d.gap_before = gap_before;
@@ -17,27 +15,27 @@ Diagnosis with_effect(double gap_before, double gap_after) {
 }
 
 TEST(Verdict, StructureIsUnexplainedWhateverWasFound) {
-  EXPECT_EQ(verdict_of(with_effect(10.0, 1.0), {.structured = true}, policy), Verdict::unexplained);
-  EXPECT_EQ(verdict_of({}, {.structured = true}, policy), Verdict::unexplained);
+  EXPECT_EQ(verdict_of(with_effect(10.0, 1.0), {.structured = true}), Verdict::unexplained);
+  EXPECT_EQ(verdict_of({}, {.structured = true}), Verdict::unexplained);
 }
 
 TEST(Verdict, AnEffectExplainsIfItClosesHalfOfAClearGap) {
-  EXPECT_EQ(verdict_of(with_effect(10.0, 1.5), {}, policy), Verdict::explained);
-  EXPECT_EQ(verdict_of(with_effect(10.0, 5.4), {.clear_gap = true}, policy), Verdict::explained);
-  EXPECT_EQ(verdict_of(with_effect(10.0, 5.6), {.clear_gap = true}, policy), Verdict::unexplained);
+  EXPECT_EQ(verdict_of(with_effect(10.0, 1.5), {}), Verdict::explained);
+  EXPECT_EQ(verdict_of(with_effect(10.0, 5.4), {.clear_gap = true}), Verdict::explained);
+  EXPECT_EQ(verdict_of(with_effect(10.0, 5.6), {.clear_gap = true}), Verdict::unexplained);
 }
 
 TEST(Verdict, NothingFoundNeedsDataThatWouldHaveShownIt) {
-  EXPECT_EQ(verdict_of({}, {}, policy), Verdict::no_discrepancy);
-  EXPECT_EQ(verdict_of({}, {.may_hide = true}, policy), Verdict::not_excited);
-  EXPECT_EQ(verdict_of({}, {.clear_gap = true}, policy), Verdict::not_excited);
-  EXPECT_EQ(verdict_of({}, {.moves_enough = false}, policy), Verdict::not_excited);
+  EXPECT_EQ(verdict_of({}, {}), Verdict::no_discrepancy);
+  EXPECT_EQ(verdict_of({}, {.may_hide = true}), Verdict::not_excited);
+  EXPECT_EQ(verdict_of({}, {.clear_gap = true}), Verdict::not_excited);
+  EXPECT_EQ(verdict_of({}, {.moves_enough = false}), Verdict::not_excited);
 }
 
 TEST(Verdict, WhatHelpsHereOnlyIsUnexplained) {
   Diagnosis d;
   d.helps_here_only.emplace_back();
-  EXPECT_EQ(verdict_of(d, {}, policy), Verdict::unexplained);
+  EXPECT_EQ(verdict_of(d, {}), Verdict::unexplained);
 }
 
 TEST(Verdict, TheReasonNamesTheGapAndWhatMayHide) {
