@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <limits>
 #include <utility>
 
 #include "stepwise_selection.hpp"
@@ -21,6 +22,7 @@ bool StepwiseSelection::find_without(std::size_t effect) {
   Checkpoint other{search_.without(current_, effect), found_};
   if (!std::isfinite(other.hypothesis.train.objective)) return false;
   std::erase(other.found, effect);
+  const Goal goal{current_.train.objective, search_.on_screening_subset(current_).train.objective};
   const bool contradicted = contradicted_;
   const auto exchange_paths = [&] {
     std::swap(current_, other.hypothesis);
@@ -34,7 +36,7 @@ bool StepwiseSelection::find_without(std::size_t effect) {
     exchange_paths();
   };
   try {
-    find_again(other.hypothesis.train.objective);
+    find_again(goal);
   } catch (...) {  // the search may end at any time: what was found before it counts
     return_to_path();
     throw;
@@ -53,6 +55,21 @@ bool StepwiseSelection::find_without(std::size_t effect) {
   }
   record_step();
   return better;
+}
+
+void StepwiseSelection::find_again(const Goal& goal) {
+  select_forward(3 * budget_.max_rounds, 4 * budget_.max_rounds, false, goal);
+  if (current_.train.objective <= goal.objective) eliminate_backward();
+}
+
+bool StepwiseSelection::is_out_of_reach_of(const std::vector<ScreenedCandidate>& screened, const Goal& goal,
+                                           int rounds_left) {
+  double objective = std::numeric_limits<double>::infinity(), gain = 0.0;
+  for (const ScreenedCandidate& s : screened) {
+    objective = std::min(objective, s.hypothesis.train.objective);
+    gain = std::max(gain, s.gain);
+  }
+  return is_out_of_reach(objective - goal.on_subset, gain, rounds_left);
 }
 
 bool StepwiseSelection::find_attached_mass() {

@@ -27,7 +27,7 @@ void StepwiseSelection::begin() {
 }
 
 void StepwiseSelection::find() {
-  select_forward(0, budget_.max_rounds, false);
+  select_forward(0, budget_.max_rounds, false, {});
   try_pairs(finalists_);
   eliminate_backward();
 }
@@ -49,7 +49,7 @@ bool StepwiseSelection::find_pairs_of_all() {
 bool StepwiseSelection::find_thoroughly(bool certainly_missing) {
   const std::vector<std::size_t> before = found_;
   const double objective = current_.train.objective;
-  select_forward(budget_.max_rounds, 2 * budget_.max_rounds, true);
+  select_forward(budget_.max_rounds, 2 * budget_.max_rounds, true, {});
   const double share = search_.screening_share();
   bool more = share < 1.0;
   // What certainly is missing shows on a part of many data too, but for a limit that only a few reach.
@@ -57,16 +57,11 @@ bool StepwiseSelection::find_thoroughly(bool certainly_missing) {
     more = search_.screen_on_largest_voltage();
   else if (more)
     search_.screen_on_all();
-  if (more) select_forward(2 * budget_.max_rounds, 3 * budget_.max_rounds, false);
+  if (more) select_forward(2 * budget_.max_rounds, 3 * budget_.max_rounds, false, {});
   // On the way a better place may have been found for the noise alone.
   if (found_ == before) return is_better_optimum(objective - current_.train.objective, policy_.significance);
   eliminate_backward();
   return true;
-}
-
-void StepwiseSelection::find_again(double to_beat) {
-  select_forward(3 * budget_.max_rounds, 4 * budget_.max_rounds, false, to_beat);
-  if (current_.train.objective <= to_beat) eliminate_backward();
 }
 
 std::vector<std::size_t> StepwiseSelection::withdraw(std::size_t effect) {
@@ -286,11 +281,16 @@ void StepwiseSelection::record_step() {
   record_.steps.push_back(std::move(step));
 }
 
-void StepwiseSelection::select_forward(int first_round, int last_round, bool with_low_noise, double to_beat) {
+void StepwiseSelection::select_forward(int first_round, int last_round, bool with_low_noise,
+                                       const Goal& goal) {
   double before = current_.train.objective;
-  for (int round = first_round; round < last_round && add_best(round, with_low_noise); ++round) {
+  for (int round = first_round; round < last_round; ++round) {
+    const int rounds_left = last_round - round - 1;
+    const std::vector<ScreenedCandidate> screened = screen(round, with_low_noise, Candidates::usual);
+    if (is_out_of_reach_of(screened, goal, rounds_left)) break;
+    if (!add_best_of(screened, round, with_low_noise)) break;
     const double reached = current_.train.objective;
-    if (is_out_of_reach(reached - to_beat, before - reached, last_round - round - 1)) break;
+    if (is_out_of_reach(reached - goal.objective, before - reached, rounds_left)) break;
     before = reached;
   }
   resolve_doubt();
@@ -298,10 +298,6 @@ void StepwiseSelection::select_forward(int first_round, int last_round, bool wit
 
 double StepwiseSelection::share_done(int round) {
   return std::min(0.05 + 0.2 * round, 0.7);
-}
-
-bool StepwiseSelection::add_best(int round, bool with_low_noise) {
-  return add_best_of(screen(round, with_low_noise, Candidates::usual), round, with_low_noise);
 }
 
 bool StepwiseSelection::add_best_of(const std::vector<ScreenedCandidate>& screened, int round,
@@ -359,6 +355,7 @@ std::vector<StepwiseSelection::Finalist> StepwiseSelection::fit_finalists(
   for (std::size_t place = 0; place < std::min(budget_.max_finalists, ranking.size()); ++place) {
     const ScreenedCandidate& finalist = *ranking[place];
     if (finalist.gain < std::max(min_gain, budget_.min_gain_share * ranking[0]->gain)) break;
+    if (!accepted.empty() && finalist.gain < budget_.resembling_share * ranking[0]->gain) break;
     options_.report_progress(
         done + 0.12 + 0.08 * static_cast<double>(place) / static_cast<double>(budget_.max_finalists),
         "fitting " + kind_of(finalist.effect));

@@ -49,9 +49,16 @@ class StepwiseSelection {
   /// Back to what stood before it was sought.
   void give_up_attached_mass();
 
-  /// After something was taken out for good: looks for what can stand in its place. `to_beat`: given
-  /// up where this objective is out of reach.
-  void find_again(double to_beat = std::numeric_limits<double>::infinity());
+  /// What a search has to beat: the objective of another model, of all training data and of the screening
+  /// subset.
+  struct Goal {
+    double objective = std::numeric_limits<double>::infinity();
+    double on_subset = std::numeric_limits<double>::infinity();
+  };
+  /// After something was taken out for good: looks for what can stand in its place. Given up where the goal
+  /// is out of reach.
+  void find_again(const Goal& goal);
+  void find_again() { find_again(Goal{}); }
   /// No candidate from now on.
   void exclude(const std::vector<std::size_t>& effects) { withdrawn_.insert(effects.begin(), effects.end()); }
 
@@ -144,13 +151,13 @@ class StepwiseSelection {
   void record_step();
 
   /// Adds effects one at a time, the best first, for as long as the data ask for one. `with_low_noise`: as
-  /// they show with little noise, for much noise can account for the whole of an effect. `to_beat`: as in
+  /// they show with little noise, for much noise can account for the whole of an effect. `goal`: as in
   /// find_again().
-  void select_forward(int first_round, int last_round, bool with_low_noise,
-                      double to_beat = std::numeric_limits<double>::infinity());
-  /// One round: whether an effect was added.
-  bool add_best(int round, bool with_low_noise);
-  /// The same, of these.
+  void select_forward(int first_round, int last_round, bool with_low_noise, const Goal& goal);
+  /// Whether the goal is out of reach of the best of these, and of the rounds after it.
+  static bool is_out_of_reach_of(const std::vector<ScreenedCandidate>& screened, const Goal& goal,
+                                 int rounds_left);
+  /// One round: whether one of these was added.
   bool add_best_of(const std::vector<ScreenedCandidate>& screened, int round, bool with_low_noise);
   /// How far the work is.
   static double share_done(int round);
