@@ -8,6 +8,7 @@
 #include "candidates.hpp"
 #include "estimation/random_curve.hpp"
 #include "listing.hpp"
+#include "tails.hpp"
 #include "upright/model/effects/all.hpp"
 #include "without_effect.hpp"
 
@@ -96,13 +97,18 @@ class PlaceNull {
   /// Null if there is none.
   const RandomCurve* track_force() const { return track_ && track_->is_there() ? &*track_ : nullptr; }
 
-  /// What the effect saves beside the force, after the penalty of its parameters.
-  double evidence_of(const PlantEffect& effect, Shape shape) const {
+  /// Standard errors of a straight line along the track, from what it saves.
+  double certainty_of(double saved, Shape shape) const {
+    return certainty_beside_track(saved, track_->effective_values(equations_),
+                                  shape == Shape::slope ? 2.0 : 1.0);
+  }
+
+  /// What the effect saves beside the force.
+  double saved_by(const PlantEffect& effect, Shape shape) const {
     if (!is_removable(known_.train.point.plant, effect.number, search_.given()))
       return std::numeric_limits<double>::infinity();
     const auto force_n = force_of_place(effect, nodes_);
-    return (force_n ? replaced(*force_n, shape) : fitted_without(effect.number)) - track_->change() -
-           search_.penalty_of(known_, effect.number);
+    return (force_n ? replaced(*force_n, shape) : fitted_without(effect.number)) - track_->change();
   }
 
  private:
@@ -192,12 +198,18 @@ Needed how_needed(Search& search, const Hypothesis& judged, const std::vector<Re
 
 }  // namespace
 
+double certainty_beside_track(double saved, double effective_values, double left_out) {
+  const double freedom = std::max(effective_values - left_out, 1.0);
+  return normal_deviate(std::sqrt(std::max(saved, 0.0) * freedom / (freedom + left_out)), freedom);
+}
+
 std::optional<Withdrawal> outdone_by_place(Search& search, const Hypothesis& known, const Hypothesis& judged,
                                            const std::vector<Reproduction>& effects) {
   std::optional<Withdrawal> worst;
   if (!search.is_of_all_data(known.train.point)) return worst;
   std::optional<PlaceNull> null;
   double least = search.policy().acceptance.min_evidence;
+  const double noticeable_z = search.policy().significance.noticeable_z;
   for (const Reproduction& found : effects) {
     if (search.is_nuisance(found.effect)) continue;
     const PlantEffect& effect = *known.train.point.plant.find(found.effect);
@@ -205,9 +217,11 @@ std::optional<Withdrawal> outdone_by_place(Search& search, const Hypothesis& kno
     if (goes_last(shape)) continue;
     if (!null) null.emplace(search, known);
     if (null->track_force() == nullptr) break;
-    const double evidence = null->evidence_of(effect, shape);
+    const double saved = null->saved_by(effect, shape);
+    const double evidence = saved - search.penalty_of(known, effect.number);
     if (!(evidence < least)) continue;
-    const bool may_be_average = shape == Shape::slope || shape == Shape::not_of_place;
+    const bool is_noticed = shape == Shape::not_of_place || null->certainty_of(saved, shape) > noticeable_z;
+    const bool may_be_average = (shape == Shape::slope || shape == Shape::not_of_place) && is_noticed;
     const Needed needed = may_be_average ? how_needed(search, judged, effects, found.effect) : Needed::no;
     if (needed == Needed::by_itself) continue;
     least = evidence;
@@ -218,14 +232,17 @@ std::optional<Withdrawal> outdone_by_place(Search& search, const Hypothesis& kno
 
 std::optional<Withdrawal> trend_of_place(const Search& search, const Hypothesis& known) {
   if (!search.is_of_all_data(known.train.point)) return std::nullopt;
-  const double min_evidence = evidence_at(search.policy().significance.noticeable_z);
+  const SelectionPolicy& policy = search.policy();
   std::optional<PlaceNull> null;
   for (const PlantEffect& effect : known.train.point.plant.effects) {
     const Shape shape = shape_of(effect, search);
     if (search.is_nuisance(effect.number) || !goes_last(shape)) continue;
     if (!null) null.emplace(search, known);
     if (null->track_force() == nullptr) return std::nullopt;
-    if (null->evidence_of(effect, shape) < min_evidence) return Withdrawal{effect.number, as_well};
+    const double saved = null->saved_by(effect, shape);
+    const bool is_noticed = null->certainty_of(saved, shape) > policy.significance.noticeable_z;
+    if (!is_noticed && saved < policy.acceptance.overwhelming_evidence)
+      return Withdrawal{effect.number, as_well};
   }
   return std::nullopt;
 }

@@ -79,6 +79,11 @@ double RandomCurve::change_with(const CurveEquations& equations) const {
   return PrincipalAxes(equations, nodes_, length_).marginal_change(variance_);
 }
 
+double RandomCurve::effective_values(const CurveEquations& equations) const {
+  const Eigen::ArrayXd shown = variance_ * PrincipalAxes(equations, nodes_, length_).information.array();
+  return (shown / (1.0 + shown)).sum();
+}
+
 Eigen::VectorXd RandomCurve::mean(const CurveEquations& equations) const {
   const PrincipalAxes axes(equations, nodes_, length_);
   const Eigen::ArrayXd expected =

@@ -25,6 +25,9 @@ class RandomCurve {
   /// Correlation length.
   double length() const { return length_; }
 
+  /// How many independent values of it the data show, in effect: the trace of the matrix that turns the data
+  /// into the curve (Hastie, Tibshirani, Friedman, The Elements of Statistical Learning, 2009, eq. 5.16).
+  double effective_values(const CurveEquations& equations) const;
   /// The same change with other equations, with the size and the length held.
   double change_with(const CurveEquations& equations) const;
   /// The expected values at the nodes, from these equations and the prior.

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "blind_case.hpp"
+#include "estimation/random_curve.hpp"
 
 namespace upright {
 namespace {
@@ -87,6 +88,22 @@ TEST(ForceCurve, IsRecoveredFromTheInnovations) {
     size += std::pow(expected_n, 2);
   }
   EXPECT_LT(error, 0.1 * size);
+}
+
+/// A curve that differs from node to node has as many values as nodes where each is known well, and none
+/// where the data say nothing of it.
+TEST(RandomCurve, HasAsManyValuesAsTheDataShow) {
+  constexpr Eigen::Index count = 8;
+  const CurveNodes nodes{0.0, 0.1, count};
+  Eigen::VectorXd values(count);
+  values << 1.0, -1.0, 0.5, -1.5, 1.0, 1.2, -0.8, -0.4;
+  const auto known_to = [&](double information) {
+    return CurveEquations{information * Eigen::MatrixXd::Identity(count, count), information * values};
+  };
+  const RandomCurve curve(known_to(1e4), nodes);
+  ASSERT_TRUE(curve.is_there());
+  EXPECT_NEAR(curve.effective_values(known_to(1e4)), 8.0, 0.1);
+  EXPECT_LT(curve.effective_values(known_to(1e-4)), 0.1);
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "diagnosis/candidates.hpp"
+#include "diagnosis/place_null.hpp"
 
 namespace upright {
 namespace {
@@ -91,6 +92,16 @@ TEST(HeldOutRuns, MayBeAsFarOffAgainAsAllRunsAre) {
   EXPECT_TRUE(is_held_out_too_far_off(above(levels.clear_ratio), 0.5, levels));
   EXPECT_FALSE(is_held_out_too_far_off(1.5 * levels.clear_ratio, 1.5, levels));
   EXPECT_TRUE(is_held_out_too_far_off(above(1.5 * levels.clear_ratio), 1.5, levels));
+}
+
+TEST(CertaintyBesideTrack, IsLessWhereFewPlacesWereSeen) {
+  EXPECT_NEAR(certainty_beside_track(9.0, 1e6, 1.0), 3.0, 1e-3);
+  // Six places and a constant: t = sqrt(16 * 5 / 6) with five degrees of freedom, two-sided p = 0.0145.
+  EXPECT_NEAR(certainty_beside_track(16.0, 6.0, 1.0), 2.44, 0.03);
+  EXPECT_LT(certainty_beside_track(16.0, 6.0, 2.0), certainty_beside_track(16.0, 6.0, 1.0));
+  // One degree of freedom is the least.
+  EXPECT_EQ(certainty_beside_track(16.0, 1.2, 1.0), certainty_beside_track(16.0, 2.0, 1.0));
+  EXPECT_EQ(certainty_beside_track(-1.0, 6.0, 1.0), 0.0);
 }
 
 TEST(Runs, MoveEnoughBeyondTheStepsOfASensor) {
