@@ -355,6 +355,7 @@ std::vector<StepwiseSelection::Finalist> StepwiseSelection::fit_finalists(
   for (std::size_t place = 0; place < std::min(budget_.max_finalists, ranking.size()); ++place) {
     const ScreenedCandidate& finalist = *ranking[place];
     if (finalist.gain < std::max(min_gain, budget_.min_gain_share * ranking[0]->gain)) break;
+    // Neither similar to the best one nor next best.
     if (!accepted.empty() && finalist.gain < budget_.resembling_share * ranking[0]->gain) break;
     options_.report_progress(
         done + 0.12 + 0.08 * static_cast<double>(place) / static_cast<double>(budget_.max_finalists),
