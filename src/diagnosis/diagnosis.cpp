@@ -209,8 +209,8 @@ class Diagnostician {
     if (left.structured && selection_.renew_initial_states()) left = settle();
     if (left.structured) left = with_attached_mass(left);
     if (left.structured && selection_.find_pairs_of_all()) left = settle();
-    if (left.beyond_sensors && selection_.find_thoroughly(left.structured)) left = settle();
     if (left.structured && selection_.find_without_each()) left = settle();
+    if (left.beyond_sensors && selection_.find_thoroughly(left.structured)) left = settle();
     return left;
   }
 
