@@ -246,8 +246,7 @@ class Diagnostician {
     ResidualTests left = examine_fit(search_.data_of(fitted), fitted, policy_, budget_);
     if (!left.structured) compare_held_out(search_, fits_.judged(), noise, left);
     if (left.structured) return left;
-    if (const auto impossible =
-            sentence_on_impossible_scale(fits_.known(), fits_.effects(), policy_.correction)) {
+    if (const auto impossible = sentence_on_impossible_scale(fits_.known(), fits_.effects())) {
       left.structured = true;
       left.sentence = *impossible;
     }

@@ -20,13 +20,12 @@ std::pair<double, const FreeParameter*> scale_of(const Hypothesis& known, std::s
 }  // namespace
 
 std::optional<std::string> sentence_on_impossible_scale(const Hypothesis& known,
-                                                        const std::vector<std::size_t>& effects,
-                                                        const CorrectionPolicy& policy) {
+                                                        const std::vector<std::size_t>& effects) {
   std::optional<std::string> sentence;
   for (const std::size_t effect : effects) {
     const auto [scale, parameter] = scale_of(known, effect);
     if (parameter == nullptr) continue;
-    const EndOfRange end = end_of_range(scale, parameter->low, parameter->high, policy);
+    const EndOfRange end = end_of_range(scale, parameter->low, parameter->high);
     if (end == EndOfRange::none) continue;
     std::ostringstream text;
     text.precision(3);

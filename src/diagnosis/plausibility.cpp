@@ -57,9 +57,9 @@ bool is_within_prior(double value, double prior_mean, double prior_sigma, const 
   return std::abs(value - prior_mean) < policy.noticeable_z * prior_sigma;
 }
 
-EndOfRange end_of_range(double scale, double low, double high, const CorrectionPolicy& policy) {
-  if (scale < low * (1.0 + policy.end_of_range)) return EndOfRange::low;
-  if (scale < high * (1.0 - policy.end_of_range)) return EndOfRange::none;
+EndOfRange end_of_range(double scale, double low, double high) {
+  if (scale < low * (1.0 + end_tolerance)) return EndOfRange::low;
+  if (scale < high * (1.0 - end_tolerance)) return EndOfRange::none;
   return EndOfRange::high;
 }
 
@@ -67,8 +67,8 @@ bool is_doubtful(double scale, const PriorPolicy& policy) {
   return !(std::abs(std::log(scale)) < policy.doubtful_scale);
 }
 
-bool shows_on_encoder(double offset_rad, double resolution_rad) {
-  return !(std::abs(offset_rad) < resolution_rad);
+bool shows_on_encoder(double offset_rad, double resolution_rad, const CorrectionPolicy& policy) {
+  return !(std::abs(offset_rad) < policy.min_angle_offset_steps * resolution_rad);
 }
 
 bool are_bristles_short(double breakaway_n, double stiffness_n_per_m, double travel_m,

@@ -30,13 +30,15 @@ bool is_within_prior(double value, double prior_mean, double prior_sigma, const 
 
 /// Where a scale is at an end of what it may be, and stands for something else.
 enum class EndOfRange { none, low, high };
-EndOfRange end_of_range(double scale, double low, double high, const CorrectionPolicy& policy);
+EndOfRange end_of_range(double scale, double low, double high);
+/// Relative to the end: far larger than the distance that the last step of a fit leaves.
+inline constexpr double end_tolerance = 1e-3;
 
 /// A number of the plant file that is off by more than a data sheet is.
 bool is_doubtful(double scale, const PriorPolicy& policy);
 
-/// An offset of the angle by a step of its encoder, or more: this far its counts show it.
-bool shows_on_encoder(double offset_rad, double resolution_rad);
+/// An offset of the angle that its encoder shows.
+bool shows_on_encoder(double offset_rad, double resolution_rad, const CorrectionPolicy& policy);
 
 /// Bristles that bend over a good part of the track before they slide are a spring by another name.
 bool are_bristles_short(double breakaway_n, double stiffness_n_per_m, double travel_m,

@@ -81,9 +81,8 @@ struct CorrectionPolicy {
   /// [1] The factor by which priors are widened in the final fits. The plant file still has weight there, but
   /// less, where the data correct it. Chosen.
   double prior_widening = 4.0;
-  /// [1] A scale within this relative distance of the end of its range is at the end, so it stands for
-  /// something else. Far larger than the distance that the last optimiser step leaves. Chosen.
-  double end_of_range = 1e-3;
+  /// [encoder steps] A smaller offset of the angle is not visible in the encoder's counts. Chosen.
+  double min_angle_offset_steps = 1.5;
 };
 
 /// What the data would have shown.

@@ -58,11 +58,11 @@ TEST(Correction, IsAsBelievedWithinWhatCoefficientsMove) {
 }
 
 TEST(Scale, IsAtAnEndOfItsRangeJustBeforeIt) {
-  const double low = 0.3 * (1.0 + policy.end_of_range), high = 3.0 * (1.0 - policy.end_of_range);
-  EXPECT_EQ(end_of_range(below(low), 0.3, 3.0, policy), EndOfRange::low);
-  EXPECT_EQ(end_of_range(low, 0.3, 3.0, policy), EndOfRange::none);
-  EXPECT_EQ(end_of_range(below(high), 0.3, 3.0, policy), EndOfRange::none);
-  EXPECT_EQ(end_of_range(high, 0.3, 3.0, policy), EndOfRange::high);
+  const double low = 0.3 * (1.0 + end_tolerance), high = 3.0 * (1.0 - end_tolerance);
+  EXPECT_EQ(end_of_range(below(low), 0.3, 3.0), EndOfRange::low);
+  EXPECT_EQ(end_of_range(low, 0.3, 3.0), EndOfRange::none);
+  EXPECT_EQ(end_of_range(below(high), 0.3, 3.0), EndOfRange::none);
+  EXPECT_EQ(end_of_range(high, 0.3, 3.0), EndOfRange::high);
 }
 
 TEST(Scale, IsDoubtfulBeyondADataSheet) {
@@ -72,11 +72,11 @@ TEST(Scale, IsDoubtfulBeyondADataSheet) {
   EXPECT_TRUE(is_doubtful(std::exp(-prior.doubtful_scale - 1e-9), prior));
 }
 
-TEST(AngleOffset, ShowsFromAStepOn) {
-  const double step = 0.001;
-  EXPECT_FALSE(shows_on_encoder(below(step), step));
-  EXPECT_TRUE(shows_on_encoder(step, step));
-  EXPECT_TRUE(shows_on_encoder(-step, step));
+TEST(AngleOffset, ShowsFromAStepAndAHalfOn) {
+  const double step = 0.001, min_offset = policy.min_angle_offset_steps * step;
+  EXPECT_FALSE(shows_on_encoder(below(min_offset), step, policy));
+  EXPECT_TRUE(shows_on_encoder(min_offset, step, policy));
+  EXPECT_TRUE(shows_on_encoder(-min_offset, step, policy));
 }
 
 TEST(Bristles, AreShortWithinATenthOfTheTravel) {
