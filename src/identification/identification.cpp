@@ -349,8 +349,8 @@ class Identifier {
     for (const std::string_view kind : kinds) {
       names += (names.empty() ? "" : " and ") + std::string(kind);
       const std::size_t effect = effect_number(kind);
-      sized = sized && best.plant.find(effect)->values[0] >
-                           policy_.significance.certain_z * sigma_of(best, effect, 0);
+      sized = sized &&
+              best.plant.find(effect)->values[0] > policy_.significance.certain_z * sigma_of(best, effect, 0);
     }
     const bool kept = evidence > policy_.acceptance.min_evidence && sized;
     const std::string size =
