@@ -239,9 +239,9 @@ std::optional<Withdrawal> trend_of_place(const Search& search, const Hypothesis&
     if (search.is_nuisance(effect.number) || !goes_last(shape)) continue;
     if (!null) null.emplace(search, known);
     if (null->track_force() == nullptr) return std::nullopt;
-    const double saved = null->saved_by(effect, shape);
-    const bool is_noticed = null->certainty_of(saved, shape) > policy.significance.noticeable_z;
-    if (!is_noticed && saved < policy.acceptance.overwhelming_evidence)
+    const double evidence = null->saved_by(effect, shape) - search.penalty_of(known, effect.number);
+    const bool is_noticed = null->certainty_of(evidence, shape) > policy.significance.noticeable_z;
+    if (!is_noticed && evidence < policy.acceptance.overwhelming_evidence)
       return Withdrawal{effect.number, as_well};
   }
   return std::nullopt;
