@@ -220,8 +220,8 @@ std::optional<Withdrawal> outdone_by_place(Search& search, const Hypothesis& kno
     const double saved = null->saved_by(effect, shape);
     const double evidence = saved - search.penalty_of(known, effect.number);
     if (!(evidence < least)) continue;
-    const bool is_noticed = shape == Shape::not_of_place || null->certainty_of(saved, shape) > noticeable_z;
-    const bool may_be_average = (shape == Shape::slope || shape == Shape::not_of_place) && is_noticed;
+    const bool may_be_average = shape == Shape::not_of_place ||
+                                (shape == Shape::slope && null->certainty_of(saved, shape) > noticeable_z);
     const Needed needed = may_be_average ? how_needed(search, judged, effects, found.effect) : Needed::no;
     if (needed == Needed::by_itself) continue;
     least = evidence;

@@ -42,12 +42,14 @@ struct SignificancePolicy {
   /// draws, of the slow residual beside white noise (a disturbance of 10 Hz reaches 1.8, measured on the
   /// matrix), and of the standard error beside the one that the evidence of an effect suggests. An effect
   /// stays, even if a force of the place accounts for it, if the held-out error is so many times larger
-  /// without it and with a constant force in its place. Chosen.
+  /// without it and with a constant force in its place. A curve that lowers this error by more becomes part
+  /// of the model. Chosen.
   double clear_ratio = 2.0;
   /// [ln of a ratio] A change of an error by less is not visible: a tenth. A simulation that is further off
   /// than the sensor noise by less leaves nothing to be tested. An effect goes if the simulations of held-out
   /// segments are further off with it by this and by what may be chance. So does the fitted value of a number
-  /// that moved further than believed. Chosen.
+  /// that moved further than believed. A curve that lowers the error by more shows that something is missing.
+  /// Chosen.
   double visible_change = 0.1;
 };
 
