@@ -1,6 +1,7 @@
 // Which name came next to the one that was taken.
 #include <gtest/gtest.h>
 
+#include "diagnosis/search_budget.hpp"
 #include "upright/diagnosis/diagnosis.hpp"
 #include "upright/model/registry.hpp"
 
@@ -20,7 +21,7 @@ Trial trial_of(std::size_t round, const char* kind, double evidence, bool taken 
 class NextBestName : public testing::Test {
  protected:
   NextBestName() {
-    diagnosis_.trials = {trial_of(0, "coulomb_friction", 9000.0, true), trial_of(0, "voltage_offset", 2900.0),
+    diagnosis_.trials = {trial_of(0, "coulomb_friction", 9000.0, true),
                          trial_of(1, "viscous_asymmetry", 900.0, true), trial_of(1, "constant_force", 700.0),
                          trial_of(1, "cable_spring", 690.0)};
   }
@@ -43,8 +44,13 @@ TEST_F(NextBestName, IsOfTheSameRoundTheBestFirst) {
   EXPECT_EQ(kind_of(best.others[1]->effect), "cable_spring");
 }
 
-TEST_F(NextBestName, IsNotOneThatComesNowhereNear) {
-  EXPECT_TRUE(of("coulomb_friction").others.empty());
+TEST_F(NextBestName, IsOneAboveAShareOfTheEvidenceAndNoneBelowIt) {
+  const double limit = 9000.0 * SearchBudget{}.resembling_share;
+  diagnosis_.trials.push_back(trial_of(0, "voltage_gain", 1.01 * limit));
+  diagnosis_.trials.push_back(trial_of(0, "voltage_offset", 0.99 * limit));
+  const NextBest best = of("coulomb_friction");
+  ASSERT_EQ(best.others.size(), 1u);
+  EXPECT_EQ(kind_of(best.others[0]->effect), "voltage_gain");
 }
 
 TEST_F(NextBestName, IsNotOneThatWasRefusedForAllItsEvidence) {
