@@ -34,7 +34,7 @@ double order_of_magnitude(const ParameterInfo& info, const DataRange& range, con
   double order = 0.0;
   if (info.unit == "N") order = force;
   if (info.unit == "N/m" && travel > 0.0) order = force / travel;
-  if (info.unit == "N/(m/s)" && speed > 0.0) order = force / speed;
+  if (info.unit == "N s/m" && speed > 0.0) order = force / speed;
   if (info.unit == "N s^2/m^2" && speed > 0.0) order = force / (speed * speed);
   const double torque = usual_torque_nm(range, prior);
   const double rate = range.pendulum_rate_radps;

@@ -157,7 +157,7 @@ double GaussNewton::sample_count() const {
 }
 
 void GaussNewton::descend(double& objective) {
-  double damping = min_damping;
+  double damping = negligible_damping;
   converged_ = false;
   for (int iteration = 0;
        iteration < options_.max_iterations && std::isfinite(objective) && is_within_bound(); ++iteration) {
@@ -200,9 +200,8 @@ double GaussNewton::try_steps(double objective, double min_fall, double& damping
     }
     damping = std::max(damping, min_damping) * 30.0;
   }
-  // Where a step had to be damped, the next one has to be too.
-  if (next_objective < objective && !std::isfinite(rejected))
-    damping = std::max(damping * 0.1, negligible_damping);
+  // Where a step had to be damped, the next one has to be too, but less.
+  if (next_objective < objective) damping = std::max(damping * 0.1, negligible_damping);
   return next_objective;
 }
 

@@ -215,5 +215,27 @@ TEST(Fit, ConvergesFromFarAwayWhereTheCartRests) {
   }
 }
 
+// Friction and back-EMF brake alike: only the belief in the plant file tells them apart, and it is next to
+// nothing beside what the data say of the sum.
+TEST(Fit, FollowsTheBeliefWhereTheDataLeaveItOpen) {
+  const Plant truth = cart_alone();
+  const std::vector<Measurement> runs =
+      square_and_multisine({.plant = truth, .cart_step_m = 2e-6}, 500.0, 20.0, 6.0);
+  const FitData data{&runs, cut_segments(runs)};
+  const std::size_t friction = effect_number("viscous_friction"), back_emf = effect_number("back_emf");
+  Plant guess = truth;
+  guess.set("viscous_friction", {0.1});
+  guess.set("back_emf", {1.4});
+  const std::vector<FreeParameter> free = {
+      {.effect = friction, .low = 0.0, .high = 100.0, .scale = 1.0},
+      {.effect = back_emf, .low = 0.1, .high = 10.0, .scale = 0.1, .prior_mean = 1.0, .prior_sigma = 0.05}};
+  FitOptions few_steps;
+  few_steps.max_iterations = 3;
+  const FitPoint start{guess, estimate_initial_states(runs, data.segments, guess), {.force = 0.1}};
+  const Plant found = fit(data, start, free, few_steps).point.plant;
+  EXPECT_NEAR(found.find(back_emf)->values[0], 1.0, 0.005);
+  EXPECT_NEAR(found.find(friction)->values[0], truth.find(friction)->values[0], 0.1);
+}
+
 }  // namespace
 }  // namespace upright
