@@ -198,10 +198,10 @@ double GaussNewton::try_steps(double objective, double min_fall, double& damping
       linearised_.swap(former_);
       rejected = next.predicted_reduction;
     }
-    damping = std::max(damping, min_damping) * 30.0;
+    damping = std::max(damping * damping_growth, first_damping);
   }
   // Where a step had to be damped, the next one has to be too, but less.
-  if (next_objective < objective) damping = std::max(damping * 0.1, negligible_damping);
+  if (next_objective < objective) damping = std::max(damping * damping_decay, negligible_damping);
   return next_objective;
 }
 

@@ -68,10 +68,13 @@ class GaussNewton {
   double work_samples() const { return work_samples_; }
 
  private:
-  static constexpr double min_damping = 1e-4;  ///< of a first step
-  /// Parameters that are one force are told apart by what is believed of them alone: next to nothing beside
-  /// what is known of each by itself, and damping goes by that.
+  /// Of a first step. Damping goes by what the data say of each parameter. Where two parameters are one
+  /// force, only the belief tells them apart: next to nothing beside that, and a step along the two must not
+  /// be damped.
   static constexpr double negligible_damping = 1e-9;
+  static constexpr double first_damping = 3e-3;   ///< after an undamped step that failed
+  static constexpr double damping_growth = 30.0;  ///< after a damped step that failed
+  static constexpr double damping_decay = 0.1;    ///< after a step that was taken
 
   struct ReducedEquations;
 
