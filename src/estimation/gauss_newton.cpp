@@ -301,15 +301,22 @@ void GaussNewton::move_parameters(Eigen::VectorXd& delta, Step& result) const {
 void GaussNewton::move_initial_states(const ReducedEquations& reduced, const Eigen::VectorXd& delta,
                                       Step& result) const {
   constexpr double longest[state_count] = {0.01, 0.3, 0.5, 3.0, 0.01, 0.01, 0.5};
+  const Dynamics<double> dynamics(make_model<double>(result.point.plant));
   Eigen::VectorXd way(state_count + delta.size());
   way.tail(delta.size()) = delta;
   for (std::size_t s = 0; s < linearised_.size(); ++s) {
-    const auto values = as_array(result.point.starts[s]);
+    PlantState<double>& start = result.point.starts[s];
+    const auto values = as_array(start);
     way.head<state_count>() = reduced.base[s] - reduced.back[s] * delta;
     for (int i = 0; i < state_count; ++i) {
       result.cut_short = result.cut_short || std::abs(way[i]) > longest[i];
       way[i] = std::clamp(way[i], -longest[i], longest[i]);
       *values[static_cast<std::size_t>(i)] += way[i];
+    }
+    if (dynamics.has_bristle_state()) {
+      const double bent_m = start.bristle_m, most_m = longest_bend_m(dynamics, start);
+      start.bristle_m = std::clamp(bent_m, -most_m, most_m);
+      way[bristle_state] += start.bristle_m - bent_m;
     }
     result.predicted_reduction +=
         promise(linearised_[s].normal.information, linearised_[s].normal.score, way);

@@ -5,6 +5,7 @@
 #include <numbers>
 #include <string>
 
+#include "base/number_text.hpp"
 #include "base/parallel.hpp"
 #include "fit.hpp"
 #include "segment_start.hpp"
@@ -142,6 +143,20 @@ std::vector<PlantState<double>> initial_states(const Plant& plant, const std::ve
   return fit_initial_states(data, guess).point.starts;
 }
 
+/// Infinite numbers are no simulation.
+void refuse_diverged(const Measurement& run, const RunSimulation& simulation) {
+  for (const Segment& piece : simulation.pieces)
+    for (std::size_t k = piece.first; k <= piece.last; ++k) {
+      const bool finite = (simulation.cart_m.empty() || std::isfinite(simulation.cart_m[k])) &&
+                          (simulation.theta_rad.empty() || std::isfinite(simulation.theta_rad[k]));
+      if (finite) continue;
+      throw ConfigError("the simulation of " + run.name + " is not finite from " +
+                        number_text(run.time_s[k]) +
+                        " s on: the numbers of the plant file give forces that grow without limit or change "
+                        "faster than any step follows. Check its effects");
+    }
+}
+
 std::size_t max_commands(const Measurement& run, const Segment& piece, const SimulatedController* controller,
                          double delay_s) {
   std::size_t count = max_commands(run, piece);
@@ -181,6 +196,7 @@ std::vector<RunSimulation> simulate_runs(const Plant& plant, const std::vector<M
   });
   for (std::size_t r = 0; r < runs.size(); ++r) {
     RunSimulation& simulation = simulations[r];
+    refuse_diverged(runs[r], simulation);
     simulation.cart_error_m = channel_error(runs[r], simulation, runs[r].cart_m, simulation.cart_m);
     simulation.theta_error_rad = channel_error(runs[r], simulation, runs[r].theta_rad, simulation.theta_rad);
   }

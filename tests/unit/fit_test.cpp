@@ -215,6 +215,30 @@ TEST(Fit, ConvergesFromFarAwayWhereTheCartRests) {
   }
 }
 
+// Such bristles would explain the first milliseconds of any motion.
+TEST(Fit, BendsBristlesNoFurtherThanFrictionHoldsThem) {
+  constexpr double stiffness_n_per_m = 4000.0, friction_n = 3.0, rate_hz = 200.0;
+  Plant plant = cart_alone();
+  plant.set("coulomb_friction", {friction_n});
+  plant.set("bristle_friction", {stiffness_n_per_m, 50.0});
+  for (const double kink_mps : {-0.2, -0.05, 0.05, 0.2}) {
+    Measurement run;
+    run.name = "run";
+    run.cart_resolution_m = 1e-6;
+    for (int k = 0; k < 20; ++k) {
+      const double time_s = k / rate_hz;
+      run.time_s.push_back(time_s);
+      run.voltage_v.push_back(0.0);
+      run.cart_m.push_back(0.2 * time_s + kink_mps * std::max(time_s - 0.02, 0.0));
+    }
+    const std::vector<Measurement> runs = {run};
+    const FitData data{&runs, {{0, 0, run.size() - 1}}};
+    const FitPoint guess{plant, estimate_initial_states(runs, data.segments, plant), {}};
+    const PlantState<double> start = fit_initial_states(data, guess).point.starts[0];
+    EXPECT_LE(std::abs(start.bristle_m), friction_n / stiffness_n_per_m) << kink_mps;
+  }
+}
+
 // Friction and back-EMF brake alike: only the belief in the plant file tells them apart, and it is next to
 // nothing beside what the data say of the sum.
 TEST(Fit, FollowsTheBeliefWhereTheDataLeaveItOpen) {

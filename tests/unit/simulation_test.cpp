@@ -187,6 +187,13 @@ TEST(Simulation, OfAClampedCartSwingsAsEllipticIntegralsSay) {
   EXPECT_TRUE(std::isnan(simulation.cart_error_m.rmse));
 }
 
+TEST(Simulation, RefusesForcesWithoutLimit) {
+  const Measurement run = damped_motion(even_times(500.0, 1.0), 0.0, 0.1);
+  Plant plant = damped_cart();
+  plant.set("cable_spring", {1e308, -1.0});
+  EXPECT_THROW(simulated(plant, run), ConfigError);
+}
+
 TEST(Simulation, RefusesWhatCannotBeCompared) {
   Measurement swing = damped_motion(even_times(500.0, 1.0), 0.0, 0.0);
   swing.theta_rad = swing.cart_m;
