@@ -53,7 +53,7 @@ class Diagnostician {
         plant_(plant),
         runs_(record.runs),
         options_(options),
-        data_(checked(split(runs_, which, policy_.excitation.arm_m, policy_.excitation.speed_window_s))),
+        data_(split(runs_, which, policy_.excitation.arm_m, policy_.excitation.speed_window_s)),
         work_samples_(options.search_bound * (sample_count(data_.train) + sample_count(data_.held))),
         bound_(work_samples_),
         search_(plant_, runs_, bounded(data_.train), bounded(data_.held), policy_, budget_),
@@ -108,6 +108,8 @@ class Diagnostician {
                        [&](std::size_t effect) { return !search_.is_nuisance(effect); });
   }
   bool is_disturbed() const { return disturbed_; }  ///< by more than is usual
+  /// Minus twice the log likelihood of all runs, and of the priors, with what is named in the end.
+  double objective_of_all_runs() const { return fits_.known().train.objective; }
   /// Of what is unexplained: whether held-out runs alone may show it, or contradict the others to the end.
   bool misses_held_out_excitation() const {
     return selection_.contradicted() || largest_voltage_is_held_out(data_) ||
@@ -115,12 +117,6 @@ class Diagnostician {
   }
 
  private:
-  static DataSplit checked(DataSplit data) {
-    if (data.train.segments.empty())
-      throw ConfigError("no part of the data is long enough to simulate: record longer runs");
-    return data;
-  }
-
   const FitData& bounded(FitData& data) {
     data.bound = &bound_;
     return data;
@@ -548,8 +544,11 @@ void look_further(const Plant& plant, const Record& record, const DiagnosisOptio
       options.report_progress(0.02, "repeating the search with other runs held out");
       second.emplace(plant, record, options, HeldOut::other);
       Diagnosis other = second->run(!unexplained);
+      // Each search judges by its own held-out runs; between the two all runs decide.
+      const bool fits = second->objective_of_all_runs() <
+                        first.objective_of_all_runs() + SelectionPolicy{}.acceptance.min_evidence;
       const bool explains = other.verdict == Verdict::explained || second->is_disturbed();
-      if (explains && (unexplained || second->found_missing_effect())) {
+      if (fits && explains && (unexplained || second->found_missing_effect())) {
         second->describe_what_is_left(other);
         other.notes.emplace_back(
             "the runs held out at first show what the others alone do not: others were held out instead");

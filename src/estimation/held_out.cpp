@@ -5,6 +5,8 @@
 #include <numeric>
 #include <utility>
 
+#include "upright/base/error.hpp"
+
 namespace upright {
 
 namespace {
@@ -51,6 +53,8 @@ double sample_count(const FitData& data) {
 
 DataSplit split(const std::vector<Measurement>& runs, HeldOut which, double arm_m, double speed_window_s) {
   const std::vector<Segment> segments = cut_segments(runs);
+  if (segments.empty())
+    throw ConfigError("no part of the data is long enough to simulate: record longer runs");
   DataSplit result;
   result.train.runs = result.held.runs = &runs;
   std::vector<Segment> whole;

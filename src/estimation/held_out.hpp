@@ -24,7 +24,7 @@ double sample_count(const FitData& data);
 enum class HeldOut { middle, other, end };
 
 /// Holds out a third. The excitation is the RMS of the speeds of the cart and of the tip of a pendulum of
-/// length `arm_m`, computed as differences over `speed_window_s`.
+/// length `arm_m`, computed as differences over `speed_window_s`. Throws ConfigError if no run has a segment.
 DataSplit split(const std::vector<Measurement>& runs, HeldOut which, double arm_m, double speed_window_s);
 
 /// Whether the runs that are held out are driven by a larger voltage than all others. So they alone show what
