@@ -339,11 +339,14 @@ std::vector<std::vector<double>> search_starts(std::size_t effect, const DataRan
     start.push_back(std::isfinite(parameter.neutral)
                         ? (parameter.neutral == 1.0 ? 1.0 : 0.1 * order_of_magnitude(parameter, range, prior))
                         : parameter.typical);
-  if (info.parameters.size() > 1 || !(info.parameters[0].range.low < 0.0)) return {start};
+  if (info.parameters.size() > 1) return {start};
+  const ParameterInfo& size = info.parameters[0];
   // A dry level is not below zero: where no other friction is known, nothing grows from nothing.
-  if (info.dry) return {{start[0]}, {-start[0]}};
-  // Other effects of either sign start at nothing, so that the sign is the data's.
-  return {{0.0}};
+  if (info.dry && size.range.low < 0.0) return {{start[0]}, {-start[0]}};
+  // A smooth force starts at nothing. Its sign is the data's, and no guess has to be taken back: in precise
+  // data that is so much that what a first step promises says nothing.
+  const bool may_vanish = size.neutral == 0.0 && size.range.low <= 0.0 && !size.range.low_open;
+  return {{!info.dry && may_vanish ? 0.0 : start[0]}};
 }
 
 }  // namespace upright

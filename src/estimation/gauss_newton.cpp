@@ -341,48 +341,47 @@ void GaussNewton::move_start_positions(const Eigen::VectorXd& delta, Step& resul
   }
 }
 
-/// Solves for the parameters; those held at a bound by the data stay there, and no step is longer than makes
-/// sense.
+/// Solves for the parameters. One that would go beyond its range, or further than makes sense, goes as far as
+/// it may, and the others are solved again for that: parameters that are one force change together.
 Eigen::VectorXd GaussNewton::bounded_step(const ReducedEquations& reduced, double damping,
                                           bool& cut_short) const {
   const Eigen::Index np = reduced.score.size();
-  std::vector<bool> held(static_cast<std::size_t>(np), false);
   Eigen::VectorXd delta = Eigen::VectorXd::Zero(np);
-  for (int pass = 0; pass < 3; ++pass) {
-    std::vector<Eigen::Index> moving;
-    for (Eigen::Index j = 0; j < np; ++j)
-      if (!held[static_cast<std::size_t>(j)]) moving.push_back(j);
-    if (moving.empty()) break;
-    const Eigen::VectorXd solved = solve_for(moving, reduced, damping);
-    delta.setZero();
-    bool again = false;
+  std::vector<Eigen::Index> moving(static_cast<std::size_t>(np));
+  std::iota(moving.begin(), moving.end(), Eigen::Index{0});
+  for (bool again = true; again && !moving.empty();) {
+    for (const Eigen::Index j : moving) delta[j] = 0.0;
+    const Eigen::VectorXd solved = solve_for(moving, delta, reduced, damping);
+    std::vector<Eigen::Index> free;
     for (std::size_t a = 0; a < moving.size(); ++a) {
       const Eigen::Index j = moving[a];
       const FreeParameter& p = free_[static_cast<std::size_t>(j)];
-      const double value = point_.plant.find(p.effect)->values[p.index];
-      const double limit = longest_step(p, value), at = solved[static_cast<Eigen::Index>(a)];
-      const double wanted = std::isfinite(at) ? at * p.scale : 0.0;
-      delta[j] = std::clamp(wanted, -limit, limit);
-      cut_short = cut_short || delta[j] != wanted;
-      const bool below = value <= p.low && delta[j] < 0.0;
-      const bool above = value >= p.high && delta[j] > 0.0;
-      if (below || above) held[static_cast<std::size_t>(j)] = again = true;
+      const double value = point_.plant.find(p.effect)->values[p.index], limit = longest_step(p, value);
+      const double at = solved[static_cast<Eigen::Index>(a)], wanted = std::isfinite(at) ? at * p.scale : 0.0;
+      const double to_low = std::min(p.low - value, 0.0), to_high = std::max(p.high - value, 0.0);
+      delta[j] = std::clamp(wanted, std::max(-limit, to_low), std::min(limit, to_high));
+      if (delta[j] == wanted) free.push_back(j);
+      // What the data hold at an end of its range is where it should be.
+      const bool is_held = delta[j] == 0.0 && (to_low == 0.0 || to_high == 0.0);
+      cut_short = cut_short || (delta[j] != wanted && !is_held);
     }
-    if (!again) break;
+    again = free.size() < moving.size();
+    moving = std::move(free);
   }
   return delta;
 }
 
-/// The damped step of those parameters that move, each in units of its scale.
-Eigen::VectorXd GaussNewton::solve_for(const std::vector<Eigen::Index>& moving,
+/// Of the `moving` parameters, in units of their scales. The others go by `delta`.
+Eigen::VectorXd GaussNewton::solve_for(const std::vector<Eigen::Index>& moving, const Eigen::VectorXd& delta,
                                        const ReducedEquations& reduced, double damping) const {
   const auto n = static_cast<Eigen::Index>(moving.size());
   const auto number = [&](Eigen::Index a) { return moving[static_cast<std::size_t>(a)]; };
   const auto scale = [&](Eigen::Index a) { return free_[static_cast<std::size_t>(number(a))].scale; };
+  const Eigen::VectorXd score = reduced.score - reduced.information * delta;
   Matrix small(n, n);
   Eigen::VectorXd right(n);
   for (Eigen::Index a = 0; a < n; ++a) {
-    right[a] = reduced.score[number(a)] * scale(a);
+    right[a] = score[number(a)] * scale(a);
     for (Eigen::Index b = 0; b < n; ++b)
       small(a, b) = reduced.information(number(a), number(b)) * scale(a) * scale(b);
   }

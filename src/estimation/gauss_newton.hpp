@@ -71,7 +71,7 @@ class GaussNewton {
   /// Of a first step. Damping goes by what the data say of each parameter. Where two parameters are one
   /// force, only the belief tells them apart: next to nothing beside that, and a step along the two must not
   /// be damped.
-  static constexpr double negligible_damping = 1e-9;
+  static constexpr double negligible_damping = 1e-12;
   static constexpr double first_damping = 3e-3;   ///< after an undamped step that failed
   static constexpr double damping_growth = 30.0;  ///< after a damped step that failed
   static constexpr double damping_decay = 0.1;    ///< after a step that was taken
@@ -93,8 +93,8 @@ class GaussNewton {
   void move_initial_states(const ReducedEquations& reduced, const Eigen::VectorXd& delta, Step& result) const;
   void move_start_positions(const Eigen::VectorXd& delta, Step& result) const;
   Eigen::VectorXd bounded_step(const ReducedEquations& reduced, double damping, bool& cut_short) const;
-  Eigen::VectorXd solve_for(const std::vector<Eigen::Index>& moving, const ReducedEquations& reduced,
-                            double damping) const;
+  Eigen::VectorXd solve_for(const std::vector<Eigen::Index>& moving, const Eigen::VectorXd& delta,
+                            const ReducedEquations& reduced, double damping) const;
 
   const FitData& data_;
   const std::vector<FreeParameter>& free_;

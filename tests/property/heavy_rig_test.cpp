@@ -31,15 +31,23 @@ double found_size(const Plant& believed, const Plant& truth, std::string_view ki
   return std::numeric_limits<double>::quiet_NaN();
 }
 
-void expect_alike(std::string_view kind, std::initializer_list<double> values) {
-  Plant truth = cart_with_friction();
+void expect_alike(std::string_view kind, std::initializer_list<double> values,
+                  const Plant& file = cart_with_friction()) {
+  Plant truth = file;
   truth.set(kind, values);
-  const double size = found_size(cart_with_friction(), truth, kind);
+  const double size = found_size(file, truth, kind);
   constexpr double factor = 85.0;
   EXPECT_NEAR(size, *values.begin(), 0.05 * size) << kind;
-  EXPECT_NEAR(found_size(heavier(cart_with_friction(), factor), heavier(truth, factor), kind), factor * size,
+  EXPECT_NEAR(found_size(heavier(file, factor), heavier(truth, factor), kind), factor * size,
               0.01 * factor * size)
       << kind;
+}
+
+// The motor brakes in the same way, and its number is in the file: what is believed of it decides.
+TEST(HeavyRig, HasTheSameFriction) {
+  Plant file = cart_with_friction();
+  file.remove(effect_number("viscous_friction"));
+  expect_alike("viscous_friction", {3.5}, file);
 }
 
 TEST(HeavyRig, HasTheSameSpring) {
