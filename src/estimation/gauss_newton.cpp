@@ -157,7 +157,9 @@ double GaussNewton::sample_count() const {
 }
 
 void GaussNewton::descend(double& objective) {
-  double damping = negligible_damping;
+  // Far from the optimum the equations are not those of the optimum, and an undamped step goes astray.
+  const bool is_far = step(negligible_damping).predicted_reduction > sample_count();
+  double damping = is_far ? far_damping : negligible_damping;
   converged_ = false;
   for (int iteration = 0;
        iteration < options_.max_iterations && std::isfinite(objective) && is_within_bound(); ++iteration) {

@@ -68,9 +68,11 @@ class GaussNewton {
   double work_samples() const { return work_samples_; }
 
  private:
-  /// Of a first step. Damping goes by what the data say of each parameter. Where two parameters are one
-  /// force, only the belief tells them apart: next to nothing beside that, and a step along the two must not
-  /// be damped.
+  /// Of a first step, if it promises more than the noise of all samples is.
+  static constexpr double far_damping = 1e-4;
+  /// Of a first step near the optimum. Damping goes by what the data say of each parameter. Where two
+  /// parameters are one force, only the belief tells them apart: next to nothing beside that, and a step
+  /// along the two must not be damped.
   static constexpr double negligible_damping = 1e-12;
   static constexpr double first_damping = 3e-3;   ///< after an undamped step that failed
   static constexpr double damping_growth = 30.0;  ///< after a damped step that failed
