@@ -207,6 +207,10 @@ std::vector<std::size_t> same_force_as(std::size_t effect) {
   return others;
 }
 
+bool is_plainer_name(std::size_t a, std::size_t b) {
+  return std::max(place_among_one_force(a), place_among_one_force(b)) < one_force.size() && is_plainer(a, b);
+}
+
 std::vector<FreeParameter> correction_parameters(const Plant& plant, std::size_t effect,
                                                  const DataRange& range, const PriorPolicy& prior) {
   const EffectInfo& info = effect_registry()[effect];

@@ -71,6 +71,8 @@ bool is_plainer(std::size_t a, std::size_t b);
 
 /// The other names of one and the same force (docs/reference/effects.md); empty for an effect that has none.
 std::vector<std::size_t> same_force_as(std::size_t effect);
+/// Whether both are one and the same force, and `a` supposes less.
+bool is_plainer_name(std::size_t a, std::size_t b);
 
 /// Parameter values from which to search for an effect; several where the misfit has several valleys.
 /// Of an effect that is periodic along the track, any: periodic_starts() knows better.

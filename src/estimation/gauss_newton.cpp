@@ -24,6 +24,27 @@ using Matrix = Eigen::MatrixXd;
 /// Information on the initial state beyond the data: nearly none, enough to keep unmeasured states in place.
 constexpr double start_information[state_count] = {1.0, 1.0, 0.1, 0.01, 1e4, 1e4, 10.0};
 
+/// Of a state that stays where it is.
+constexpr double held_information = 1e30;
+
+/// Whether bristles are bent as far as they may, and the data (`score`) would bend them further.
+bool bristles_are_at_end(const Dynamics<double>& dynamics, const PlantState<double>& start, double score) {
+  constexpr double nearly = 0.999;
+  return dynamics.has_bristle_state() && score * start.bristle_m > 0.0 &&
+         std::abs(start.bristle_m) >= nearly * longest_bend_m(dynamics, start);
+}
+
+/// Changes the way of an initial state so that it bends the bristles by this much, and the others fit that.
+void bend_bristles_by(double bend_m, const NormalEquations& n, Eigen::VectorXd& way) {
+  Matrix information = n.information.topLeftCorner(state_count, state_count);
+  for (int i = 0; i < state_count; ++i) information(i, i) += start_information[i];
+  Eigen::VectorXd score = information.col(bristle_state) * (bend_m - way[bristle_state]);
+  score[bristle_state] = 0.0;
+  information(bristle_state, bristle_state) += held_information;
+  way.head<state_count>() -= solve_symmetric(information, score).col(0);
+  way[bristle_state] = bend_m;
+}
+
 /// By how much a quadratic objective falls along a way.
 double promise(const Matrix& information, const Eigen::VectorXd& slope, const Eigen::VectorXd& way) {
   return 2.0 * slope.dot(way) - way.dot(information * way);
@@ -214,10 +235,13 @@ GaussNewton::ReducedEquations GaussNewton::eliminate_initial_states(double dampi
   reduced.score = -prior_.information() * prior_.deviation(point_.plant);
   reduced.back.resize(linearised_.size());
   reduced.base.resize(linearised_.size());
+  const Dynamics<double> dynamics(make_model<double>(point_.plant));
   for (std::size_t s = 0; s < linearised_.size(); ++s) {
     const NormalEquations& n = linearised_[s].normal;
     Matrix hii = n.information.topLeftCorner(state_count, state_count);
     for (int i = 0; i < state_count; ++i) hii(i, i) += start_information[i] + damping * hii(i, i);
+    if (bristles_are_at_end(dynamics, point_.starts[s], n.score[bristle_state]))
+      hii(bristle_state, bristle_state) += held_information;
     Matrix right(state_count, np + 1);
     right << n.information.topRightCorner(state_count, np), n.score.head(state_count);
     const Matrix solved = solve_symmetric(hii, right);
@@ -310,15 +334,15 @@ void GaussNewton::move_initial_states(const ReducedEquations& reduced, const Eig
     PlantState<double>& start = result.point.starts[s];
     const auto values = as_array(start);
     way.head<state_count>() = reduced.base[s] - reduced.back[s] * delta;
+    if (dynamics.has_bristle_state()) {
+      const double most_m = longest_bend_m(dynamics, start), bent_m = start.bristle_m + way[bristle_state];
+      if (std::abs(bent_m) > most_m)
+        bend_bristles_by(std::copysign(most_m, bent_m) - start.bristle_m, linearised_[s].normal, way);
+    }
     for (int i = 0; i < state_count; ++i) {
       result.cut_short = result.cut_short || std::abs(way[i]) > longest[i];
       way[i] = std::clamp(way[i], -longest[i], longest[i]);
       *values[static_cast<std::size_t>(i)] += way[i];
-    }
-    if (dynamics.has_bristle_state()) {
-      const double bent_m = start.bristle_m, most_m = longest_bend_m(dynamics, start);
-      start.bristle_m = std::clamp(bent_m, -most_m, most_m);
-      way[bristle_state] += start.bristle_m - bent_m;
     }
     result.predicted_reduction +=
         promise(linearised_[s].normal.information, linearised_[s].normal.score, way);
