@@ -344,9 +344,10 @@ std::vector<StepwiseSelection::Finalist> StepwiseSelection::fit_finalists(
   for (const ScreenedCandidate& s : screened) ranking.push_back(&s);
   std::stable_sort(ranking.begin(), ranking.end(),
                    [](const ScreenedCandidate* a, const ScreenedCandidate* b) { return a->gain > b->gain; });
-  for (std::size_t i = 1; i < ranking.size(); ++i)  // names of one force differ by rounding alone
+  constexpr double rounding = 0.01;  // [evidence] by which two names of one force differ
+  for (std::size_t i = 1; i < ranking.size(); ++i)
     if (is_plainer_name(ranking[i]->effect, ranking[i - 1]->effect) &&
-        ranking[i - 1]->gain < ranking[i]->gain + 0.01)
+        ranking[i - 1]->gain < ranking[i]->gain + rounding)
       std::swap(ranking[i], ranking[i - 1]);
   if (round == 0)
     for (const ScreenedCandidate* s : ranking)

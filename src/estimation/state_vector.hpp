@@ -19,9 +19,9 @@ auto as_array(State& s) -> std::array<decltype(&s.cart_m), state_count> {
   return {&s.cart_m, &s.theta_rad, &s.cart_mps, &s.theta_radps, &s.bristle_m, &s.attached_m, &s.attached_mps};
 }
 
-/// By how much bristles can be bent [m]: no further than friction holds them (Canudas de Wit et al., A new
-/// model for control of systems with friction, IEEE Trans. Autom. Control 40 (1995), property 1). A state
-/// beyond it snaps back in no time, which no step length follows.
+/// By how much bristles can be bent [m]: no further than friction holds them (the LuGre model, IEEE Trans.
+/// Autom. Control 40 (1995) 419, property 1). A state beyond it snaps back in no time, which no step length
+/// follows.
 inline double longest_bend_m(const Dynamics<double>& dynamics, const PlantState<double>& state) {
   if (dynamics.depends_on_load() || dynamics.changes_with_time())
     return std::numeric_limits<double>::infinity();
