@@ -24,8 +24,25 @@ using Matrix = Eigen::MatrixXd;
 /// Information on the initial state beyond the data: nearly none, enough to keep unmeasured states in place.
 constexpr double start_information[state_count] = {1.0, 1.0, 0.1, 0.01, 1e4, 1e4, 10.0};
 
+/// Of the first states of a segment's start: what the data say, and the little beyond them.
+Matrix information_of_start(const NormalEquations& n, int states = state_count) {
+  Matrix information = n.information.topLeftCorner(states, states);
+  for (int i = 0; i < states; ++i) information(i, i) += start_information[i];
+  return information;
+}
+
 /// Of a state that stays where it is.
 constexpr double held_information = 1e30;
+
+/// By how much bristles can be bent [m]: no further than friction holds them (the LuGre model, IEEE Trans.
+/// Autom. Control 40 (1995) 419, property 1). A state beyond it snaps back in no time, which no step length
+/// follows.
+double longest_bend_m(const Dynamics<double>& dynamics, const PlantState<double>& state) {
+  if (dynamics.depends_on_load() || dynamics.changes_with_time()) return infinity;
+  const double level_n = std::max(dynamics.cart_dry_level(state.cart_m, 0.0, 1.0),
+                                  dynamics.cart_dry_level(state.cart_m, 0.0, -1.0));
+  return level_n / dynamics.bristle_stiffness();
+}
 
 /// Whether bristles are bent as far as they may, and the data (`score`) would bend them further.
 bool bristles_are_at_end(const Dynamics<double>& dynamics, const PlantState<double>& start, double score) {
@@ -36,8 +53,7 @@ bool bristles_are_at_end(const Dynamics<double>& dynamics, const PlantState<doub
 
 /// Changes the way of an initial state so that it bends the bristles by this much, and the others fit that.
 void bend_bristles_by(double bend_m, const NormalEquations& n, Eigen::VectorXd& way) {
-  Matrix information = n.information.topLeftCorner(state_count, state_count);
-  for (int i = 0; i < state_count; ++i) information(i, i) += start_information[i];
+  Matrix information = information_of_start(n);
   Eigen::VectorXd score = information.col(bristle_state) * (bend_m - way[bristle_state]);
   score[bristle_state] = 0.0;
   information(bristle_state, bristle_state) += held_information;
@@ -178,12 +194,12 @@ double GaussNewton::sample_count() const {
 }
 
 void GaussNewton::descend(double& objective) {
-  // Far from the optimum the equations are not those of the optimum, and an undamped step goes astray.
-  const bool is_far = step(negligible_damping).predicted_reduction > sample_count();
-  double damping = is_far ? far_damping : negligible_damping;
+  double damping = negligible_damping;
   converged_ = false;
   for (int iteration = 0;
        iteration < options_.max_iterations && std::isfinite(objective) && is_within_bound(); ++iteration) {
+    // Far from the optimum the equations are not those of the optimum, and an undamped step goes astray.
+    if (iteration == 0 && step(damping).predicted_reduction > sample_count()) damping = far_damping;
     const double min_fall = options_.tolerance * sample_count() * 0.1 + 0.02;
     const double next_objective = try_steps(objective, min_fall, damping);
     if (!(next_objective < objective)) {
@@ -206,7 +222,8 @@ double GaussNewton::try_steps(double objective, double min_fall, double& damping
   double next_objective = infinity, rejected = infinity;
   for (int attempt = 0; attempt < 4; ++attempt) {
     Step next = step(damping);
-    if (next.predicted_reduction < min_fall && attempt == 0) next = step(damping = negligible_damping);
+    if (next.predicted_reduction < min_fall && attempt == 0 && damping > negligible_damping)
+      next = step(damping = negligible_damping);
     const bool promises = next.predicted_reduction >= min_fall;
     if (!promises && !next.cut_short) break;
     // A step that hardly differs from one that was rejected is not worth looking at, nor is one that does
@@ -257,9 +274,7 @@ GaussNewton::ReducedEquations GaussNewton::eliminate_initial_states(double dampi
 namespace {
 
 ParameterEquations without_initial_state(const NormalEquations& n, Eigen::Index np) {
-  Matrix hii = n.information.topLeftCorner(state_count, state_count);
-  for (int i = 0; i < state_count; ++i) hii(i, i) += start_information[i];
-  const Matrix back = solve_symmetric(hii, n.information.topRightCorner(state_count, np));
+  const Matrix back = solve_symmetric(information_of_start(n), n.information.topRightCorner(state_count, np));
   return {n.information.bottomRightCorner(np, np) - n.information.bottomLeftCorner(np, state_count) * back,
           n.score.tail(np) - back.transpose() * n.score.head(state_count)};
 }
@@ -356,12 +371,10 @@ void GaussNewton::move_start_positions(const Eigen::VectorXd& delta, Step& resul
   constexpr int positions = 2;
   for (std::size_t s = 0; s < linearised_.size(); ++s) {
     const NormalEquations& n = linearised_[s].normal;
-    Matrix information = n.information.topLeftCorner(positions, positions);
-    for (int i = 0; i < positions; ++i) information(i, i) += start_information[i];
     const Eigen::VectorXd score =
         n.score.head(positions) -
         n.information.topRightCorner(state_count, delta.size()).topRows(positions) * delta;
-    const Eigen::VectorXd way = solve_symmetric(information, score);
+    const Eigen::VectorXd way = solve_symmetric(information_of_start(n, positions), score);
     const auto values = as_array(result.starts_at_held_speed[s]);
     for (int i = 0; i < positions; ++i) *values[static_cast<std::size_t>(i)] += way[i];
   }
