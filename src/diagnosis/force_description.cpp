@@ -152,7 +152,8 @@ Eigen::MatrixXd table_prior(const RandomCurve& curve, const CurveNodes& nodes, T
   return information;
 }
 
-/// Curves over each quantity, the one with the most evidence first.
+/// Curves over each quantity, the one with the most evidence first. A curve that held-out data contradict
+/// describes the training data alone, so it is left out.
 std::vector<Curve> curves_of(const Followed& train, const Followed& held, std::size_t many,
                              const CurvePolicy& policy) {
   std::vector<Curve> curves;
@@ -167,6 +168,7 @@ std::vector<Curve> curves_of(const Followed& train, const Followed& held, std::s
     const Eigen::VectorXd force_n = curve.mean(shown);
     const CurveEquations unseen = held.equations(nodes, over, held.arguments(over));
     const double held_evidence = 2.0 * force_n.dot(unseen.score) - force_n.dot(unseen.information * force_n);
+    if (!(held_evidence > 0.0)) continue;
     const CurveNodes few = table_nodes(along, over, curve.length(), policy);
     curves.push_back(
         {over, -curve.change(), held_evidence, few, table_prior(curve, few, over), curve.deviation(), {}});

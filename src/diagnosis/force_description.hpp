@@ -29,11 +29,11 @@ struct ForceDescription {
   FoundEffect as_effect(double gap_before, double gap_after) const;
 };
 
-/// Empty if the cart does not move, if no data are held out, if the plant file has a table already, or if the
-/// training data show no such force beyond what known effects have. `judged`: a fit to the training data,
-/// `known`: to all data. `with_trend`: a curve over the position may have a trend, because the search gave a
-/// force of this kind up. Whether the curve helps on held-out data is for the caller to judge. Throws
-/// Interrupted and BoundReached.
+/// Empty if the cart does not move, if no data are held out, if the plant file has a table already, if the
+/// training data show no such force beyond what known effects have, or if held-out data contradict it.
+/// `judged`: a fit to the training data, `known`: to all data. `with_trend`: a curve over the position may
+/// have a trend, because the search gave a force of this kind up. Whether the curve helps on held-out data is
+/// for the caller to judge. Throws Interrupted and BoundReached.
 std::optional<ForceDescription> describe_force(const Search& search, const Hypothesis& judged,
                                                const Hypothesis& known, bool with_trend);
 

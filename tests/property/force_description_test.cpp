@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "blind_case.hpp"
 #include "diagnosis/described_curve.hpp"
 #include "named_effects.hpp"
 #include "upright/diagnosis/diagnosis.hpp"
@@ -75,6 +76,20 @@ TEST(ForceDescription, EndsAtItsLevelBesideTheMeasuredTrack) {
     EXPECT_LT(curve->force_n.front(), *greatest) << seed;
   }
   EXPECT_GT(drawn, 0);
+}
+
+/// A weak dead zone in 12 s of data. The training runs show a curve over the velocity with an evidence of 46,
+/// beside which the other parameters move, and the held-out run contradicts it.
+TEST(ForceDescription, NeedsHeldOutRunsThatAgree) {
+  blind::Request request;
+  request.hidden = {"voltage_dead_zone"};
+  request.size = blind::Size::weak;
+  request.seed = 20261225ull * 1000003ull + 13ull;
+  request.condition = blind::Condition::laboratory;
+  request.max_samples = 6000.0;
+  const blind::Case blind = make_case(request);
+  const Diagnosis d = diagnose(blind.believed, measure_all(blind));
+  EXPECT_EQ(d.verdict, Verdict::explained) << d.residual;
 }
 
 TEST(ForceDescription, DrawsNothingWhereNothingIsMissing) {
