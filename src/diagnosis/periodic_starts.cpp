@@ -154,7 +154,11 @@ std::vector<std::vector<double>> periodic_starts(std::size_t effect, const std::
     const bool near = std::any_of(starts.begin(), starts.end(), [&](const std::vector<double>& start) {
       return std::abs(1.0 / start[1] - sine.frequency_per_m) < 4.0 * spacing;
     });
-    if (!near) starts.push_back(start_at(sine, effect));
+    const auto alike = std::ranges::count_if(starts, [&](const std::vector<double>& start) {
+      const double ratio = start[1] * sine.frequency_per_m;
+      return ratio < 2.0 && ratio > 0.5;
+    });
+    if (!near && alike < budget.max_alike_pitches) starts.push_back(start_at(sine, effect));
     if (starts.size() == budget.max_pitches) break;
   }
   return starts.empty() ? any : starts;

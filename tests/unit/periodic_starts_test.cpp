@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <random>
@@ -31,12 +32,16 @@ std::vector<PlaceForce> residual_with(double cogging_n, double ripple) {
   return residual;
 }
 
-std::vector<double> first_start(std::size_t effect, const std::vector<PlaceForce>& residual) {
+std::vector<std::vector<double>> starts_of(std::size_t effect, const std::vector<PlaceForce>& residual) {
   DataRange range;
   range.cart_low_m = -0.1;
   range.cart_high_m = 0.3;
   range.longest_travel_m = 0.4;
-  return periodic_starts(effect, residual, range, PriorPolicy{}, SearchBudget{}).front();
+  return periodic_starts(effect, residual, range, PriorPolicy{}, SearchBudget{});
+}
+
+std::vector<double> first_start(std::size_t effect, const std::vector<PlaceForce>& residual) {
+  return starts_of(effect, residual).front();
 }
 
 void expect_found(std::size_t effect, const std::vector<PlaceForce>& residual) {
@@ -74,6 +79,19 @@ TEST(PeriodicStarts, EccentricEncoderIsFoundInTheForceItShows) {
     residual.push_back({x, 0.2 + mass_kg * shown_mps2 + noise_n(random), 1.0, mass_kg * v * v});
   }
   expect_found(effect_number("encoder_eccentricity"), residual);
+}
+
+// The steps of an encoder make many pitches of a few steps look likely.
+TEST(PeriodicStarts, OthersAreTriedBesideManyShortPitches) {
+  std::vector<PlaceForce> residual = residual_with(size, 0.0);
+  for (PlaceForce& at : residual)
+    for (int i = 0; i < 8; ++i)
+      at.force_n += 2.0 * size * std::sin(2.0 * std::numbers::pi * at.cart_m * (900.0 + 5.0 * i) + i);
+  const auto starts = starts_of(effect_number("cogging_force"), residual);
+  EXPECT_NEAR(starts.front()[1], 1e-3, 2e-4);
+  EXPECT_TRUE(std::ranges::any_of(starts, [](const std::vector<double>& start) {
+    return std::abs(start[1] - pitch_m) < 0.02 * pitch_m;
+  }));
 }
 
 TEST(PeriodicStarts, FewSamplesStartAnywhere) {
