@@ -127,6 +127,18 @@ std::vector<FittedSine> ranked(const std::vector<FittedSine>& sines) {
   return compared;
 }
 
+/// Whether none of these starts has the pitch of a sine, and few enough are within a factor of two of it.
+bool differs_enough(const FittedSine& sine, const std::vector<std::vector<double>>& starts,
+                    double spacing_per_m, const SearchBudget& budget) {
+  std::size_t alike = 0;
+  for (const std::vector<double>& start : starts) {
+    const double frequency_per_m = 1.0 / start[1], ratio = sine.frequency_per_m / frequency_per_m;
+    if (std::abs(frequency_per_m - sine.frequency_per_m) < 4.0 * spacing_per_m) return false;
+    if (ratio < 2.0 && ratio > 0.5) ++alike;
+  }
+  return alike < budget.max_alike_pitches;
+}
+
 }  // namespace
 
 /// An effect counts as one that repeats when a run passes some of its crests. Several runs at different
@@ -151,14 +163,7 @@ std::vector<std::vector<double>> periodic_starts(std::size_t effect, const std::
   const std::vector<FittedSine> found = periodogram(residual, unit_n, 1.0 / longest, 1.0 / shortest, spacing);
   std::vector<std::vector<double>> starts;
   for (const FittedSine& sine : ranked(found)) {
-    const bool near = std::any_of(starts.begin(), starts.end(), [&](const std::vector<double>& start) {
-      return std::abs(1.0 / start[1] - sine.frequency_per_m) < 4.0 * spacing;
-    });
-    const auto alike = std::ranges::count_if(starts, [&](const std::vector<double>& start) {
-      const double ratio = start[1] * sine.frequency_per_m;
-      return ratio < 2.0 && ratio > 0.5;
-    });
-    if (!near && alike < budget.max_alike_pitches) starts.push_back(start_at(sine, effect));
+    if (differs_enough(sine, starts, spacing, budget)) starts.push_back(start_at(sine, effect));
     if (starts.size() == budget.max_pitches) break;
   }
   return starts.empty() ? any : starts;

@@ -130,7 +130,7 @@ struct SearchBudget {
   /// [pitches] The most of these within a factor of two. The steps of an encoder make many pitches of a few
   /// steps look likely, and these must not keep out all others: the first three were about six steps, where
   /// the true pitch of 579 steps came 192nd (laboratory, seed 20261230, case 73).
-  std::ptrdiff_t max_alike_pitches = 2;
+  std::size_t max_alike_pitches = 2;
 
   /// [nodes] The nodes along the travel of a random force of the track. A force that changes within the
   /// hundredth part of the travel is still resolved; the work grows with the cube of the number. Chosen.

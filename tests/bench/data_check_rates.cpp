@@ -180,7 +180,7 @@ Case case_of(std::uint64_t seed, std::size_t number, bool laboratory) {
   for (const std::string& kind : unknown_kinds(laboratory ? Condition::laboratory : Condition::quantized))
     hidden.push_back({kind});
   Request request;
-  request.seed = seed * 1000003 + number;
+  request.seed = seed_of_case(seed, number);
   for (int i = 0; i < 4; ++i) hidden.push_back(random_pair(request.seed + static_cast<std::uint64_t>(i)));
   request.hidden = hidden[number % hidden.size()];
   request.size = static_cast<Size>((number + number / hidden.size()) % 3);

@@ -99,7 +99,7 @@ Request request_of(const Flags& flags, std::size_t number, std::string& label) {
   const std::size_t round = number / labels.size();
   label = flags.only.empty() ? labels[number % labels.size()] : flags.only;
   Request request;
-  request.seed = flags.seed * 1000003 + number;
+  request.seed = seed_of_case(flags.seed, number);
   request.size = flags.size.value_or(static_cast<Size>((number + round) % 3));
   // Drawn, so that no kind goes with a size: a round has as many places for each as sizes.
   if (flags.condition == Condition::laboratory && !flags.size)

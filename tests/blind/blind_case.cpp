@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 #include <random>
+#include <utility>
 
 #include "design/gain_design.hpp"
 #include "laboratory.hpp"
@@ -239,6 +240,14 @@ Scales rehearse(const Case& blind) {
   std::vector<Measurement> runs;
   for (const Plan& plan : blind.plans) runs.push_back(measure({.plant = blind.believed}, plan, "rehearsal"));
   return scales_of(blind.believed, runs);
+}
+
+Request laboratory_request(std::uint64_t seed, std::vector<std::string> hidden) {
+  Request request;
+  request.hidden = std::move(hidden);
+  request.seed = seed;
+  request.condition = Condition::laboratory;
+  return request;
 }
 
 Case make_case(const Request& request) {

@@ -38,6 +38,14 @@ struct Request {
   double duration_s = 0.0;  ///< of each run; 0: by the seed
 };
 
+/// The seed of a case of a matrix, from the seed of the matrix and the number of the case.
+constexpr std::uint64_t seed_of_case(std::uint64_t matrix_seed, std::uint64_t number) {
+  return matrix_seed * 1000003 + number;
+}
+
+/// For a rig of a laboratory.
+Request laboratory_request(std::uint64_t seed, std::vector<std::string> hidden = {});
+
 struct Case {
   Request request;
   Plant believed;  ///< the plant file

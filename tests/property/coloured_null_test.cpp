@@ -50,12 +50,10 @@ struct NullCase {
 /// first. On the second, a slow sprung mass was named: short segments of a balance run hold less than a
 /// period.
 TEST(ColouredNull, ADisturbedRigWithoutAnEffectGetsNone) {
-  for (const NullCase& null : {NullCase{906ull * 1000003ull + 10ull, blind::Request{}.max_samples},
-                               NullCase{20261211ull * 1000003ull + 327ull, 6000.0}}) {
-    blind::Request request;
-    request.seed = null.seed;
+  for (const NullCase& null : {NullCase{blind::seed_of_case(906, 10), blind::Request{}.max_samples},
+                               NullCase{blind::seed_of_case(20261211, 327), 6000.0}}) {
+    blind::Request request = blind::laboratory_request(null.seed);
     request.size = static_cast<blind::Size>(std::mt19937_64(request.seed)() % 3);
-    request.condition = blind::Condition::laboratory;
     request.max_samples = null.max_samples;
     const blind::Case blind = make_case(request);
     EXPECT_EQ(named_effects(measure_all(blind), blind.believed), std::set<std::string>{}) << null.seed;

@@ -81,11 +81,9 @@ TEST(ForceDescription, EndsAtItsLevelBesideTheMeasuredTrack) {
 /// A weak dead zone in 12 s of data. The training runs show a curve over the velocity with an evidence of 46,
 /// beside which the other parameters move, and the held-out run contradicts it.
 TEST(ForceDescription, NeedsHeldOutRunsThatAgree) {
-  blind::Request request;
-  request.hidden = {"voltage_dead_zone"};
+  blind::Request request =
+      blind::laboratory_request(blind::seed_of_case(20261225, 13), {"voltage_dead_zone"});
   request.size = blind::Size::weak;
-  request.seed = 20261225ull * 1000003ull + 13ull;
-  request.condition = blind::Condition::laboratory;
   request.max_samples = 6000.0;
   const blind::Case blind = make_case(request);
   const Diagnosis d = diagnose(blind.believed, measure_all(blind));

@@ -186,16 +186,8 @@ TEST(Sensors, WithoutQuantisationHaveTheStatedNoise) {
   EXPECT_NEAR(correlation(coloured, 10), 0.25e-8 * std::exp(-1.0), 0.03e-8);
 }
 
-blind::Request laboratory(std::uint64_t seed, std::vector<std::string> hidden = {}) {
-  blind::Request request;
-  request.hidden = std::move(hidden);
-  request.seed = seed;
-  request.condition = Condition::laboratory;
-  return request;
-}
-
 TEST(LaboratoryCase, FollowsFromItsRequest) {
-  blind::Request request = laboratory(21, {"coulomb_friction"});
+  blind::Request request = blind::laboratory_request(21, {"coulomb_friction"});
   request.max_samples = 1500.0;
   const blind::Case one = make_case(request), same = make_case(request);
   request.seed = 22;
@@ -219,7 +211,7 @@ TEST(LaboratoryCase, StaysWithinWhatItStates) {
   std::size_t unquantised = 0, max_runs = 0;
   constexpr std::uint64_t cases = 60;
   for (std::uint64_t seed = 0; seed < cases; ++seed) {
-    blind::Request request = laboratory(seed);
+    blind::Request request = blind::laboratory_request(seed);
     request.max_samples = 4000.0;  // two seconds at the highest rate
     const blind::Case one = make_case(request);
     lightest_kg = std::min(lightest_kg, one.believed.cart_mass_kg);
@@ -258,7 +250,7 @@ TEST(LaboratoryCase, HidesEveryKind) {
   std::uint64_t seed = 100;
   for (std::size_t i = 0; i < kinds.size(); ++i) {
     const std::string& kind = kinds[i];
-    blind::Request request = laboratory(++seed, {kind});
+    blind::Request request = blind::laboratory_request(++seed, {kind});
     request.max_samples = 1000.0;
     const blind::Case one = make_case(request);
     const bool known = i < known_kinds;

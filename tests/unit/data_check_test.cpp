@@ -325,11 +325,9 @@ TEST_F(DataCheck, IsSilentAboutEveryEffectThatACaseHides) {
 /// The voltage of a closed loop follows the motion, so a later one accounts for it too. The motor of this rig
 /// is 31 ms late, and its cart has a strong drag.
 TEST_F(DataCheck, IsSilentAboutALateMotorInAClosedLoop) {
-  blind::Request request;
-  request.hidden = {"quadratic_drag", "input_delay"};
+  blind::Request request =
+      blind::laboratory_request(blind::seed_of_case(20261220, 5), {"quadratic_drag", "input_delay"});
   request.size = blind::Size::strong;
-  request.seed = 20261220ULL * 1000003 + 5;
-  request.condition = blind::Condition::laboratory;
   request.runs = 7;
   request.rate_hz = 1000.0;
   request.duration_s = 10.0;
