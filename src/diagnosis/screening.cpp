@@ -43,53 +43,63 @@ FitPoint Search::screening_point(const Hypothesis& base) const {
   return {base.train.point.plant, screening_starts(base.train.point.starts), base.train.point.noise};
 }
 
-double Search::predicted_objective(const FitPoint& point, const std::vector<FreeParameter>& free) const {
-  const FitResult seen = fit(screening_subset_, point, free, steps_with_fixed_noise(0));
+double Search::objective_to_come(const FitResult& seen) {
   return seen.predicted_reduction ? seen.objective - *seen.predicted_reduction
                                   : -std::numeric_limits<double>::infinity();
 }
 
-std::vector<double> Search::predicted_gains(const Hypothesis& base,
-                                            const std::vector<std::size_t>& effects) const {
-  const FitPoint from = screening_point(base);
-  const double without = predicted_objective(from, base.free);
-  std::vector<double> gains;
-  for (const std::size_t effect : effects) {
-    std::set<std::size_t> added = base.added;
-    added.insert(effect);
-    const std::vector<FreeParameter> free = free_of(added);
-    double best = std::numeric_limits<double>::infinity();
-    for (const FitPoint& point : points_with(from, effect, base))
-      best = std::min(best, predicted_objective(point, free));
-    gains.push_back(std::isfinite(without) ? without - best : std::numeric_limits<double>::infinity());
+Prediction Search::prediction_of(const Hypothesis& base, std::size_t effect, double without) const {
+  std::set<std::size_t> added = base.added;
+  added.insert(effect);
+  const std::vector<FreeParameter> free = free_of(added);
+  Prediction prediction{0.0, points_with(screening_point(base), effect, base)};
+  double lowest = std::numeric_limits<double>::infinity();
+  std::vector<double> after_step;
+  for (const FitPoint& point : prediction.starts) {
+    const FitResult seen = fit(screening_subset_, point, free, steps_with_fixed_noise(0));
+    lowest = std::min(lowest, objective_to_come(seen));
+    after_step.push_back(objective_after_step(seen));
   }
-  return gains;
+  prediction.gain = without - lowest;
+  if (is_periodic(effect) && after_step.size() > 1) {
+    const auto best = std::ranges::min_element(after_step) - after_step.begin();
+    prediction.starts = {prediction.starts[static_cast<std::size_t>(best)]};
+  }
+  return prediction;
 }
 
-std::vector<FitPoint> Search::screening_points(const Hypothesis& base, std::size_t effect,
-                                               const std::vector<FreeParameter>& free) const {
-  std::vector<FitPoint> points = points_with(screening_point(base), effect, base);
-  if (!is_periodic(effect) || points.size() < 2) return points;
-  std::vector<double> promised;
-  promised.reserve(points.size());
-  for (const FitPoint& point : points)
-    promised.push_back(objective_after_step(screening_subset_, point, free));
-  return {points[static_cast<std::size_t>(std::ranges::min_element(promised) - promised.begin())]};
+std::vector<Prediction> Search::predictions(const Hypothesis& base,
+                                            const std::vector<std::size_t>& effects) const {
+  const double without =
+      objective_to_come(fit(screening_subset_, screening_point(base), base.free, steps_with_fixed_noise(0)));
+  std::vector<Prediction> predictions;
+  for (const std::size_t effect : effects) {
+    predictions.push_back(prediction_of(base, effect, without));
+    if (!std::isfinite(without)) predictions.back().gain = std::numeric_limits<double>::infinity();
+  }
+  return predictions;
 }
 
-Hypothesis Search::screened(const Hypothesis& base, std::size_t effect, double to_reach) const {
+Hypothesis Search::screened(const Hypothesis& base, std::size_t effect, const std::vector<FitPoint>& starts,
+                            double to_reach) const {
   Hypothesis h;
   h.added = base.added;
   h.added.insert(effect);
   h.free = free_of(h.added);
   h.train.objective = std::numeric_limits<double>::infinity();
-  for (const FitPoint& point : screening_points(base, effect, h.free)) {
+  for (const FitPoint& start : starts) {
     FitResult reached =
-        fit(screening_subset_, point, h.free, steps_with_fixed_noise(budget_.screening_steps));
+        fit(screening_subset_, start, h.free, steps_with_fixed_noise(budget_.screening_steps));
     if (reached.objective < h.train.objective) h.train = std::move(reached);
   }
   if (h.train.objective < to_reach) renew_noise_on_subset(h);
   return h;
+}
+
+Hypothesis Search::screened(const Hypothesis& base, std::size_t effect) const {
+  std::vector<FitPoint> starts = points_with(screening_point(base), effect, base);
+  if (is_periodic(effect)) starts = prediction_of(base, effect, base.train.objective).starts;
+  return screened(base, effect, starts, std::numeric_limits<double>::infinity());
 }
 
 Hypothesis Search::screened_pair(const Hypothesis& base, const Hypothesis& first,

@@ -45,6 +45,15 @@ struct Hypothesis {
   }
 };
 
+/// What an effect promises on a part of the training data.
+struct Prediction {
+  /// By how much the objective falls, as derivatives say at the best start; infinite if they do not reach so
+  /// far.
+  double gain = 0.0;
+  /// Where its fits begin: of several pitches, where derivatives promise the lowest objective.
+  std::vector<FitPoint> starts;
+};
+
 /// The effects that either has.
 std::set<std::size_t> effects_of_both(const Hypothesis& first, const Hypothesis& second);
 
@@ -96,14 +105,14 @@ class Search {
 
   /// Base corrections and the plant's own effects within what is believed of them.
   Hypothesis baseline();
-  /// How far the objective falls on a part of the training data when each of these is added, as its
-  /// derivatives promise it from the best of its starts: quick, and only a promise. Infinite where they do
-  /// not reach so far.
-  std::vector<double> predicted_gains(const Hypothesis& base, const std::vector<std::size_t>& effects) const;
-  /// Adds an effect to a hypothesis: a few steps from every start with the noise as it is, on a part of the
-  /// training data. The noise is estimated again only if the objective is below `to_reach` then.
-  Hypothesis screened(const Hypothesis& base, std::size_t effect,
-                      double to_reach = std::numeric_limits<double>::infinity()) const;
+  /// Of each of these effects, were it added, on a part of the training data: quick, and only a promise.
+  std::vector<Prediction> predictions(const Hypothesis& base, const std::vector<std::size_t>& effects) const;
+  /// Adds an effect to a hypothesis: a few steps from each of these starts with the noise as it is, on a part
+  /// of the training data. The noise is estimated again only if the objective is below `to_reach` then.
+  Hypothesis screened(const Hypothesis& base, std::size_t effect, const std::vector<FitPoint>& starts,
+                      double to_reach) const;
+  /// The same from the starts that its prediction has. The noise is estimated again in any case.
+  Hypothesis screened(const Hypothesis& base, std::size_t effect) const;
   /// Brings a screened hypothesis to convergence on that part, noise included.
   void converge_on_subset(Hypothesis& screened) const;
   /// Two effects at once on that part, from where each alone was fitted, to convergence.
@@ -184,12 +193,11 @@ class Search {
   bool bristles_are_short(const Hypothesis& h) const;
   /// The zero of the angle where the plant file does not state it.
   bool is_unknown_zero(std::size_t effect) const;
-  /// Of the screening subset after a step, were residuals linear; minus infinity where that says nothing.
-  double predicted_objective(const FitPoint& point, const std::vector<FreeParameter>& free) const;
-  /// Where fits of an effect to the screening subset begin: of several pitches, at the one from which the
-  /// derivatives promise the lowest objective.
-  std::vector<FitPoint> screening_points(const Hypothesis& base, std::size_t effect,
-                                         const std::vector<FreeParameter>& free) const;
+  /// The objective of a fit that goes on from here, were residuals linear; minus infinity where that says
+  /// nothing.
+  static double objective_to_come(const FitResult& seen);
+  /// `without`: the objective to come without the effect.
+  Prediction prediction_of(const Hypothesis& base, std::size_t effect, double without) const;
   /// A hypothesis's point on the screening subset alone.
   FitPoint screening_point(const Hypothesis& base) const;
   std::vector<FreeParameter> free_of(const std::set<std::size_t>& added) const;

@@ -100,27 +100,27 @@ std::vector<std::size_t> StepwiseSelection::open_candidates(Candidates which) co
   return candidates;
 }
 
-std::vector<std::size_t> StepwiseSelection::promising_candidates(const Hypothesis& from,
-                                                                 const std::vector<std::size_t>& candidates,
-                                                                 int round) {
-  const std::vector<double> predicted = search_.predicted_gains(from, candidates);
+std::vector<StepwiseSelection::Candidate> StepwiseSelection::promising_candidates(
+    const Hypothesis& from, const std::vector<std::size_t>& candidates, int round) {
+  std::vector<Prediction> predicted = search_.predictions(from, candidates);
   std::vector<std::size_t> ranking(candidates.size());
   std::iota(ranking.begin(), ranking.end(), std::size_t{0});
   std::stable_sort(ranking.begin(), ranking.end(),
-                   [&](std::size_t a, std::size_t b) { return predicted[a] > predicted[b]; });
+                   [&](std::size_t a, std::size_t b) { return predicted[a].gain > predicted[b].gain; });
   double best = 0.0;
-  for (const double gain : predicted)
-    if (std::isfinite(gain)) best = std::max(best, gain);
-  std::vector<std::size_t> chosen;
+  for (const Prediction& of : predicted)
+    if (std::isfinite(of.gain)) best = std::max(best, of.gain);
+  std::vector<Candidate> chosen;
   std::size_t kept = 0;
   for (const std::size_t i : ranking) {
-    const bool unknown = !std::isfinite(predicted[i]);
-    const bool is_high = kept < budget_.min_screened || predicted[i] > budget_.predicted_gain_share * best;
-    if (unknown || (is_high && predicted[i] > least_predicted_gain())) {
-      chosen.push_back(candidates[i]);
+    const double gain = predicted[i].gain;
+    const bool unknown = !std::isfinite(gain);
+    const bool is_high = kept < budget_.min_screened || gain > budget_.predicted_gain_share * best;
+    if (unknown || (is_high && gain > least_predicted_gain())) {
+      chosen.push_back({candidates[i], std::move(predicted[i].starts)});
       kept += unknown ? 0 : 1;
     } else {
-      if (round == 0) note_candidate(candidates[i], predicted[i]);
+      if (round == 0) note_candidate(candidates[i], gain);
     }
   }
   return chosen;
@@ -317,22 +317,21 @@ std::vector<StepwiseSelection::ScreenedCandidate> StepwiseSelection::screen(int 
   options_.report_progress(done, "ranking the candidates");
   Hypothesis from = current_;
   if (with_low_noise) from.train.point.noise = reduced_process_noise(from.train.point.noise);
-  const std::vector<std::size_t> candidates = promising_candidates(from, open_candidates(which), round);
+  const std::vector<Candidate> candidates = promising_candidates(from, open_candidates(which), round);
   Hypothesis reference = search_.descended_on_subset(from);
   // What hardly gains with the noise as it is gains no more from other noise.
   const double to_reach = reference.train.objective - least_predicted_gain();
   search_.renew_noise_on_subset(reference);
   std::vector<ScreenedCandidate> screened;
-  for (std::size_t c = 0; c < candidates.size(); ++c) {
-    options_.report_progress(
-        done + 0.02 + 0.1 * static_cast<double>(c) / static_cast<double>(candidates.size()),
-        "trying " + kind_of(candidates[c]));
-    Hypothesis h = search_.screened(from, candidates[c], to_reach);
+  double tried = 0.0;
+  for (const auto& [effect, starts] : candidates) {
+    const double share = tried++ / static_cast<double>(candidates.size());
+    options_.report_progress(done + 0.02 + 0.1 * share, "trying " + kind_of(effect));
+    Hypothesis h = search_.screened(from, effect, starts, to_reach);
     const bool failed = !std::isfinite(h.train.objective);
-    const double gain =
-        failed ? 0.0 : reference.train.objective - h.train.objective - penalty_of(candidates[c]);
-    if (round == 0) note_candidate(candidates[c], gain);
-    if (!failed) screened.push_back({candidates[c], std::move(h), gain});
+    const double gain = failed ? 0.0 : reference.train.objective - h.train.objective - penalty_of(effect);
+    if (round == 0) note_candidate(effect, gain);
+    if (!failed) screened.push_back({effect, std::move(h), gain});
   }
   return screened;
 }

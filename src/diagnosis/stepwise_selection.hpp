@@ -89,6 +89,12 @@ class StepwiseSelection {
   double finalist_evidence(std::size_t effect) const { return finalist_evidence_.at(effect); }
 
  private:
+  /// An effect that might be added, and where its fits begin.
+  struct Candidate {
+    std::size_t effect = 0;
+    std::vector<FitPoint> starts;
+  };
+
   /// A candidate after a few steps on a part of the data, and what it saves beyond its price.
   struct ScreenedCandidate {
     std::size_t effect = 0;
@@ -118,8 +124,8 @@ class StepwiseSelection {
   void note_candidate(std::size_t effect, double gain);
   /// Those that promise a share of what the best one does, some of the others, and all that cannot promise. A
   /// promise is kept within a factor of a few (measured on the matrix), so that the best is among them.
-  std::vector<std::size_t> promising_candidates(const Hypothesis& from,
-                                                const std::vector<std::size_t>& candidates, int round);
+  std::vector<Candidate> promising_candidates(const Hypothesis& from,
+                                              const std::vector<std::size_t>& candidates, int round);
 
   double penalty_of(std::size_t effect) const;
   /// What the parameters must save that one hypothesis has beyond the other; negative where it has fewer.

@@ -133,10 +133,13 @@ FitResult fit(const FitData& data, const FitPoint& start, const std::vector<Free
   return result;
 }
 
+double objective_after_step(const FitResult& seen) {
+  return seen.objective - std::max(0.0, seen.bounded_reduction);
+}
+
 double objective_after_step(const FitData& data, const FitPoint& point,
                             const std::vector<FreeParameter>& free) {
-  const FitResult seen = fit(data, point, free, steps_with_fixed_noise(0));
-  return seen.objective - std::max(0.0, seen.bounded_reduction);
+  return objective_after_step(fit(data, point, free, steps_with_fixed_noise(0)));
 }
 
 std::vector<std::vector<LinearStep>> linearise(const FitData& data, const FitPoint& point) {

@@ -103,6 +103,8 @@ FitResult fit(const FitData& data, const FitPoint& start, const std::vector<Free
 
 /// The objective after one step within the ranges of the parameters, were residuals linear. A step that is
 /// cut short may promise to be worse: then the present one.
+double objective_after_step(const FitResult& seen);
+/// The same of a point.
 double objective_after_step(const FitData& data, const FitPoint& point,
                             const std::vector<FreeParameter>& free);
 

@@ -13,6 +13,11 @@ namespace {
 
 constexpr double unreachable = -std::numeric_limits<double>::infinity();
 
+/// A few steps from the starts of its prediction, with the noise as it is.
+Hypothesis with_former_noise(const Search& search, const Hypothesis& base, std::size_t effect) {
+  return search.screened(base, effect, search.predictions(base, {effect}).front().starts, unreachable);
+}
+
 /// Runs of a rig with a constant force that its plant file lacks.
 class Screening : public ::testing::Test {
  protected:
@@ -34,7 +39,7 @@ class Screening : public ::testing::Test {
 
 TEST_F(Screening, KeepsTheNoiseOfACandidateThatGainsTooLittle) {
   const Noise& before = base_.train.point.noise;
-  const Hypothesis kept = search_.screened(base_, hidden_, unreachable);
+  const Hypothesis kept = with_former_noise(search_, base_, hidden_);
   const Hypothesis renewed = search_.screened(base_, hidden_);
   EXPECT_EQ(kept.train.point.noise.force, before.force);
   EXPECT_LT(renewed.train.point.noise.force, before.force);
@@ -44,8 +49,8 @@ TEST_F(Screening, KeepsTheNoiseOfACandidateThatGainsTooLittle) {
 // A prediction below a tenth of the least evidence can therefore rule a candidate out.
 TEST_F(Screening, GainsWhatTheDerivativesPromise) {
   const double without = search_.descended_on_subset(base_).train.objective;
-  const double gained = without - search_.screened(base_, hidden_, unreachable).train.objective;
-  const double promised = search_.predicted_gains(base_, {hidden_}).front();
+  const double gained = without - with_former_noise(search_, base_, hidden_).train.objective;
+  const double promised = search_.predictions(base_, {hidden_}).front().gain;
   ASSERT_GT(gained, policy_.acceptance.min_evidence);
   EXPECT_GT(promised, 0.5 * gained);
   EXPECT_LT(promised, 2.0 * gained);
@@ -67,7 +72,7 @@ TEST(PeriodicScreening, FindsALongPitchAmongShortOnes) {
     Search search{given, runs, data.train, data.held, policy, budget};
     const Hypothesis base = search.baseline();
     const double without = search.descended_on_subset(base).train.objective;
-    found += without - search.screened(base, hidden, unreachable).train.objective > 100.0 ? 1 : 0;
+    found += without - with_former_noise(search, base, hidden).train.objective > 100.0 ? 1 : 0;
   }
   EXPECT_GE(found, 7);
 }
