@@ -49,7 +49,7 @@ bool StepwiseSelection::find_pairs_of_all() {
 bool StepwiseSelection::find_thoroughly(bool certainly_missing) {
   const std::vector<std::size_t> before = found_;
   const double objective = current_.train.objective;
-  select_forward(budget_.max_rounds, 2 * budget_.max_rounds, true, {});
+  if (certainly_missing) select_forward(budget_.max_rounds, 2 * budget_.max_rounds, true, {});
   const double share = search_.screening_share();
   bool more = share < 1.0;
   // What certainly is missing shows on a part of many data too, but for a limit that only a few reach.
