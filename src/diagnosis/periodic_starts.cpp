@@ -51,8 +51,8 @@ double usually_explained(const std::vector<FittedSine>& sines, std::size_t place
 }
 
 /// First what explains most, compared with others of about its frequency: the residual force is not white,
-/// for the noise of a position grows as a force with the square of its frequency. What they explain is of the
-/// usual then [1].
+/// for the noise of a position grows as a force with the square of its frequency. In the result, `explained`
+/// is a multiple of what is usual [1].
 std::vector<FittedSine> ranked(const std::vector<FittedSine>& sines) {
   constexpr double band = 1.2;  // of frequencies with the same comparison, which takes time
   std::vector<FittedSine> compared = sines;
