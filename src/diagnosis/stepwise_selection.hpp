@@ -32,9 +32,9 @@ class StepwiseSelection {
   bool renew_initial_states();
   /// What is left is more than noise: pairs of all that resembled the best effect. Whether the model changed.
   bool find_pairs_of_all();
-  /// What is left is more than the sensors' noise: every effect again, as all of the training data show it. If
-  /// something is `certainly_missing`: with little noise beyond the sensors', since much noise hides what a
-  /// poor fit leaves (beside a disturbance it hides nothing), and only on few data also on all of them.
+  /// What is left is more than the sensors' noise: every effect again, as all of the training data show it.
+  /// If something is `certainly_missing`: with little noise beyond the sensors', since much noise hides what
+  /// a poor fit leaves (beside a disturbance it hides nothing), and only on few data also on all of them.
   /// Whether the model changed.
   bool find_thoroughly(bool certainly_missing);
 
