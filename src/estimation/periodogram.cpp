@@ -1,40 +1,40 @@
 #include "periodogram.hpp"
 
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <numbers>
+#include <numeric>
+
+#include "sim/loop/lanes.hpp"
 
 namespace upright {
 
 namespace {
 
-constexpr std::size_t lanes = 8;
-using Lane [[gnu::vector_size(lanes * sizeof(double))]] = double;
-
-double sum_of(const Lane& lane) {
-  double sum = 0.0;
-  for (std::size_t i = 0; i < lanes; ++i) sum += lane[i];
-  return sum;
+double sum_of(const Lanes& lanes) {
+  const std::array<double, lane_count> numbers = lanes.values();
+  return std::accumulate(numbers.begin(), numbers.end(), 0.0);
 }
 
 /// Several forces, with sine and cosine of 2 pi f x for a rising frequency: turned by the same angle each
 /// time, since the functions themselves took longer than all else. Places beyond the last have no force.
 struct Wave {
-  Lane force_n{}, unit_n{}, sine{}, cosine{}, turn_sine{}, turn_cosine{};
+  Lanes force_n, unit_n, sine, cosine, turn_sine, turn_cosine;
 
   void set(std::size_t lane, const ForceAtPlace& at, double lowest_per_m, double spacing_per_m) {
     const double first_rad = 2.0 * std::numbers::pi * lowest_per_m * at.place_m;
     const double turn_rad = 2.0 * std::numbers::pi * spacing_per_m * at.place_m;
-    force_n[lane] = at.force_n;
-    unit_n[lane] = at.unit_n;
-    sine[lane] = std::sin(first_rad);
-    cosine[lane] = std::cos(first_rad);
-    turn_sine[lane] = std::sin(turn_rad);
-    turn_cosine[lane] = std::cos(turn_rad);
+    put(force_n, lane, at.force_n);
+    put(unit_n, lane, at.unit_n);
+    put(sine, lane, std::sin(first_rad));
+    put(cosine, lane, std::cos(first_rad));
+    put(turn_sine, lane, std::sin(turn_rad));
+    put(turn_cosine, lane, std::cos(turn_rad));
   }
 
   void advance() {
-    const Lane former = sine;
+    const Lanes former = sine;
     sine = sine * turn_cosine + cosine * turn_sine;
     cosine = cosine * turn_cosine - former * turn_sine;
   }
@@ -44,9 +44,9 @@ struct Wave {
 
 std::vector<FittedSine> periodogram(const std::vector<ForceAtPlace>& forces, double lowest_per_m,
                                     double highest_per_m, double spacing_per_m) {
-  std::vector<Wave> waves((forces.size() + lanes - 1) / lanes);
+  std::vector<Wave> waves((forces.size() + lane_count - 1) / lane_count);
   for (std::size_t i = 0; i < forces.size(); ++i)
-    waves[i / lanes].set(i % lanes, forces[i], lowest_per_m, spacing_per_m);
+    waves[i / lane_count].set(i % lane_count, forces[i], lowest_per_m, spacing_per_m);
   double unit_force = 0.0, power = 0.0;
   for (const ForceAtPlace& at : forces) {
     unit_force += at.unit_n * at.force_n;
@@ -54,9 +54,9 @@ std::vector<FittedSine> periodogram(const std::vector<ForceAtPlace>& forces, dou
   }
   std::vector<FittedSine> found;
   for (double f = lowest_per_m; f <= highest_per_m; f += spacing_per_m) {
-    Lane ss_l{}, sc_l{}, cc_l{}, sy_l{}, cy_l{}, s1_l{}, c1_l{};
+    Lanes ss_l, sc_l, cc_l, sy_l, cy_l, s1_l, c1_l;
     for (Wave& wave : waves) {
-      const Lane s = wave.unit_n * wave.sine, c = wave.unit_n * wave.cosine;
+      const Lanes s = wave.unit_n * wave.sine, c = wave.unit_n * wave.cosine;
       wave.advance();
       ss_l += s * s;
       sc_l += s * c;
