@@ -60,7 +60,7 @@ Prediction Search::prediction_of(const Hypothesis& base, std::size_t effect, dou
     lowest = std::min(lowest, objective_to_come(seen));
     after_step.push_back(objective_after_step(seen));
   }
-  prediction.gain = without - lowest;
+  prediction.gain = std::isfinite(without) ? without - lowest : std::numeric_limits<double>::infinity();
   if (is_periodic(effect) && after_step.size() > 1) {
     const auto best = std::ranges::min_element(after_step) - after_step.begin();
     prediction.starts = {prediction.starts[static_cast<std::size_t>(best)]};
@@ -73,10 +73,7 @@ std::vector<Prediction> Search::predictions(const Hypothesis& base,
   const double without =
       objective_to_come(fit(screening_subset_, screening_point(base), base.free, steps_with_fixed_noise(0)));
   std::vector<Prediction> predictions;
-  for (const std::size_t effect : effects) {
-    predictions.push_back(prediction_of(base, effect, without));
-    if (!std::isfinite(without)) predictions.back().gain = std::numeric_limits<double>::infinity();
-  }
+  for (const std::size_t effect : effects) predictions.push_back(prediction_of(base, effect, without));
   return predictions;
 }
 
@@ -97,8 +94,10 @@ Hypothesis Search::screened(const Hypothesis& base, std::size_t effect, const st
 }
 
 Hypothesis Search::screened(const Hypothesis& base, std::size_t effect) const {
-  std::vector<FitPoint> starts = points_with(screening_point(base), effect, base);
-  if (is_periodic(effect)) starts = prediction_of(base, effect, base.train.objective).starts;
+  // Only a pitch is chosen by what it promises.
+  const std::vector<FitPoint> starts = is_periodic(effect)
+                                           ? prediction_of(base, effect, base.train.objective).starts
+                                           : points_with(screening_point(base), effect, base);
   return screened(base, effect, starts, std::numeric_limits<double>::infinity());
 }
 
