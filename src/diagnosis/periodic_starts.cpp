@@ -94,15 +94,15 @@ std::vector<std::vector<double>> periodic_starts(std::size_t effect, const std::
   const std::vector<std::vector<double>> any = {{effect_registry()[effect].parameters[0].typical, 0.02, 0.0}};
   const double travel = range.cart_high_m - range.cart_low_m;
   if (residual.size() < budget.min_residual_samples || travel <= 0.0) return any;
-  std::vector<ForceAtPlace> forces;
-  forces.reserve(residual.size());
+  std::vector<PeriodogramSample> samples;
+  samples.reserve(residual.size());
   for (const PlaceForce& at : residual)
-    forces.push_back({at.cart_m, at.force_n, force_of_unit_size(effect, at)});
+    samples.push_back({at.cart_m, at.force_n, force_of_unit_size(effect, at)});
   const double longest = longest_pitch_m(range, prior);
   // Frequencies over the track one half-cycle apart, so that no crest is missed.
   const double spacing = 0.25 / travel;
   const double shortest = std::max(0.001, 1.0 / (1.0 / longest + budget.max_frequencies * spacing));
-  const std::vector<FittedSine> found = periodogram(forces, 1.0 / longest, 1.0 / shortest, spacing);
+  const std::vector<FittedSine> found = periodogram(samples, 1.0 / longest, 1.0 / shortest, spacing);
   std::vector<std::vector<double>> starts;
   for (const FittedSine& sine : ranked(found)) {
     if (differs_enough(sine, starts, spacing, budget)) starts.push_back(start_at(sine, effect));

@@ -22,7 +22,7 @@ double sum_of(const Lanes& lanes) {
 struct Wave {
   Lanes force_n, unit_n, sine, cosine, turn_sine, turn_cosine;
 
-  void set(std::size_t lane, const ForceAtPlace& at, double lowest_per_m, double spacing_per_m) {
+  void set(std::size_t lane, const PeriodogramSample& at, double lowest_per_m, double spacing_per_m) {
     const double first_rad = 2.0 * std::numbers::pi * lowest_per_m * at.place_m;
     const double turn_rad = 2.0 * std::numbers::pi * spacing_per_m * at.place_m;
     put(force_n, lane, at.force_n);
@@ -42,13 +42,13 @@ struct Wave {
 
 }  // namespace
 
-std::vector<FittedSine> periodogram(const std::vector<ForceAtPlace>& forces, double lowest_per_m,
+std::vector<FittedSine> periodogram(const std::vector<PeriodogramSample>& forces, double lowest_per_m,
                                     double highest_per_m, double spacing_per_m) {
   std::vector<Wave> waves((forces.size() + lane_count - 1) / lane_count);
   for (std::size_t i = 0; i < forces.size(); ++i)
     waves[i / lane_count].set(i % lane_count, forces[i], lowest_per_m, spacing_per_m);
   double unit_force = 0.0, power = 0.0;
-  for (const ForceAtPlace& at : forces) {
+  for (const PeriodogramSample& at : forces) {
     unit_force += at.unit_n * at.force_n;
     power += at.unit_n * at.unit_n;
   }

@@ -6,7 +6,7 @@
 namespace upright {
 
 /// A force at a place, and that of an effect of size one at its crest.
-struct ForceAtPlace {
+struct PeriodogramSample {
   double place_m, force_n, unit_n;
 };
 
@@ -21,7 +21,7 @@ struct FittedSine {
 /// period: the periodogram with a floating mean of Zechmeister and Kuerster, Astron. Astrophys. 496 (2009),
 /// for an effect whose force also depends on something else. Frequencies that the places do not tell from a
 /// constant are left out.
-std::vector<FittedSine> periodogram(const std::vector<ForceAtPlace>& forces, double lowest_per_m,
+std::vector<FittedSine> periodogram(const std::vector<PeriodogramSample>& forces, double lowest_per_m,
                                     double highest_per_m, double spacing_per_m);
 
 }  // namespace upright

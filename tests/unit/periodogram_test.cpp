@@ -13,12 +13,12 @@ namespace upright {
 namespace {
 
 /// At random places, of an effect whose force also depends on something else.
-std::vector<ForceAtPlace> random_forces(std::size_t count, std::uint64_t seed) {
+std::vector<PeriodogramSample> random_forces(std::size_t count, std::uint64_t seed) {
   std::mt19937_64 random(seed);
   std::uniform_real_distribution<double> place(-0.4, 0.6), unit(-1.5, 1.5);
   std::normal_distribution<double> force;
-  std::vector<ForceAtPlace> forces(count);
-  for (ForceAtPlace& at : forces) at = {place(random), force(random), unit(random)};
+  std::vector<PeriodogramSample> forces(count);
+  for (PeriodogramSample& at : forces) at = {place(random), force(random), unit(random)};
   return forces;
 }
 
@@ -28,8 +28,8 @@ double angle_rad(double frequency_per_m, double place_m) {
 
 TEST(Periodogram, FindsTheSineThatIsThere) {
   constexpr double size = 0.3, frequency_per_m = 23.5, phase_rad = 0.7;
-  std::vector<ForceAtPlace> forces = random_forces(101, 1);
-  for (ForceAtPlace& at : forces)
+  std::vector<PeriodogramSample> forces = random_forces(101, 1);
+  for (PeriodogramSample& at : forces)
     at.force_n = at.unit_n * (size * std::sin(angle_rad(frequency_per_m, at.place_m) + phase_rad) - 0.2);
   const std::vector<FittedSine> found = periodogram(forces, 5.0, 60.0, 0.25);
   const FittedSine best = *std::ranges::max_element(found, {}, &FittedSine::explained);
@@ -41,13 +41,13 @@ TEST(Periodogram, FindsTheSineThatIsThere) {
 // For numbers of forces that fill a SIMD register, and others.
 TEST(Periodogram, ExplainsWhatALeastSquaresFitExplains) {
   for (const std::size_t count : {16u, 17u, 60u, 127u}) {
-    const std::vector<ForceAtPlace> forces = random_forces(count, count);
+    const std::vector<PeriodogramSample> forces = random_forces(count, count);
     const auto n = static_cast<Eigen::Index>(count);
     Eigen::MatrixXd columns(n, 3);
     Eigen::VectorXd force_n(n);
     for (const FittedSine& sine : periodogram(forces, 2.0, 12.0, 0.5)) {
       for (Eigen::Index i = 0; i < n; ++i) {
-        const ForceAtPlace& at = forces[static_cast<std::size_t>(i)];
+        const PeriodogramSample& at = forces[static_cast<std::size_t>(i)];
         const double angle = angle_rad(sine.frequency_per_m, at.place_m);
         columns.row(i) << at.unit_n, at.unit_n * std::sin(angle), at.unit_n * std::cos(angle);
         force_n[i] = at.force_n;
@@ -67,7 +67,7 @@ TEST(Periodogram, ExplainsWhatALeastSquaresFitExplains) {
 
 // Of places that repeat with the pitch, the sine is the same everywhere.
 TEST(Periodogram, LeavesOutWhatThePlacesDoNotShow) {
-  std::vector<ForceAtPlace> forces;
+  std::vector<PeriodogramSample> forces;
   for (int i = 0; i < 20; ++i) forces.push_back({0.1 * (i % 5), std::sin(1.0 * i), 1.0});
   const std::vector<FittedSine> found = periodogram(forces, 5.0, 10.0, 5.0);
   EXPECT_TRUE(std::ranges::none_of(found, [](const FittedSine& s) { return s.frequency_per_m == 10.0; }));
