@@ -73,6 +73,7 @@ std::vector<Prediction> Search::predictions(const Hypothesis& base,
   const double without =
       objective_to_come(fit(screening_subset_, screening_point(base), base.free, steps_with_fixed_noise(0)));
   std::vector<Prediction> predictions;
+  predictions.reserve(effects.size());
   for (const std::size_t effect : effects) predictions.push_back(prediction_of(base, effect, without));
   return predictions;
 }
