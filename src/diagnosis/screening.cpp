@@ -52,13 +52,15 @@ Prediction Search::prediction_of(const Hypothesis& base, std::size_t effect, dou
   std::set<std::size_t> added = base.added;
   added.insert(effect);
   const std::vector<FreeParameter> free = free_of(added);
-  Prediction prediction{0.0, points_with(screening_point(base), effect, base)};
+  FitOptions options = steps_with_fixed_noise(0);
+  options.keep_equations = true;
+  Prediction prediction;
   double lowest = std::numeric_limits<double>::infinity();
   std::vector<double> after_step;
-  for (const FitPoint& point : prediction.starts) {
-    const FitResult seen = fit(screening_subset_, point, free, steps_with_fixed_noise(0));
-    lowest = std::min(lowest, objective_to_come(seen));
-    after_step.push_back(objective_after_step(seen));
+  for (const FitPoint& point : points_with(screening_point(base), effect, base)) {
+    prediction.starts.push_back(fit(screening_subset_, point, free, options));
+    lowest = std::min(lowest, objective_to_come(prediction.starts.back()));
+    after_step.push_back(objective_after_step(prediction.starts.back()));
   }
   prediction.gain = std::isfinite(without) ? without - lowest : std::numeric_limits<double>::infinity();
   if (is_periodic(effect) && after_step.size() > 1) {
@@ -78,28 +80,28 @@ std::vector<Prediction> Search::predictions(const Hypothesis& base,
   return predictions;
 }
 
-Hypothesis Search::screened(const Hypothesis& base, std::size_t effect, const std::vector<FitPoint>& starts,
+Hypothesis Search::screened(const Hypothesis& base, std::size_t effect, const std::vector<FitResult>& starts,
                             double to_reach) const {
   Hypothesis h;
   h.added = base.added;
   h.added.insert(effect);
   h.free = free_of(h.added);
   h.train.objective = std::numeric_limits<double>::infinity();
-  for (const FitPoint& start : starts) {
-    FitResult reached =
-        fit(screening_subset_, start, h.free, steps_with_fixed_noise(budget_.screening_steps));
+  FitOptions options = steps_with_fixed_noise(budget_.screening_steps);
+  // Of several starts only the best needs another noise.
+  const bool alone = starts.size() == 1;
+  if (alone) options.noise_at_end_below = to_reach;
+  for (const FitResult& start : starts) {
+    FitResult reached = continue_fit(screening_subset_, start, h.free, options);
     if (reached.objective < h.train.objective) h.train = std::move(reached);
   }
-  if (h.train.objective < to_reach) renew_noise_on_subset(h);
+  if (!alone && h.train.objective < to_reach) renew_noise_on_subset(h);
   return h;
 }
 
 Hypothesis Search::screened(const Hypothesis& base, std::size_t effect) const {
-  // Only a pitch is chosen by what it promises.
-  const std::vector<FitPoint> starts = is_periodic(effect)
-                                           ? prediction_of(base, effect, base.train.objective).starts
-                                           : points_with(screening_point(base), effect, base);
-  return screened(base, effect, starts, std::numeric_limits<double>::infinity());
+  return screened(base, effect, prediction_of(base, effect, base.train.objective).starts,
+                  std::numeric_limits<double>::infinity());
 }
 
 Hypothesis Search::screened_pair(const Hypothesis& base, const Hypothesis& first,
@@ -129,7 +131,7 @@ Hypothesis Search::descended_on_subset(const Hypothesis& base) const {
 
 void Search::renew_noise_on_subset(Hypothesis& h) const {
   FitOptions options = steps_with_fixed_noise(0);
-  options.noise_at_end = true;
+  options.noise_at_end_below = std::numeric_limits<double>::infinity();
   h.train = fit(screening_subset_, h.train.point, h.free, options);
 }
 

@@ -142,7 +142,7 @@ bool Search::may_restart_with_low_noise(const Hypothesis& base, const Hypothesis
   if (!(base.train.objective - h.train.objective > budget_.clear_evidence)) return true;
   FitPoint point = screening_point(h);
   FitOptions options = steps_with_fixed_noise(budget_.screening_steps);
-  options.noise_at_end = true;
+  options.noise_at_end_below = std::numeric_limits<double>::infinity();
   const double as_it_is = fit(screening_subset_, point, h.free, options).objective;
   point.noise = reduced_process_noise(point.noise);
   return fit(screening_subset_, point, h.free, {}).objective < as_it_is - budget_.restart_tolerance;

@@ -50,8 +50,9 @@ struct Prediction {
   /// By how much the objective falls, as derivatives say at the best start; infinite if they do not reach so
   /// far.
   double gain = 0.0;
-  /// Where its fits begin: of several pitches, where derivatives promise the lowest objective.
-  std::vector<FitPoint> starts;
+  /// Where its fits begin, with the equations there: of several pitches, where derivatives promise the lowest
+  /// objective.
+  std::vector<FitResult> starts;
 };
 
 /// The effects that either has.
@@ -109,7 +110,7 @@ class Search {
   std::vector<Prediction> predictions(const Hypothesis& base, const std::vector<std::size_t>& effects) const;
   /// Adds an effect to a hypothesis: a few steps from each of these starts with the noise as it is, on a part
   /// of the training data. The noise is estimated again only if the objective is below `to_reach` then.
-  Hypothesis screened(const Hypothesis& base, std::size_t effect, const std::vector<FitPoint>& starts,
+  Hypothesis screened(const Hypothesis& base, std::size_t effect, const std::vector<FitResult>& starts,
                       double to_reach) const;
   /// The same from the starts that its prediction has. The noise is estimated again in any case.
   Hypothesis screened(const Hypothesis& base, std::size_t effect) const;

@@ -93,7 +93,7 @@ class StepwiseSelection {
   /// An effect that might be added, and where its fits begin.
   struct Candidate {
     std::size_t effect = 0;
-    std::vector<FitPoint> starts;
+    std::vector<FitResult> starts;
   };
 
   /// A candidate after a few steps on a part of the data, and what it saves beyond its price.

@@ -15,13 +15,14 @@ namespace upright {
 
 namespace {
 
-/// Gauss-Newton and the estimate of the noise in turn.
-void iterate(const FitData& data, const FitOptions& options, GaussNewton& solver) {
+/// Gauss-Newton and the estimate of the noise in turn. `objective`: of the present point.
+void iterate(const FitData& data, const FitOptions& options, GaussNewton& solver, double objective) {
   const auto estimate = [&](const std::vector<double>& factors) {
+    solver.require_steps();
     return estimate_noise(data, solver.linearised(), factors, options.coloured_noise, solver.point());
   };
-  double objective = solver.evaluate();
   if (options.alternative_noise) {
+    solver.require_steps();
     const std::vector<double> objectives = noise_objectives(
         data, solver.point().plant, solver.linearised(), {solver.point().noise, *options.alternative_noise});
     if (objectives[1] < objectives[0]) {
@@ -30,7 +31,7 @@ void iterate(const FitData& data, const FitOptions& options, GaussNewton& solver
     }
   }
   if (options.noise_rounds == 0) solver.descend(objective);
-  if (options.noise_at_end && std::isfinite(objective)) {
+  if (std::isfinite(objective) && objective < options.noise_at_end_below) {
     estimate({4.0, 1.5, 1.15});
     objective = solver.evaluate();
   }
@@ -93,6 +94,21 @@ FitResult result_of(const GaussNewton& solver, const std::vector<FreeParameter>&
   return result;
 }
 
+/// Goes on from the present point, which has this objective.
+FitResult fit_from(const FitData& data, const std::vector<FreeParameter>& free, const FitOptions& options,
+                   GaussNewton& solver, double objective) {
+  iterate(data, options, solver, objective);
+  FitResult result = result_of(solver, free);
+  if (options.keep_equations) {
+    std::vector<NormalEquations> equations;
+    equations.reserve(solver.linearised().size());
+    for (const LinearisedSegment& segment : solver.linearised()) equations.push_back(segment.normal);
+    result.equations = std::make_shared<const std::vector<NormalEquations>>(std::move(equations));
+  }
+  if (data.bound != nullptr) data.bound->count(result.work_samples);
+  return result;
+}
+
 /// Of more parameters than a fit can free.
 FitResult failed_at(const FitPoint& start, std::size_t segments, std::size_t free) {
   constexpr double infinite = std::numeric_limits<double>::infinity();
@@ -127,10 +143,17 @@ FitResult fit(const FitData& data, const FitPoint& start, const std::vector<Free
   if (free.size() > max_free_parameters(start.plant))
     return failed_at(start, data.segments.size(), free.size());
   GaussNewton solver(data, start, free, options);
-  iterate(data, options, solver);
-  FitResult result = result_of(solver, free);
-  if (data.bound != nullptr) data.bound->count(result.work_samples);
-  return result;
+  const double objective = solver.evaluate();
+  return fit_from(data, free, options, solver, objective);
+}
+
+FitResult continue_fit(const FitData& data, const FitResult& from, const std::vector<FreeParameter>& free,
+                       const FitOptions& options) {
+  if (from.equations == nullptr) return fit(data, from.point, free, options);
+  if (data.bound != nullptr) data.bound->check();
+  GaussNewton solver(data, from.point, free, options);
+  const double objective = solver.begin_with(*from.equations);
+  return fit_from(data, free, options, solver, objective);
 }
 
 double objective_after_step(const FitResult& seen) {

@@ -11,6 +11,8 @@
 
 #include <Eigen/Core>
 #include <cstddef>
+#include <limits>
+#include <memory>
 #include <optional>
 #include <vector>
 
@@ -48,6 +50,8 @@ struct FitPoint {
   Noise noise;                             ///< of the sensors and of the process
 };
 
+struct NormalEquations;  // linearisation.hpp
+
 /// The result of a fit.
 struct FitResult {
   FitPoint point;          ///< where it ended
@@ -67,6 +71,8 @@ struct FitResult {
   double dispersion = 1.0;
   bool converged = false;     ///< false: the iterations were used up
   double work_samples = 0.0;  ///< number of samples processed, counting repetitions
+  /// Of each segment at `point`, if the options ask for them.
+  std::shared_ptr<const std::vector<NormalEquations>> equations;
 };
 
 /// A joint Gaussian prior of all free parameters, in their order.
@@ -81,10 +87,12 @@ struct FitOptions {
   int noise_rounds = 6;                    ///< upper bound of noise estimations; 0: the noise is fixed
   std::optional<Noise> alternative_noise;  ///< second starting point of the noise search, used where it gives
                                            ///< the better result
-  bool noise_at_end = false;               ///< without rounds: one coarse noise estimation after the descent
+  /// Without rounds: one coarse noise estimation after the descent, if the objective is below this.
+  double noise_at_end_below = -std::numeric_limits<double>::infinity();
   bool coloured_noise = false;  ///< estimate the coloured part of the noise too; else it stays as it is
   std::optional<GaussianPrior> joint_prior;  ///< replaces the priors of the free parameters
   double tolerance = 1e-4;                   ///< stop at this relative reduction of the objective per sample
+  bool keep_equations = false;               ///< for a fit that continues from the result
 };
 
 /// Of a fit whose noise stays. Without steps it says how the data depend on the parameters.
@@ -100,6 +108,11 @@ std::size_t max_free_parameters(const Plant& plant);
 /// beforehand. A fit that reaches the bound returns its present point.
 FitResult fit(const FitData& data, const FitPoint& start, const std::vector<FreeParameter>& free,
               const FitOptions& options = {});
+
+/// The same from where another fit of these data and free parameters ended, which kept its equations: the
+/// data are not linearised there again.
+FitResult continue_fit(const FitData& data, const FitResult& from, const std::vector<FreeParameter>& free,
+                       const FitOptions& options = {});
 
 /// The objective after one step within the ranges of the parameters, were residuals linear. A step that is
 /// cut short may promise to be worse: then the present one.

@@ -143,6 +143,15 @@ double GaussNewton::evaluate() {
   return objective_of_normals() + prior_.objective(point_.plant);
 }
 
+double GaussNewton::begin_with(const std::vector<NormalEquations>& equations) {
+  for (std::size_t s = 0; s < equations.size(); ++s) linearised_[s].normal = equations[s];
+  return objective_of_normals() + prior_.objective(point_.plant);
+}
+
+void GaussNewton::require_steps() {
+  if (std::ranges::any_of(linearised_, [](const LinearisedSegment& s) { return s.steps.empty(); })) evaluate();
+}
+
 /// By how much a segment's objective rises with a step.
 double GaussNewton::rise_of(std::size_t s) const {
   return linearised_[s].normal.likelihood.objective() - former_[s].normal.likelihood.objective();

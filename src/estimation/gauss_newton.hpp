@@ -42,6 +42,10 @@ class GaussNewton {
 
   /// Linearises at the present point; its objective.
   double evaluate();
+  /// Its objective, where the equations of all segments are known.
+  double begin_with(const std::vector<NormalEquations>& equations);
+  /// Linearises if only the equations are known.
+  void require_steps();
   /// Descends from an evaluated point of this objective. A step counts only if the whole objective falls,
   /// weights and log variances included.
   void descend(double& objective);

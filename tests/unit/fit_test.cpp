@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "blind_case.hpp"
 
@@ -46,6 +47,36 @@ TEST(Fit, TakesSlidingWhereTheModelRestsForAForce) {
   EXPECT_LT(noise.sensors, 1.5);
   EXPECT_GT(noise.force, 0.01);
   EXPECT_LT(noise.force, 1.0);
+}
+
+// A prediction linearises where the fit of a candidate begins.
+TEST(Fit, ContinuesFromKnownEquationsAsFromThePoint) {
+  Plant plant = cart_alone();
+  plant.set("coulomb_friction", {0.3});
+  const blind::Rig rig{.plant = plant};
+  const std::vector<Measurement> runs = square_and_multisine(rig, 250.0, 4.0, 3.0);
+  const FitData data{&runs, cut_segments(runs)};
+  plant.set("coulomb_friction", {0.1});
+  FreeParameter friction;
+  friction.effect = effect_number("coulomb_friction");
+  friction.high = 3.0;
+  const FitPoint start{plant, estimate_initial_states(runs, data.segments, plant), {.force = 0.1}};
+  FitOptions linearise_only = steps_with_fixed_noise(0);
+  linearise_only.keep_equations = true;
+  const FitResult linearised = fit(data, start, {friction}, linearise_only);
+  FitOptions options = steps_with_fixed_noise(3);
+  options.noise_at_end_below = std::numeric_limits<double>::infinity();
+  const FitResult once = fit(data, start, {friction}, options);
+  const FitResult continued = continue_fit(data, linearised, {friction}, options);
+  EXPECT_EQ(continued.point.plant.find(friction.effect)->values,
+            once.point.plant.find(friction.effect)->values);
+  EXPECT_EQ(continued.point.noise.force, once.point.noise.force);
+  EXPECT_EQ(continued.objective, once.objective);
+  EXPECT_LT(continued.work_samples, once.work_samples);
+  // The noise needs the steps too, where no step of the descent supplies them.
+  options.max_iterations = 0;
+  EXPECT_EQ(continue_fit(data, linearised, {friction}, options).objective,
+            fit(data, start, {friction}, options).objective);
 }
 
 /// Fits the first parameters of an effect from a guess, to runs of a cart that has it.
