@@ -55,9 +55,9 @@ struct SearchBudget {
   /// [candidates] The least number that is screened, whatever the best one promises. Well above three, for
   /// the same reason.
   std::size_t min_screened = 8;
-  /// [1] A candidate that gains less than this share of `min_evidence` on the screening segments, in
-  /// proportion to their number, is not fitted completely. Below one, because a few steps do not reach the
-  /// whole gain. Chosen.
+  /// [1] A candidate, or a pair in the place of what was found, that gains less than this share of
+  /// `min_evidence` on the screening segments, in proportion to their number, is not fitted completely. Below
+  /// one, because a few steps do not reach the whole gain. Chosen.
   double min_screening_evidence_share = 0.4;
   /// [1] A candidate that gains less than this share of the best one's gain is not fitted completely either,
   /// because a complete fit would not close the difference. Twelve matrix cases gave the same results with

@@ -40,12 +40,6 @@ bool StepwiseSelection::renew_initial_states() {
   return true;
 }
 
-bool StepwiseSelection::find_pairs_of_all() {
-  if (!try_pairs(resembling_)) return false;
-  eliminate_backward();
-  return true;
-}
-
 bool StepwiseSelection::find_thoroughly(bool certainly_missing) {
   const std::vector<std::size_t> before = found_;
   const double objective = current_.train.objective;
@@ -128,6 +122,10 @@ std::vector<StepwiseSelection::Candidate> StepwiseSelection::promising_candidate
 
 double StepwiseSelection::least_predicted_gain() const {
   return budget_.predicted_gain_share * policy_.acceptance.min_evidence * search_.screening_share();
+}
+
+double StepwiseSelection::least_screened_gain() const {
+  return budget_.min_screening_evidence_share * policy_.acceptance.min_evidence * search_.screening_share();
 }
 
 void StepwiseSelection::note_candidate(std::size_t effect, double gain) {
@@ -354,11 +352,9 @@ std::vector<StepwiseSelection::Finalist> StepwiseSelection::fit_finalists(
           s->gain > budget_.resembling_share * ranking[0]->gain)
         resembling_.emplace_back(s->effect, s->hypothesis);
   std::vector<Finalist> accepted, doubtful;
-  const double min_gain =
-      budget_.min_screening_evidence_share * policy_.acceptance.min_evidence * search_.screening_share();
   for (std::size_t place = 0; place < std::min(budget_.max_finalists, ranking.size()); ++place) {
     const ScreenedCandidate& finalist = *ranking[place];
-    if (finalist.gain < std::max(min_gain, budget_.min_gain_share * ranking[0]->gain)) break;
+    if (finalist.gain < std::max(least_screened_gain(), budget_.min_gain_share * ranking[0]->gain)) break;
     // Neither similar to the best one nor next best.
     if (!accepted.empty() && finalist.gain < budget_.resembling_share * ranking[0]->gain) break;
     options_.report_progress(
@@ -531,38 +527,6 @@ bool StepwiseSelection::simplify() {
     return true;
   }
   return false;
-}
-
-bool StepwiseSelection::try_pairs(const std::vector<std::pair<std::size_t, Hypothesis>>& contenders) {
-  if (contenders.size() < 2) return false;
-  std::optional<Hypothesis> best;
-  std::vector<std::size_t> best_found;
-  std::optional<double> to_beat;  // on the screening subset, by the best so far
-  for (std::size_t a = 0; a < contenders.size(); ++a)
-    for (std::size_t b = a + 1; b < contenders.size(); ++b) {
-      const std::size_t first = contenders[a].first, second = contenders[b].first;
-      if (found_.size() > 2 || (found_.size() == 2 && is_found(first) && is_found(second))) continue;
-      if (!paired_.insert(std::minmax(first, second)).second) continue;
-      options_.report_progress(0.83, "trying " + kind_of(first) + " with " + kind_of(second));
-      const Hypothesis& so_far = best ? *best : current_;
-      const Hypothesis quick = search_.screened_pair(given_, contenders[a].second, contenders[b].second);
-      if (!to_beat) to_beat = search_.on_screening_subset(so_far).train.objective;
-      if (!(quick.train.objective < *to_beat)) continue;
-      Hypothesis h = search_.with_pair(given_, contenders[a].second, contenders[b].second);
-      Evidence e = evidence_of(Change::pair, so_far, h, {first, second});
-      e.penalty = penalty_of_change(so_far, h);
-      if (!decided(e, h, first).accepted) continue;
-      best = std::move(h);
-      best_found = {first, second};
-      to_beat.reset();
-    }
-  if (!best) return false;
-  for (const std::size_t effect : best_found)
-    if (!where_.contains(effect)) where_[effect] = where_.empty() ? locate(given_) : where_.begin()->second;
-  current_ = std::move(*best);
-  found_ = best_found;
-  record_step();
-  return true;
 }
 
 void StepwiseSelection::eliminate_backward() {

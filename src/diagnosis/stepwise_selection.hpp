@@ -121,6 +121,8 @@ class StepwiseSelection {
   std::vector<std::size_t> open_candidates(Candidates which) const;
   /// A candidate that promises less is not screened: the least evidence is out of its reach.
   double least_predicted_gain() const;
+  /// A candidate, or a pair, that gains less on the screening subset is not fitted completely.
+  double least_screened_gain() const;
   /// Notes a candidate of the first round, in the place of an earlier note.
   void note_candidate(std::size_t effect, double gain);
   /// Those that promise a share of what the best one does, some of the others, and all that cannot promise. A
