@@ -26,6 +26,7 @@
 #include "plant_scale.hpp"
 #include "plausibility.hpp"
 #include "quick.hpp"
+#include "repeated_search.hpp"
 #include "reproducibility.hpp"
 #include "run_differences.hpp"
 #include "search.hpp"
@@ -110,8 +111,10 @@ class Diagnostician {
   bool is_disturbed() const { return disturbed_; }  ///< by more than is usual
   /// Minus twice the log likelihood of all runs, and of the priors, with what is named in the end.
   double objective_of_all_runs() const { return fits_.known().train.objective; }
-  /// Of what is unexplained: whether held-out runs alone may show it, or contradict the others to the end.
-  bool misses_held_out_excitation() const {
+  /// Whether other held-out runs may change the answer. If it is unexplained: held-out runs alone may show
+  /// what is missing, or contradict the others to the end.
+  bool is_worth_repeating(const Diagnosis& answer, bool unexplained) const {
+    if (!unexplained) return !found_missing_effect() && may_find_more_with_other_runs(answer, data_, policy_);
     return selection_.contradicted() || largest_voltage_is_held_out(data_) ||
            !examine_fit(data_.train, fits_.judged().train.point, policy_, budget_).structured;
   }
@@ -539,8 +542,7 @@ void look_further(const Plant& plant, const Record& record, const DiagnosisOptio
   if (diagnosis.verdict == Verdict::not_excited || diagnosis.interrupted || diagnosis.bound_reached) return;
   const bool unexplained = diagnosis.verdict == Verdict::unexplained && !first.is_disturbed();
   try {
-    // A weak effect may show too little in the runs that are left once one is held out.
-    if (unexplained ? first.misses_held_out_excitation() : !first.found_missing_effect()) {
+    if (first.is_worth_repeating(diagnosis, unexplained)) {
       options.report_progress(0.02, "repeating the search with other runs held out");
       second.emplace(plant, record, options, HeldOut::other);
       Diagnosis other = second->run(!unexplained);
