@@ -53,7 +53,8 @@ struct SearchBudget {
   /// had promised at least 22.
   double predicted_gain_share = 0.1;
   /// [candidates] The least number that is screened, whatever the best one promises. Well above three, for
-  /// the same reason.
+  /// the same reason. After a round on a part of the data in which none was accepted, so many are screened on
+  /// all: 28 of 130 matrix cases had such a second round, and none was accepted in it.
   std::size_t min_screened = 8;
   /// [1] A candidate, or a pair in the place of what was found, that gains less than this share of
   /// `min_evidence` on the screening segments, in proportion to their number, is not fitted completely. Below

@@ -45,13 +45,16 @@ bool StepwiseSelection::find_thoroughly(bool certainly_missing) {
   const double objective = current_.train.objective;
   if (certainly_missing) select_forward(budget_.max_rounds, 2 * budget_.max_rounds, true, {});
   const double share = search_.screening_share();
-  bool more = share < 1.0;
-  // What certainly is missing shows on a part of many data too, but for a limit that only a few reach.
-  if (more && certainly_missing && share < budget_.certain_screening_share)
-    more = search_.screen_on_largest_voltage();
-  else if (more)
-    search_.screen_on_all();
-  if (more) select_forward(2 * budget_.max_rounds, 3 * budget_.max_rounds, false, {});
+  if (share < 1.0) {
+    const int first_round = 2 * budget_.max_rounds, last_round = 3 * budget_.max_rounds;
+    // A limit that only a few data reach may not have shown on a part of them.
+    const bool limit_is_open = search_.screen_on_largest_voltage();
+    const Candidates first = limit_is_open ? Candidates::usual : Candidates::best_of_last_round;
+    // What certainly is missing shows on a part of many data too, but for such a limit.
+    const bool on_all = !certainly_missing || share >= budget_.certain_screening_share;
+    if (on_all) search_.screen_on_all();
+    if (on_all || limit_is_open) select_forward(first_round, last_round, false, {}, first);
+  }
   // On the way a better place may have been found for the noise alone.
   if (found_ == before) return is_better_optimum(objective - current_.train.objective, policy_.significance);
   eliminate_backward();
@@ -85,12 +88,14 @@ void StepwiseSelection::hold(std::size_t number) {
 }
 
 std::vector<std::size_t> StepwiseSelection::open_candidates(Candidates which) const {
-  const bool usual = which == Candidates::usual;
+  const bool usual = which != Candidates::attached_masses;
   std::vector<std::size_t> candidates =
       (usual ? candidate_effects : attached_mass_candidates)(current_.train.point.plant, search_.range());
   for (const std::size_t effect : search_.nuisances())
     if (usual && !current_.added.contains(effect)) candidates.push_back(effect);
   std::erase_if(candidates, [&](std::size_t effect) { return withdrawn_.contains(effect); });
+  if (which == Candidates::best_of_last_round)
+    std::erase_if(candidates, [&](std::size_t effect) { return !best_of_last_round_.contains(effect); });
   return candidates;
 }
 
@@ -279,12 +284,13 @@ void StepwiseSelection::record_step() {
   record_.steps.push_back(std::move(step));
 }
 
-void StepwiseSelection::select_forward(int first_round, int last_round, bool with_low_noise,
-                                       const Goal& goal) {
+void StepwiseSelection::select_forward(int first_round, int last_round, bool with_low_noise, const Goal& goal,
+                                       Candidates first) {
   double before = current_.train.objective;
   for (int round = first_round; round < last_round; ++round) {
     const int rounds_left = last_round - round - 1;
-    const std::vector<ScreenedCandidate> screened = screen(round, with_low_noise, Candidates::usual);
+    const Candidates which = round == first_round ? first : Candidates::usual;
+    const std::vector<ScreenedCandidate> screened = screen(round, with_low_noise, which);
     if (is_out_of_reach_of(screened, goal, rounds_left)) break;
     if (!add_best_of(screened, round, with_low_noise)) break;
     const double reached = current_.train.objective;
@@ -331,16 +337,27 @@ std::vector<StepwiseSelection::ScreenedCandidate> StepwiseSelection::screen(int 
     if (round == 0) note_candidate(effect, gain);
     if (!failed) screened.push_back({effect, std::move(h), gain});
   }
+  if (which == Candidates::usual) {
+    best_of_last_round_.clear();
+    for (const ScreenedCandidate* s : by_gain(screened))
+      if (best_of_last_round_.size() < budget_.min_screened) best_of_last_round_.insert(s->effect);
+  }
   return screened;
 }
 
-std::vector<StepwiseSelection::Finalist> StepwiseSelection::fit_finalists(
-    int round, const std::vector<ScreenedCandidate>& screened, bool with_low_noise, double done) {
+std::vector<const StepwiseSelection::ScreenedCandidate*> StepwiseSelection::by_gain(
+    const std::vector<ScreenedCandidate>& screened) {
   std::vector<const ScreenedCandidate*> ranking;
   ranking.reserve(screened.size());
   for (const ScreenedCandidate& s : screened) ranking.push_back(&s);
   std::stable_sort(ranking.begin(), ranking.end(),
                    [](const ScreenedCandidate* a, const ScreenedCandidate* b) { return a->gain > b->gain; });
+  return ranking;
+}
+
+std::vector<StepwiseSelection::Finalist> StepwiseSelection::fit_finalists(
+    int round, const std::vector<ScreenedCandidate>& screened, bool with_low_noise, double done) {
+  std::vector<const ScreenedCandidate*> ranking = by_gain(screened);
   constexpr double rounding = 0.01;  // [evidence] by which two names of one force differ
   for (std::size_t i = 1; i < ranking.size(); ++i)
     if (is_plainer_name(ranking[i]->effect, ranking[i - 1]->effect) &&

@@ -32,10 +32,11 @@ class StepwiseSelection {
   bool renew_initial_states();
   /// What is left is more than noise: pairs of all that resembled the best effect. Whether the model changed.
   bool find_pairs_of_all();
-  /// What is left is more than the sensors' noise: every effect again, as all of the training data show it.
-  /// If something is `certainly_missing`: with little noise beyond the sensors', since much noise hides what
-  /// a poor fit leaves (beside a disturbance it hides nothing), and only on few data also on all of them.
-  /// Whether the model changed.
+  /// What is left is more than the sensors' noise: the best of the last round again, as all of the training
+  /// data show them, or every effect if the last round lacked the largest voltage. If something is
+  /// `certainly_missing`, every effect is tried with little noise beyond the sensors' first, since much noise
+  /// hides what a poor fit leaves (beside a disturbance it hides nothing), and all of the data are used only
+  /// if they are few. Whether the model changed.
   bool find_thoroughly(bool certainly_missing);
 
   /// What is left is more than noise: an effect that others resemble is left out, and the search goes on
@@ -116,7 +117,8 @@ class StepwiseSelection {
     std::vector<std::size_t> found;
   };
 
-  enum class Candidates { usual, attached_masses };
+  /// `best_of_last_round`: of the usual ones, the few that gained most in the last round.
+  enum class Candidates { usual, attached_masses, best_of_last_round };
 
   std::vector<std::size_t> open_candidates(Candidates which) const;
   /// A candidate that promises less is not screened: the least evidence is out of its reach.
@@ -162,7 +164,9 @@ class StepwiseSelection {
   /// Adds effects one at a time, the best first, for as long as the data ask for one. `with_low_noise`: as
   /// they show with little noise, for much noise can account for the whole of an effect. `goal`: as in
   /// find_again().
-  void select_forward(int first_round, int last_round, bool with_low_noise, const Goal& goal);
+  /// `first`: the candidates of the first round.
+  void select_forward(int first_round, int last_round, bool with_low_noise, const Goal& goal,
+                      Candidates first = Candidates::usual);
   /// Whether the goal is out of reach of the best of these, and of the rounds after it.
   static bool is_out_of_reach_of(const std::vector<ScreenedCandidate>& screened, const Goal& goal,
                                  int rounds_left);
@@ -172,6 +176,8 @@ class StepwiseSelection {
   static double share_done(int round);
   /// All promising candidates.
   std::vector<ScreenedCandidate> screen(int round, bool with_low_noise, Candidates which);
+  /// In the order of what they gain, the best first.
+  static std::vector<const ScreenedCandidate*> by_gain(const std::vector<ScreenedCandidate>& screened);
   /// The best of them fitted in full: those that the data believe, or, where there are none, those that only
   /// held-out runs speak against.
   std::vector<Finalist> fit_finalists(int round, const std::vector<ScreenedCandidate>& screened,
@@ -234,6 +240,7 @@ class StepwiseSelection {
   std::map<std::size_t, double> finalist_evidence_;
   std::vector<std::pair<std::size_t, Hypothesis>> resembling_;  ///< screened, of the first round
   std::set<std::pair<std::size_t, std::size_t>> paired_;        ///< tried already
+  std::set<std::size_t> best_of_last_round_;                    ///< of the usual candidates
 };
 
 }  // namespace upright
