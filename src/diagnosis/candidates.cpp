@@ -159,6 +159,10 @@ std::vector<FreeParameter> free_parameters(std::size_t effect, const DataRange& 
     } else if (name == "stiffness_n_per_m" && is_named(effect, "bristle_friction")) {
       p.low = prior.min_bristle_stiffness_n_per_m;
       p.high = prior.max_bristle_stiffness_n_per_m;
+    } else if (name == "damping_n_per_mps" && is_named(effect, "bristle_friction")) {
+      // The critical damping of the cart on the stiffest bristles. A damper that is much stronger holds the
+      // cart as a rigid contact does, and is followed in tiny steps.
+      p.high = 2.0 * std::sqrt(prior.max_bristle_stiffness_n_per_m * range.cart_mass_kg);
     } else if (is_named(effect, "input_delay")) {
       p.high = prior.max_delay_s;
     } else if (is_named(effect, "motor_lag")) {

@@ -245,8 +245,8 @@ struct PriorPolicy {
   /// [N/m] The softest bristles. Softer ones act as a spring. For a small cart, and scaled to other plants.
   /// Chosen.
   double min_bristle_stiffness_n_per_m = 5.0;
-  /// [N/m] The stiffest bristles. Stiffer ones are indistinguishable from a rigid contact. Scaled as the
-  /// softest. Chosen.
+  /// [N/m] The stiffest bristles. Stiffer ones are indistinguishable from a rigid contact. Bristles have at
+  /// most the critical damping of the cart on the stiffest. Scaled as the softest. Chosen.
   double max_bristle_stiffness_n_per_m = 3e4;
   /// [s] The longest delay of the input. Chosen.
   double max_delay_s = 0.2;
