@@ -546,11 +546,10 @@ void look_further(const Plant& plant, const Record& record, const DiagnosisOptio
       options.report_progress(0.02, "repeating the search with other runs held out");
       second.emplace(plant, record, options, HeldOut::other);
       Diagnosis other = second->run(!unexplained);
-      // Each search judges by its own held-out runs; between the two all runs decide.
-      const bool fits = second->objective_of_all_runs() <
-                        first.objective_of_all_runs() + SelectionPolicy{}.acceptance.min_evidence;
+      const double saved = first.objective_of_all_runs() - second->objective_of_all_runs();
       const bool explains = other.verdict == Verdict::explained || second->is_disturbed();
-      if (fits && explains && (unexplained || second->found_missing_effect())) {
+      const bool is_open = unexplained || second->found_missing_effect();
+      if (is_open && is_better_answer(saved, explains, unexplained, SelectionPolicy{}.acceptance)) {
         second->describe_what_is_left(other);
         other.notes.emplace_back(
             "the runs held out at first show what the others alone do not: others were held out instead");

@@ -13,4 +13,10 @@ bool may_find_more_with_other_runs(const Diagnosis& first, const DataSplit& data
   return largest_voltage_is_held_out(data) || std::ranges::any_of(first.trials, enough);
 }
 
+bool is_better_answer(double saved, bool explains, bool first_is_unexplained,
+                      const AcceptancePolicy& policy) {
+  if (explains) return saved > -policy.min_evidence;
+  return first_is_unexplained && saved > policy.overwhelming_evidence;
+}
+
 }  // namespace upright

@@ -13,4 +13,9 @@ namespace upright {
 bool may_find_more_with_other_runs(const Diagnosis& first, const DataSplit& data,
                                    const SelectionPolicy& policy);
 
+/// Whether the answer with other runs held out takes the place of the first one. Each search judges by its
+/// own held-out runs, so all runs decide between the two: `saved` is by how much their objective is less with
+/// the second answer. If both are unexplained, they must say so overwhelmingly.
+bool is_better_answer(double saved, bool explains, bool first_is_unexplained, const AcceptancePolicy& policy);
+
 }  // namespace upright

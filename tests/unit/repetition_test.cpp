@@ -60,5 +60,19 @@ TEST_F(Repetition, IsWorthItIfTheLargestVoltageIsHeldOut) {
   EXPECT_TRUE(is_worth_it());
 }
 
+TEST(SecondAnswer, ThatExplainsMustFitAllRunsAsWell) {
+  const AcceptancePolicy policy;
+  EXPECT_TRUE(is_better_answer(-policy.min_evidence + 0.1, true, true, policy));
+  EXPECT_TRUE(is_better_answer(-policy.min_evidence + 0.1, true, false, policy));
+  EXPECT_FALSE(is_better_answer(-policy.min_evidence - 0.1, true, true, policy));
+}
+
+TEST(SecondAnswer, ThatExplainsNoMoreMustFitAllRunsFarBetter) {
+  const AcceptancePolicy policy;
+  EXPECT_TRUE(is_better_answer(policy.overwhelming_evidence + 0.1, false, true, policy));
+  EXPECT_FALSE(is_better_answer(policy.overwhelming_evidence - 0.1, false, true, policy));
+  EXPECT_FALSE(is_better_answer(policy.overwhelming_evidence + 0.1, false, false, policy));
+}
+
 }  // namespace
 }  // namespace upright
