@@ -1,4 +1,4 @@
-// When a search is worth repeating with other runs held out.
+// When a search is worth repeating with other runs held out, and which of the two answers counts.
 #pragma once
 
 #include "estimation/held_out.hpp"

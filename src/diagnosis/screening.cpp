@@ -57,7 +57,10 @@ Prediction Search::prediction_of(const Hypothesis& base, std::size_t effect, dou
   Prediction prediction;
   double lowest = std::numeric_limits<double>::infinity();
   std::vector<double> after_step;
-  for (const FitPoint& point : points_with(screening_point(base), effect, base)) {
+  const std::vector<FitPoint> points = points_with(screening_point(base), effect, base);
+  prediction.starts.reserve(points.size());
+  after_step.reserve(points.size());
+  for (const FitPoint& point : points) {
     prediction.starts.push_back(fit(screening_subset_, point, free, options));
     lowest = std::min(lowest, objective_to_come(prediction.starts.back()));
     after_step.push_back(objective_after_step(prediction.starts.back()));

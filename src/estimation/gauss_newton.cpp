@@ -149,7 +149,8 @@ double GaussNewton::begin_with(const std::vector<NormalEquations>& equations) {
 }
 
 void GaussNewton::require_steps() {
-  if (std::ranges::any_of(linearised_, [](const LinearisedSegment& s) { return s.steps.empty(); })) evaluate();
+  if (std::ranges::any_of(linearised_, [](const LinearisedSegment& s) { return s.steps.empty(); }))
+    evaluate();
 }
 
 /// By how much a segment's objective rises with a step.

@@ -1,4 +1,4 @@
-// When a search that found nothing is repeated with other runs held out.
+// When a search that found nothing is repeated with other runs held out, and which answer counts.
 #include <gtest/gtest.h>
 
 #include "diagnosis/repeated_search.hpp"
