@@ -48,38 +48,39 @@ double Search::objective_to_come(const FitResult& seen) {
                                   : -std::numeric_limits<double>::infinity();
 }
 
-Prediction Search::prediction_of(const Hypothesis& base, std::size_t effect, double without) const {
+std::vector<FitResult> Search::linearised_starts(const Hypothesis& base, std::size_t effect) const {
   std::set<std::size_t> added = base.added;
   added.insert(effect);
   const std::vector<FreeParameter> free = free_of(added);
   FitOptions options = steps_with_fixed_noise(0);
   options.keep_equations = true;
-  Prediction prediction;
-  double lowest = std::numeric_limits<double>::infinity();
-  std::vector<double> after_step;
   const std::vector<FitPoint> points = points_with(screening_point(base), effect, base);
-  prediction.starts.reserve(points.size());
-  after_step.reserve(points.size());
-  for (const FitPoint& point : points) {
-    prediction.starts.push_back(fit(screening_subset_, point, free, options));
-    lowest = std::min(lowest, objective_to_come(prediction.starts.back()));
-    after_step.push_back(objective_after_step(prediction.starts.back()));
-  }
-  prediction.gain = std::isfinite(without) ? without - lowest : std::numeric_limits<double>::infinity();
-  if (is_periodic(effect) && after_step.size() > 1) {
-    const auto best = std::ranges::min_element(after_step) - after_step.begin();
-    prediction.starts = {prediction.starts[static_cast<std::size_t>(best)]};
-  }
-  return prediction;
+  std::vector<FitResult> starts;
+  starts.reserve(points.size());
+  for (const FitPoint& point : points) starts.push_back(fit(screening_subset_, point, free, options));
+  return starts;
+}
+
+std::vector<FitResult> Search::without_other_pitches(std::size_t effect, std::vector<FitResult> starts) {
+  if (!is_periodic(effect) || starts.size() < 2) return starts;
+  const auto promised = [](const FitResult& start) { return objective_after_step(start); };
+  return {*std::ranges::min_element(starts, {}, promised)};
 }
 
 std::vector<Prediction> Search::predictions(const Hypothesis& base,
                                             const std::vector<std::size_t>& effects) const {
+  constexpr double infinity = std::numeric_limits<double>::infinity();
   const double without =
       objective_to_come(fit(screening_subset_, screening_point(base), base.free, steps_with_fixed_noise(0)));
   std::vector<Prediction> predictions;
   predictions.reserve(effects.size());
-  for (const std::size_t effect : effects) predictions.push_back(prediction_of(base, effect, without));
+  for (const std::size_t effect : effects) {
+    std::vector<FitResult> starts = linearised_starts(base, effect);
+    double lowest = infinity;
+    for (const FitResult& start : starts) lowest = std::min(lowest, objective_to_come(start));
+    const double gain = std::isfinite(without) ? without - lowest : infinity;
+    predictions.push_back({gain, without_other_pitches(effect, std::move(starts))});
+  }
   return predictions;
 }
 
@@ -103,7 +104,7 @@ Hypothesis Search::screened(const Hypothesis& base, std::size_t effect, const st
 }
 
 Hypothesis Search::screened(const Hypothesis& base, std::size_t effect) const {
-  return screened(base, effect, prediction_of(base, effect, base.train.objective).starts,
+  return screened(base, effect, without_other_pitches(effect, linearised_starts(base, effect)),
                   std::numeric_limits<double>::infinity());
 }
 

@@ -197,8 +197,10 @@ class Search {
   /// The objective of a fit that goes on from here, were residuals linear; minus infinity where that says
   /// nothing.
   static double objective_to_come(const FitResult& seen);
-  /// `without`: the objective to come without the effect.
-  Prediction prediction_of(const Hypothesis& base, std::size_t effect, double without) const;
+  /// Where the fits of an effect on the screening subset may begin, linearised there.
+  std::vector<FitResult> linearised_starts(const Hypothesis& base, std::size_t effect) const;
+  /// Of several pitches only the one where derivatives promise the lowest objective.
+  static std::vector<FitResult> without_other_pitches(std::size_t effect, std::vector<FitResult> starts);
   /// A hypothesis's point on the screening subset alone.
   FitPoint screening_point(const Hypothesis& base) const;
   std::vector<FreeParameter> free_of(const std::set<std::size_t>& added) const;

@@ -53,8 +53,8 @@ struct SearchBudget {
   /// had promised at least 22.
   double predicted_gain_share = 0.1;
   /// [candidates] The least number that is screened, whatever the best one promises. Well above three, for
-  /// the same reason. After a round on a part of the data in which none was accepted, so many are screened on
-  /// all: 28 of 130 matrix cases had such a second round, and none was accepted in it.
+  /// the same reason. If a round on a part of the data accepts none, this many are screened on all data. In
+  /// 28 of 130 matrix cases there was such a second round. It accepted none either.
   std::size_t min_screened = 8;
   /// [1] A candidate, or a pair in the place of what was found, that gains less than this share of
   /// `min_evidence` on the screening segments, in proportion to their number, is not fitted completely. Below
