@@ -67,7 +67,7 @@ ContinuousModel continuous_model(const Plant& plant) {
     throw ConfigError(
         "the estimator's plant has no pendulum: name a plant file with a pendulum in state_estimator");
   constexpr double any_smoothing = 1.0;  // no dry level is left to smooth
-  const LinearPlant linear = linearize(sliding_plant(with_sprung_mass_fixed(plant)), any_smoothing);
+  const LinearPlant linear = linearize(sliding_plant(without_vibrations(plant)), any_smoothing);
   const Index n = linear.a.rows();
   ContinuousModel model;
   model.a.topLeftCorner(n, n) = linear.a;

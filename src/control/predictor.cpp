@@ -28,7 +28,7 @@ LinearPlant sliding_line(const Plant& plant) {
     throw ConfigError(
         "the predictor's plant has no pendulum: name a plant file with a pendulum in delay_compensation");
   constexpr double any_smoothing = 1.0;  // no dry level is left to smooth
-  return linearize(sliding_plant(with_sprung_mass_fixed(plant)), any_smoothing);
+  return linearize(sliding_plant(without_vibrations(plant)), any_smoothing);
 }
 
 }  // namespace

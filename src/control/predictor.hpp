@@ -3,7 +3,7 @@
 // products for each buffered voltage).
 //
 // The model is the plant file's while the cart slides (dry levels and bristles taken out: they change no
-// slope; a sprung mass fixed to the cart), as an exact sampled line s' = a s + b u + f. The static actuator
+// slope; a sprung mass fixed to the cart, a rigid rod), as an exact sampled line s' = a s + b u + f. The static actuator
 // chain (dead zone, gain, offset, saturation) is not linearised: the buffered voltages go through it.
 // input_delay is looked through as well, motor_lag is a state that follows from the voltages.
 //

@@ -28,9 +28,14 @@ std::string number_text(double value) {
   return text;
 }
 
-/// What `with_sprung_mass_fixed` means for a design whose poles are of the plant as it is.
-constexpr const char* sprung_mass_is_fixed =
-    "sprung_mass: it is not measured, and the gains take it as fixed to the cart";
+/// Says what `without_vibrations` means for a design. `rest`: how the poles or the predictor take it.
+void note_vibrations(std::vector<std::string>& notes, const Plant& plant, const std::string& rest) {
+  if (plant.find("sprung_mass") != nullptr)
+    notes.push_back("sprung_mass: it is not measured, and the gains take it as fixed to the cart" + rest);
+  if (plant.find("flexible_rod") != nullptr)
+    notes.push_back("flexible_rod: its vibration is not measured, and the gains take the rod as rigid" +
+                    rest);
+}
 
 /// The plant with its motor lag taken as quick: the motor voltage is its command. `lagging` tells whether it
 /// was there.
@@ -100,11 +105,10 @@ void record_plant_structure(GainDesign& design, const Plant& plant, const Linear
                            " s do not enter a continuous design; see --delay");
   if (plant.find("voltage_saturation") != nullptr)
     design.notes.emplace_back("voltage_saturation: the design holds below the limit");
-  if (plant.find("sprung_mass") != nullptr)
-    design.notes.push_back(std::string(sprung_mass_is_fixed) + "; the closed-loop poles are those with it");
+  note_vibrations(design.notes, plant, "; the closed-loop poles are those with it");
 }
 
-/// Poles of the whole controllable plant, with its motor lag and sprung mass, under the gains.
+/// Poles of the whole controllable plant, with its motor lag and vibrations, under the gains.
 void find_poles(GainDesign& design, const LinearPlant& linear, const RowVectorXd& k) {
   const ControllablePart whole = controllable_part(linear);
   RowVectorXd feedback = RowVectorXd::Zero(whole.a.rows());
@@ -112,8 +116,9 @@ void find_poles(GainDesign& design, const LinearPlant& linear, const RowVectorXd
   design.closed_loop_poles = sorted_eigenvalues(whole.a - whole.b * (linear.actuator_slope * feedback));
   if (design.closed_loop_poles.front().real() >= 0.0)
     throw ConfigError(
-        "the gains designed with a quick motor and a fixed sprung mass do not stabilize the plant with its "
-        "motor_lag and sprung_mass, " +
+        "the gains designed with a quick motor, a fixed sprung mass and a rigid rod do not stabilize the "
+        "plant "
+        "with its motor_lag, sprung_mass and flexible_rod, " +
         matrix_text("A", whole.a) + ", " + matrix_text("b", whole.b) +
         ": raise --r, or shorten the motor lag");
 }
@@ -131,7 +136,7 @@ GainDesign design_gains(const Plant& plant, const DesignWeights& weights, double
   const LinearPlant linear = linearize(plant, smoothing);
   refuse_unreadable(linear);
   bool lagging = false;
-  const LinearPlant quick = without_motor_lag(linearize(with_sprung_mass_fixed(plant), smoothing), lagging);
+  const LinearPlant quick = without_motor_lag(linearize(without_vibrations(plant), smoothing), lagging);
   const ControllablePart part = controllable_part(quick);
   const RiccatiSolution solution = solve_continuous_riccati(part.a, part.b * quick.actuator_slope,
                                                             weight_matrix(quick, weights), weights.r);
@@ -262,7 +267,7 @@ void check_with_all_states(SampledDesign& result, const SampledProblem& direct, 
 
 SampledDesign design_sampled_gains(const Plant& plant, const DesignWeights& weights, double smoothing,
                                    double rate_hz, double delay_s, const EstimatorConfig& estimator) {
-  const LinearPlant linear = linearize(with_sprung_mass_fixed(plant), smoothing);
+  const LinearPlant linear = linearize(without_vibrations(plant), smoothing);
   refuse_unreadable(linear);
   bool lagging = false;
   const LinearPlant quick = without_motor_lag(linear, lagging);
@@ -283,8 +288,7 @@ SampledDesign design_sampled_gains(const Plant& plant, const DesignWeights& weig
   add_shares(result.design, part, solution.gain);
   if (lagging)
     result.design.notes.emplace_back("motor_lag: the gains take it as quick; the predictor follows it");
-  if (plant.find("sprung_mass") != nullptr)
-    result.design.notes.push_back(std::string(sprung_mass_is_fixed) + ", as the predictor does");
+  note_vibrations(result.design.notes, plant, ", as the predictor does");
   check_with_all_states(result, direct, solution.gain, static_cast<Index>(linear.fed_back.size()) / 2,
                         make_estimator_step(estimator, period_s));
   return result;
@@ -292,7 +296,7 @@ SampledDesign design_sampled_gains(const Plant& plant, const DesignWeights& weig
 
 GainCost::GainCost(const Plant& plant, const DesignWeights& weights, double smoothing, double rate_hz)
     : rate_hz_(rate_hz) {
-  const LinearPlant linear = linearize(with_sprung_mass_fixed(plant), smoothing);
+  const LinearPlant linear = linearize(without_vibrations(plant), smoothing);
   refuse_unreadable(linear);
   bool lagging = false;
   plant_ = without_motor_lag(linear, lagging);

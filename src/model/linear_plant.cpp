@@ -142,7 +142,7 @@ Plant sliding_plant(const Plant& plant) {
   return sliding;
 }
 
-Plant with_sprung_mass_fixed(Plant plant) {
+Plant without_vibrations(Plant plant) {
   const std::size_t sprung = effect_index<effects::SprungMass>();
   if (const PlantEffect* found = plant.find(sprung); found != nullptr) {
     const double corrected = make_model<double>(plant).corrected().cart_mass_kg / plant.cart_mass_kg;
@@ -150,6 +150,7 @@ Plant with_sprung_mass_fixed(Plant plant) {
         effects::SprungMass::attached_mass_kg(found->values.data(), plant.cart_mass_kg) / corrected;
     plant.remove(sprung);
   }
+  plant.remove(effect_index<effects::FlexibleRod>());
   return plant;
 }
 

@@ -43,9 +43,9 @@ LinearPlant linearize(const Plant& plant, double smoothing);
 /// bristles are removed. Valid for motions far larger than the stick-slip band.
 Plant sliding_plant(const Plant& plant);
 
-/// The plant with its sprung mass bolted to the cart, as slow motions see it: for feedback and observers,
-/// whose gains and states are those of the rigid cart.
-Plant with_sprung_mass_fixed(Plant plant);
+/// The plant with its sprung mass bolted to the cart and with a rigid rod, as slow motions see it: for
+/// feedback and observers, whose gains and states are those of the rigid bodies.
+Plant without_vibrations(Plant plant);
 
 /// x(t + duration) = a x(t) + b u for an input that is constant over the duration; exact.
 struct SampledPlant {

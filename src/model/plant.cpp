@@ -41,6 +41,15 @@ std::string fault_of_table(const PlantEffect& table) {
   return "";
 }
 
+/// "sprung_mass and backlash", say.
+std::string attached_kinds(const Plant& plant) {
+  std::string kinds;
+  for (const PlantEffect& effect : plant.effects)
+    if (attaches_mass(effect.number))
+      kinds += (kinds.empty() ? "" : " and ") + std::string(effect_registry()[effect.number].kind);
+  return kinds;
+}
+
 }  // namespace
 
 bool is_dry(const PlantEffect& effect) {
@@ -69,8 +78,8 @@ std::string fault_of(const Plant& plant) {
            "stribeck_friction";
   if (std::count_if(plant.effects.begin(), plant.effects.end(),
                     [](const PlantEffect& e) { return attaches_mass(e.number); }) > 1)
-    return "the plant has sprung_mass and backlash, and one mass at most may move on the cart: remove one of "
-           "them";
+    return "the plant has " + attached_kinds(plant) +
+           ", and one of these at most may have a motion of its own: remove the others";
   if (plant.pendulum) return "";
   for (const PlantEffect& effect : plant.effects) {
     const std::string kind(effect_registry()[effect.number].kind);

@@ -15,12 +15,14 @@ namespace upright::blind {
 namespace {
 
 bool needs_pendulum(const std::string& kind) {
-  return kind.starts_with("pivot_") || kind.starts_with("angle_") || kind.starts_with("pendulum_");
+  return kind.starts_with("pivot_") || kind.starts_with("angle_") || kind.starts_with("pendulum_") ||
+         kind == "flexible_rod";
 }
 
 /// What a pendulum shows that swings from a cart held still.
 bool shows_when_locked(const std::string& kind) {
-  return kind.starts_with("pivot_") || kind == "angle_scale" || kind == "pendulum_length";
+  return kind.starts_with("pivot_") || kind == "angle_scale" || kind == "pendulum_length" ||
+         kind == "flexible_rod";
 }
 
 bool needs_dry_level(const std::string& kind) {

@@ -136,6 +136,13 @@ std::vector<double> values_for(const std::string& kind, Size size, const Plant& 
     const double radps = between(random, 1.0, 6.0) / time_constant_s(plant);
     return {share * plant.cart_mass_kg, radps / (2.0 * std::numbers::pi), between(random, 0.03, 0.2)};
   }
+  if (kind == "flexible_rod") {
+    const double swing_radps =
+        std::sqrt(plant.gravity_mps2 * plant.pendulum->mass_kg * plant.pendulum->length_to_com_m /
+                  plant.pendulum->inertia_about_pivot_kgm2());
+    return {pick(size, 0.1, 0.3, 0.7), between(random, 3.0, 10.0) * swing_radps / (2.0 * std::numbers::pi),
+            between(random, 0.01, 0.1)};
+  }
   if (kind == "backlash") {
     const double motor_share = between(random, 0.1, 0.4), contact_radps = between(random, 200.0, 600.0);
     return {pick(size, 0.0005, 0.002, 0.008) * s.travel_m, motor_share,

@@ -30,11 +30,25 @@ void expect_values(const PlantEffect& found, std::string_view kind, std::initial
   }
 }
 
+/// A cart with friction that carries a pendulum.
+Plant cart_with_pendulum() {
+  Plant plant = cart_with_friction();
+  plant.pendulum = Pendulum{0.21, 0.305, {}};
+  return plant;
+}
+
 TEST(AttachedMassSearch, FindsASprungMass) {
   const auto values = {0.1, 4.0, 0.08};
   Plant truth = cart_with_friction();
   truth.set("sprung_mass", values);
   expect_values(only_named(cart_with_friction(), truth), "sprung_mass", values, 0.1);
+}
+
+TEST(AttachedMassSearch, FindsAFlexibleRod) {
+  const auto values = {0.5, 4.0, 0.05};
+  Plant truth = cart_with_pendulum();
+  truth.set("flexible_rod", values);
+  expect_values(only_named(cart_with_pendulum(), truth), "flexible_rod", values, 0.1);
 }
 
 TEST(AttachedMassSearch, FindsBacklash) {
@@ -56,12 +70,12 @@ TEST(AttachedMassSearch, FindsASprungMassOnAHeavyRig) {
 }
 
 TEST(AttachedMassSearch, BeginsWithinItsLimits) {
-  const std::vector<Measurement> runs = three_runs({.plant = cart_with_friction()}, 6.0, 1);
-  Plant plant = cart_with_friction();
+  Plant plant = cart_with_pendulum();
+  const std::vector<Measurement> runs = three_runs({.plant = plant}, 6.0, 1);
   const SelectionPolicy policy = policy_for(plant);
   const DataRange range = range_of(runs, plant, policy.excitation);
   const std::vector<std::size_t> masses = attached_mass_candidates(plant, range);
-  ASSERT_EQ(masses.size(), 2u);
+  ASSERT_EQ(masses.size(), 3u);
   for (const std::size_t effect : masses) {
     const std::vector<FreeParameter> free = free_parameters(effect, range, policy.prior);
     const auto starts = attached_mass_starts(effect, range, policy.prior);

@@ -24,6 +24,30 @@ Physics with(const char* kind, std::initializer_list<double> values) {
   return Physics(make_model<double>(plant));
 }
 
+/// Lagrange's equations of x, theta and q of the paper's plant at 1 V, before one was inserted in the others,
+/// with a rod of {0.4, 8 Hz, 0.1}.
+void expect_equations_of_a_bending_rod(const Plant& plant, const PlantState<double>& s,
+                                       const PlantState<double>& rate) {
+  const double moment = plant.pendulum->mass_kg * plant.pendulum->length_to_com_m;
+  const double inertia = plant.pendulum->inertia_about_pivot_kgm2(), g = plant.gravity_mps2;
+  const double h = 1.08975 * inertia / moment, m = 0.4 * inertia / (h * h), w = 2.0 * std::numbers::pi * 8.0;
+  const double sine = std::sin(s.theta_rad), cosine = std::cos(s.theta_rad);
+  const double q = s.attached_m, dq = s.attached_mps, omega = s.theta_radps;
+  const double ddx = rate.cart_mps, ddth = rate.theta_radps, ddq = rate.attached_mps;
+  EXPECT_DOUBLE_EQ(rate.attached_m, dq);
+  const double rest_kg = plant.cart_mass_kg + plant.pendulum->mass_kg - m, rest_moment = moment - m * h;
+  const double across = h * ddth + ddq, turning = h * omega + dq;
+  const double rod_n = m * (ddx + across * cosine - turning * omega * sine - dq * omega * sine -
+                            q * ddth * sine - q * omega * omega * cosine);
+  const double motor_n = plant.motor.force_per_volt_n - plant.motor.back_emf_n_per_mps * s.cart_mps;
+  EXPECT_NEAR(rest_kg * ddx + rest_moment * (cosine * ddth - sine * omega * omega) + rod_n, motor_n, 1e-12);
+  const double rod_nm = m * (h * across + q * q * ddth + 2.0 * q * dq * omega +
+                             ddx * (h * cosine - q * sine) - g * (h * sine + q * cosine));
+  EXPECT_NEAR((inertia - m * h * h) * ddth + rest_moment * (cosine * ddx - g * sine) + rod_nm, 0.0, 1e-12);
+  const double pull = 0.6 * (w * w * q + 2.0 * 0.1 * w * dq);
+  EXPECT_NEAR(across + ddx * cosine - q * omega * omega - g * sine + pull, 0.0, 1e-11);
+}
+
 /// Force on the cart beyond motor and back-EMF.
 double cart_force(const Physics& physics, double x, double v) {
   PlantState<double> s;
@@ -208,6 +232,15 @@ const std::map<std::string, std::function<void()>>& answers() {
        }},
       {"pivot_quadratic_drag",
        [] { EXPECT_DOUBLE_EQ(with("pivot_quadratic_drag", {0.001}).pivot_smooth_torque(-3.0), 0.009); }},
+      {"flexible_rod",
+       [] {
+         Plant plant = paper_plant();
+         plant.set("flexible_rod", {0.4, 8.0, 0.1});
+         const Physics p(make_model<double>(plant));
+         EXPECT_TRUE(p.has_attached_mass());
+         const PlantState<double> s{0.0, 0.4, 0.3, 1.7, 0.0, 0.0, 0.02, -0.3};
+         expect_equations_of_a_bending_rod(plant, s, p.derivative(s, 1.0, {}));
+       }},
       {"angle_offset",
        [] {
          EXPECT_DOUBLE_EQ(shown(with("angle_offset", {0.01})).theta_rad, 0.21);
@@ -317,7 +350,7 @@ INSTANTIATE_TEST_SUITE_P(All, Effect, testing::Range(std::size_t{0}, effect_coun
 });
 
 TEST(Registry, IsWhole) {
-  EXPECT_EQ(effect_count, 36u);
+  EXPECT_EQ(effect_count, 37u);
   std::set<std::string_view> kinds;
   std::size_t offset = 0;
   for (std::size_t i = 0; i < effect_count; ++i) {

@@ -64,6 +64,17 @@ TEST(LinearPlant, HasTheSwingOfASprungMass) {
   EXPECT_NEAR(poles.real().minCoeff(), -damping_ratio * std::sqrt(both) * radps, 1e-9 * radps);
 }
 
+TEST(GainDesign, TakesAFlexibleRodAsRigidAndShowsItsPoles) {
+  Plant plant = plant_named("viscous");
+  const GainDesign rigid = design_gains(plant, {}, 100.0);
+  plant.set("flexible_rod", {0.5, 30.0, 0.05});
+  const GainDesign design = design_gains(plant, {}, 100.0);
+  EXPECT_EQ(design.gains, rigid.gains);
+  EXPECT_EQ(design.closed_loop_poles.size(), rigid.closed_loop_poles.size() + 2);
+  ASSERT_FALSE(design.notes.empty());
+  EXPECT_NE(design.notes.back().find("flexible_rod"), std::string::npos);
+}
+
 TEST(GainDesign, EliminatesTheBristleThatTheVoltageCannotMoveAlone) {
   const GainDesign design = design_gains(plant_named("dynamic"), {}, 100.0);
   expect_gains(design, {170.170, 290.499, 136.020, 58.101});

@@ -9,9 +9,11 @@
 #include <algorithm>
 #include <cmath>
 
+#include "upright/model/actuator_chain.hpp"
 #include "upright/model/attached_mass.hpp"
 #include "upright/model/effect_hooks.hpp"
 #include "upright/model/elementary.hpp"
+#include "upright/model/motion_equations.hpp"
 #include "upright/model/plant_model.hpp"
 #include "upright/model/plant_state.hpp"
 #include "upright/model/scalar.hpp"
@@ -29,7 +31,7 @@ class Dynamics {
       : model_(model),
         base_(model.corrected()),
         present_(set_of(model, present)),
-        attached_(model, present_, base_.cart_mass_kg) {
+        attached_(model, present_, base_) {
     total_mass_ = base_.cart_mass_kg;
     if (attached_.is_motor()) total_mass_ = total_mass_ - attached_.mass_kg();
     coupling_ = S(0.0);
@@ -37,8 +39,10 @@ class Dynamics {
     if (model.has_pendulum) {
       total_mass_ = total_mass_ + base_.pendulum_mass_kg;
       coupling_ = base_.pendulum_mass_kg * base_.length_to_com_m;
+      inertia_kgm2_ = base_.inertia_about_pivot_kgm2;
+      if (attached_.is_on_rod()) leave_out_mass_on_rod();
       gravity_torque_ = coupling_ * base_.gravity_mps2;
-      inertia_ = Divisor<S>(base_.inertia_about_pivot_kgm2);
+      inertia_ = Divisor<S>(inertia_kgm2_);
     }
     mass_ = Divisor<S>(total_mass_);
     for_each_effect([&]<std::size_t I>() {
@@ -89,37 +93,11 @@ class Dynamics {
   }
 
   /// Voltage after dead zone, gain, offset and saturation; engines treat delay and lag.
-  S actuate(S volts) const {
-    for (int stage = 1; stage <= 4; ++stage)
-      for_each_effect([&]<std::size_t I>() {
-        using E = EffectAt<I>;
-        if constexpr (requires { E::actuator_stage; })
-          if (E::actuator_stage == stage && present_.template has<I>()) volts = E::actuate(p<I>(), volts);
-      });
-    return volts;
-  }
-
+  S actuate(const S& volts) const { return actuated(model_, present_, volts); }
   /// Delay of the plant's input [s].
-  S input_delay_s() const {
-    S delay(0.0);
-    for_each_effect([&]<std::size_t I>() {
-      using E = EffectAt<I>;
-      if constexpr (requires { E::input_delay_s(p<I>()); })
-        if (present_.template has<I>()) delay = delay + E::input_delay_s(p<I>());
-    });
-    return delay;
-  }
-
+  S input_delay_s() const { return input_delay_of(model_, present_); }
   /// Of the motor lag [s]; 0: none.
-  S motor_time_constant_s() const {
-    S constant(0.0);
-    for_each_effect([&]<std::size_t I>() {
-      using E = EffectAt<I>;
-      if constexpr (requires { E::motor_time_constant_s(p<I>()); })
-        if (present_.template has<I>()) constant = E::motor_time_constant_s(p<I>());
-    });
-    return constant;
-  }
+  S motor_time_constant_s() const { return motor_time_constant_of(model_, present_); }
 
   /// The outputs of the sensors in a state (before quantisation).
   Outputs<S> measure(const PlantState<S>& state) const {
@@ -184,11 +162,7 @@ class Dynamics {
     } else if (cart_dry_) {
       force = force + cart_sliding_force(state, motor_v, contacts.cart);
     }
-    S torque(0.0);
-    if (model_.has_pendulum) {
-      torque = pivot_smooth_torque(state.theta_radps);
-      if (pivot_dry_) torque = torque + pivot_sliding_torque(state.theta_radps, contacts.pivot);
-    }
+    const S torque = model_.has_pendulum ? pivot_torque(state.theta_radps, contacts.pivot) : S(0.0);
     const bool cart_rests = model_.cart_locked || (contacts.cart == Contact::stick && cart_can_stick());
     const bool pivot_rests = !model_.has_pendulum || (contacts.pivot == Contact::stick && pivot_can_stick());
     accelerate(state, force, torque, cart_rests, pivot_rests, rate);
@@ -371,25 +345,28 @@ class Dynamics {
     const S force = cart_smooth_force(at_rest, motor_v);
     if (!model_.has_pendulum) return force;
     const auto [s, c] = elementary::sine_and_cosine(state.theta_rad);
+    const bool pivot_rests = pivot == Contact::stick && pivot_can_stick();
+    const S torque = pivot_rests ? S(0.0) : pivot_torque(state.theta_radps, pivot);
+    if (attached_.is_on_rod()) return with_rod(state, s, c, force, torque).cart_load(pivot_rests);
     S theta_acceleration(0.0);
-    if (!(pivot == Contact::stick && pivot_can_stick())) {
-      S torque = pivot_smooth_torque(state.theta_radps);
-      if (pivot_dry_) torque = torque + pivot_sliding_torque(state.theta_radps, pivot);
-      theta_acceleration = (gravity_torque_ * s + torque) / inertia_;
-    }
+    if (!pivot_rests) theta_acceleration = (gravity_torque_ * s + torque) / inertia_;
     return force + coupling_ * (s * state.theta_radps * state.theta_radps - c * theta_acceleration);
   }
 
   /// The torque that dry friction must balance to hold a resting pendulum, with the cart's present mode.
   S pivot_load(const PlantState<S>& state, const S& motor_v, Contact cart) const {
     const auto [s, c] = elementary::sine_and_cosine(state.theta_rad);
-    const S gravity = gravity_torque_ * s;
-    const bool cart_rests = model_.cart_locked || (cart == Contact::stick && cart_can_stick());
-    if (cart_rests) return gravity;
     PlantState<S> at_rest = state;
     at_rest.theta_radps = S(0.0);
-    const PlantState<S> rate = derivative(at_rest, motor_v, {cart, Contact::stick});
-    return gravity - coupling_ * c * rate.cart_mps;
+    S load = gravity_torque_ * s, coupling = coupling_ * c;
+    if (attached_.is_on_rod()) {
+      const MotionEquations<S> at = with_rod(at_rest, s, c, S(0.0), S(0.0));
+      load = at.torque_nm;
+      coupling = at.coupling_kgm;
+    }
+    const bool cart_rests = model_.cart_locked || (cart == Contact::stick && cart_can_stick());
+    if (cart_rests) return load;
+    return load - coupling * derivative(at_rest, motor_v, {cart, Contact::stick}).cart_mps;
   }
 
   /// Greatest rate of the motion in this state [1/s]; engines keep their steps below a fraction of its
@@ -466,7 +443,7 @@ class Dynamics {
   template <class T>
   T smooth_force(const PlantState<T>& state, const S& motor_v) const {
     T force = attached_.is_motor() ? T(0.0) : motor_force_of(state, motor_v);
-    if (attached_.exists())
+    if (attached_.exists() && !attached_.is_on_rod())
       force = force + attached_.mass_kg() * attached_.pull_mps2(model_, state.attached_m, state.attached_mps);
     for_each_effect([&]<std::size_t I>() {
       using E = EffectAt<I>;
@@ -489,7 +466,9 @@ class Dynamics {
 
   void move_attached_mass(const PlantState<S>& state, const S& motor_v, PlantState<S>& rate) const {
     rate.attached_m = state.attached_mps;
-    rate.attached_mps = -attached_.pull_mps2(model_, state.attached_m, state.attached_mps) - rate.cart_mps;
+    rate.attached_mps = -attached_.pull_mps2(model_, state.attached_m, state.attached_mps);
+    if (attached_.is_on_rod()) return attached_.carry_on_rod(state, base_.gravity_mps2, rate);
+    rate.attached_mps = rate.attached_mps - rate.cart_mps;
     if (attached_.is_motor())
       rate.attached_mps = rate.attached_mps + motor_force(state, motor_v) / attached_.mass_kg();
   }
@@ -531,6 +510,12 @@ class Dynamics {
     return -cart_dry_level(state, motor_v, speed, direction) * direction;
   }
 
+  /// Without gravity.
+  S pivot_torque(const S& omega, Contact contact) const {
+    const S torque = pivot_smooth_torque(omega);
+    return pivot_dry_ ? S(torque + pivot_sliding_torque(omega, contact)) : torque;
+  }
+
   S pivot_sliding_torque(const S& omega, Contact contact) const {
     if (model_.smoothing > 0.0) return -pivot_dry_level() * elementary::tanh(S(model_.smoothing) * omega);
     return -pivot_dry_level() * S(static_cast<double>(contact));
@@ -548,9 +533,28 @@ class Dynamics {
     accelerate(state, s, c, force, torque, cart_rests, pivot_rests, rate);
   }
 
+  /// The rigid bodies of a pendulum whose rod bends are those without the mass on the rod.
+  void leave_out_mass_on_rod() {
+    const S moment_kgm = attached_.mass_kg() * attached_.lever_m();
+    total_mass_ = total_mass_ - attached_.mass_kg();
+    coupling_ = coupling_ - moment_kgm;
+    inertia_kgm2_ = inertia_kgm2_ - moment_kgm * attached_.lever_m();
+  }
+
+  /// With a rod that bends. `force` and `torque` as for `accelerate`.
+  MotionEquations<S> with_rod(const PlantState<S>& state, const S& s, const S& c, const S& force,
+                              const S& torque) const {
+    const S centripetal_n = coupling_ * s * state.theta_radps * state.theta_radps;
+    const MotionEquations<S> rest{total_mass_, coupling_ * c, inertia_kgm2_, force + centripetal_n,
+                                  gravity_torque_ * s + torque};
+    return rest + attached_.on_rod(model_, state, s, c);
+  }
+
   /// The same with a pendulum. Eight parameters: callers know the sine and cosine of its angle already.
   void accelerate(const PlantState<S>& state, const S& s, const S& c, const S& force, const S& torque,
                   bool cart_rests, bool pivot_rests, PlantState<S>& rate) const {
+    if (attached_.is_on_rod())
+      return with_rod(state, s, c, force, torque).solve(cart_rests, pivot_rests, rate);
     const S f_n = force + coupling_ * s * state.theta_radps * state.theta_radps;
     if (pivot_rests) {
       if (!cart_rests) rate.cart_mps = f_n / mass_;
@@ -584,7 +588,7 @@ class Dynamics {
   BaseParameters<S> base_;
   Present present_;
   AttachedMass<S, Present> attached_;
-  S total_mass_, coupling_, gravity_torque_;
+  S total_mass_, coupling_, gravity_torque_, inertia_kgm2_{1.0};
   Divisor<S> inertia_{S(1.0)}, mass_{S(1.0)};  ///< about the pivot, and of both bodies
   S level_of_time_{0.0};                       ///< of the cart's dry friction at the time that was set
   bool bristles_ = false, cart_dry_ = false, pivot_dry_ = false, cart_kink_ = false, pivot_kink_ = false,

@@ -22,6 +22,10 @@
 //   S attached_pull_mps2(p, mass_kg, q, rate)       by which its spring pulls it back to the cart, at q
 //                                                   from there [m/s^2]
 //   bool motor_is_attached                          whether that mass is the motor, a part of the cart's
+//   S vibrating_share(p)                            the share of the pendulum's inertia that moves across
+//                                                   its rod, with the hook attached_pull_mps2
+//   double lever_over_oscillation                   where on the rod, over the distance of the centre of
+//                                                   oscillation from the pivot
 //   S drive_deflection_m(p, force)                  position of the motor relative to the cart [m]
 //   S encoder_error_m(p, x)                         what the cart's encoder shows too much [m]
 //   void measure(p, Outputs<S>&)                    one linear stage of the sensors, by `sensor_stage`

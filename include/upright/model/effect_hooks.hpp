@@ -37,9 +37,14 @@ template <class E, class S>
 constexpr bool has_bristles = requires(const S* p) {
   E::bristle_stiffness(p);
 };
-/// A mass with states of its own.
+/// A rod that bends: a share of the pendulum with states of its own.
 template <class E, class S>
-constexpr bool has_attached_mass = requires(const S* p) {
+constexpr bool has_bending_rod = requires(const S* p) {
+  E::vibrating_share(p);
+};
+/// A mass with states of its own, on the cart or on the rod.
+template <class E, class S>
+constexpr bool has_attached_mass = has_bending_rod<E, S> || requires(const S* p) {
   E::attached_mass_kg(p, *p);
 };
 

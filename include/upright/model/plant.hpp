@@ -39,7 +39,7 @@ struct PlantEffect {
 /// Whether an effect is a level of dry friction. Of a force table its values decide.
 bool is_dry(const PlantEffect& effect);
 
-/// Whether an effect attaches a mass with a motion of its own to the cart (attached_mass.hpp).
+/// Whether an effect attaches a mass with a motion of its own to the plant (attached_mass.hpp).
 bool attaches_mass(std::size_t effect);
 
 /// Rigid body, motor and effects.

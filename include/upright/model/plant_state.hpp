@@ -6,7 +6,7 @@
 namespace upright {
 
 /// State of the plant. `motor_v` is used with motor_lag only, `bristle_m` with bristle_friction only,
-/// `attached_m` and `attached_mps` with sprung_mass or backlash only.
+/// `attached_m` and `attached_mps` with sprung_mass, backlash or flexible_rod only.
 template <class S>
 struct PlantState {
   S cart_m{};        ///< position of the cart [m]
@@ -15,8 +15,8 @@ struct PlantState {
   S theta_radps{};   ///< rate of the pendulum [rad/s]
   S motor_v{};       ///< motor voltage after the motor lag [V]
   S bristle_m{};     ///< deflection of the bristles [m]
-  S attached_m{};    ///< position of the attached mass relative to the cart, 0 at rest [m]
-  S attached_mps{};  ///< velocity of the attached mass relative to the cart [m/s]
+  S attached_m{};    ///< position of the attached mass relative to cart or rod, 0 at rest [m]
+  S attached_mps{};  ///< velocity of the attached mass relative to cart or rod [m/s]
 };
 
 /// Mode of a contact with dry friction: sticking, or sliding in one direction.

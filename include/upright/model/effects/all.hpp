@@ -16,6 +16,7 @@
 #include "upright/model/effects/coulomb_friction.hpp"
 #include "upright/model/effects/drive_compliance.hpp"
 #include "upright/model/effects/encoder_eccentricity.hpp"
+#include "upright/model/effects/flexible_rod.hpp"
 #include "upright/model/effects/force_table.hpp"
 #include "upright/model/effects/friction_asymmetry.hpp"
 #include "upright/model/effects/input_delay.hpp"
@@ -71,6 +72,7 @@ using AllEffects =
                effects::PivotViscousFriction,
                effects::PivotCoulombFriction,
                effects::PivotQuadraticDrag,
+               effects::FlexibleRod,
                effects::DriveCompliance,
                effects::AngleOffset,
                effects::EncoderEccentricity,
