@@ -3,9 +3,9 @@
 // products for each buffered voltage).
 //
 // The model is the plant file's while the cart slides (dry levels and bristles taken out: they change no
-// slope; a sprung mass fixed to the cart, a rigid rod), as an exact sampled line s' = a s + b u + f. The static actuator
-// chain (dead zone, gain, offset, saturation) is not linearised: the buffered voltages go through it.
-// input_delay is looked through as well, motor_lag is a state that follows from the voltages.
+// slope; a sprung mass fixed to the cart, a rigid rod), as an exact sampled line s' = a s + b u + f. The
+// static actuator chain (dead zone, gain, offset, saturation) is not linearised: the buffered voltages go
+// through it. input_delay is looked through as well, motor_lag is a state that follows from the voltages.
 //
 // Whether the measurement or the voltage is late makes no difference to the loop: with a total delay of d
 // periods the state d periods after the newest one known is a^d s plus what d known voltages add.

@@ -117,8 +117,7 @@ void find_poles(GainDesign& design, const LinearPlant& linear, const RowVectorXd
   if (design.closed_loop_poles.front().real() >= 0.0)
     throw ConfigError(
         "the gains designed with a quick motor, a fixed sprung mass and a rigid rod do not stabilize the "
-        "plant "
-        "with its motor_lag, sprung_mass and flexible_rod, " +
+        "plant with its motor_lag, sprung_mass and flexible_rod, " +
         matrix_text("A", whole.a) + ", " + matrix_text("b", whole.b) +
         ": raise --r, or shorten the motor lag");
 }

@@ -44,7 +44,8 @@ std::vector<Subject> subjects() {
   add("track", exponential, E{"cogging_force", {0.3, 0.01, 0.2}}, E{"cable_spring", {2.0, 0.01}});
   add("warming", exponential, E{"warming_friction", {0.3, 1.5}}, E{"viscous_asymmetry", {0.5}});
   add("sprung", exponential, E{"sprung_mass", {0.1, 6.0, 0.05}}, E{"motor_lag", {0.004}});
-  add("flexible_rod", exponential, E{"flexible_rod", {0.3, 12.0, 0.05}}, E{"pivot_coulomb_friction", {0.002}});
+  add("flexible_rod", exponential, E{"flexible_rod", {0.3, 12.0, 0.05}},
+      E{"pivot_coulomb_friction", {0.002}});
   add("velocity_ripple", exponential, E{"velocity_ripple", {0.2, 0.15}});
   add("loaded", exponential, E{"load_dependent_friction", {0.1}}, E{"motor_lag", {0.004}});
   // Steps of fixed length cross the kink where the motor's force changes direction: up to 3.7e-6.
