@@ -565,11 +565,7 @@ class Dynamics {
       rate.theta_radps = tau_nm / inertia_;
       return;
     }
-    const S off_diagonal = coupling_ * c;
-    const S inverse_determinant =
-        S(1.0) / (total_mass_ * base_.inertia_about_pivot_kgm2 - off_diagonal * off_diagonal);
-    rate.cart_mps = (base_.inertia_about_pivot_kgm2 * f_n - off_diagonal * tau_nm) * inverse_determinant;
-    rate.theta_radps = (total_mass_ * tau_nm - off_diagonal * f_n) * inverse_determinant;
+    solve_both(total_mass_, S(coupling_ * c), base_.inertia_about_pivot_kgm2, f_n, tau_nm, rate);
   }
 
   template <bool Stiffness>

@@ -5,6 +5,15 @@
 
 namespace upright {
 
+/// Sets both accelerations in `rate`. The arguments are those of MotionEquations.
+template <class S>
+void solve_both(const S& cart_kg, const S& coupling_kgm, const S& pendulum_kgm2, const S& force_n,
+                const S& torque_nm, PlantState<S>& rate) {
+  const S inverse_determinant = S(1.0) / (cart_kg * pendulum_kgm2 - coupling_kgm * coupling_kgm);
+  rate.cart_mps = (pendulum_kgm2 * force_n - coupling_kgm * torque_nm) * inverse_determinant;
+  rate.theta_radps = (cart_kg * torque_nm - coupling_kgm * force_n) * inverse_determinant;
+}
+
 /// Mass matrix and right-hand side, with a = x'' and b = th'':
 ///
 ///   cart a + coupling b     = force
@@ -38,9 +47,7 @@ struct MotionEquations {
       rate.theta_radps = torque_nm / pendulum_kgm2;
       return;
     }
-    const S determinant = cart_kg * pendulum_kgm2 - coupling_kgm * coupling_kgm;
-    rate.cart_mps = (pendulum_kgm2 * force_n - coupling_kgm * torque_nm) / determinant;
-    rate.theta_radps = (cart_kg * torque_nm - coupling_kgm * force_n) / determinant;
+    solve_both(cart_kg, coupling_kgm, pendulum_kgm2, force_n, torque_nm, rate);
   }
 };
 
