@@ -66,6 +66,12 @@ bool attaches_mass(std::size_t effect) {
   return attaches;
 }
 
+bool needs_pendulum(std::size_t effect) {
+  const EffectInfo& info = effect_registry()[effect];
+  return info.enters == Enters::pendulum || info.kind.starts_with("pendulum_") ||
+         info.kind.starts_with("angle_");
+}
+
 std::string fault_of(const Plant& plant) {
   if (const PlantEffect* table = plant.find(effect_index<effects::ForceTable>()))
     if (std::string fault = fault_of_table(*table); !fault.empty()) return fault;
@@ -83,8 +89,7 @@ std::string fault_of(const Plant& plant) {
   if (plant.pendulum) return "";
   for (const PlantEffect& effect : plant.effects) {
     const std::string kind(effect_registry()[effect.number].kind);
-    if (effect_registry()[effect.number].enters == Enters::pendulum || kind.starts_with("pendulum_") ||
-        kind.starts_with("angle_"))
+    if (needs_pendulum(effect.number))
       return "the plant has no pendulum, but has " + kind + ": add the pendulum, or remove " + kind;
   }
   return "";

@@ -14,11 +14,6 @@ namespace upright::blind {
 
 namespace {
 
-bool needs_pendulum(const std::string& kind) {
-  return kind.starts_with("pivot_") || kind.starts_with("angle_") || kind.starts_with("pendulum_") ||
-         kind == "flexible_rod";
-}
-
 /// What a pendulum shows that swings from a cart held still.
 bool shows_when_locked(const std::string& kind) {
   return kind.starts_with("pivot_") || kind == "angle_scale" || kind == "pendulum_length" ||
@@ -180,7 +175,10 @@ std::vector<std::string> random_pair(std::uint64_t seed) {
 
 std::string choose_campaign(const Request& request, double rate_hz, Random& random) {
   const auto& kinds = request.hidden;
-  const bool pendulum = std::any_of(kinds.begin(), kinds.end(), needs_pendulum);
+  const bool pendulum = std::any_of(kinds.begin(), kinds.end(), [](const std::string& kind) {
+    const std::size_t effect = effect_number(kind);  // what is unknown has no number
+    return effect < effect_count && needs_pendulum(effect);
+  });
   const double u = between(random, 0.0, 1.0);
   if (std::all_of(kinds.begin(), kinds.end(), shows_when_locked) && u < 0.3) return "locked";
   const double v = between(random, 0.0, 1.0);

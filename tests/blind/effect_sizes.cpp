@@ -4,6 +4,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "model/rigid_body.hpp"
+
 namespace upright::blind {
 
 namespace {
@@ -137,9 +139,7 @@ std::vector<double> values_for(const std::string& kind, Size size, const Plant& 
     return {share * plant.cart_mass_kg, radps / (2.0 * std::numbers::pi), between(random, 0.03, 0.2)};
   }
   if (kind == "flexible_rod") {
-    const double swing_radps =
-        std::sqrt(plant.gravity_mps2 * plant.pendulum->mass_kg * plant.pendulum->length_to_com_m /
-                  plant.pendulum->inertia_about_pivot_kgm2());
+    const double swing_radps = std::sqrt(plant.gravity_mps2 / rigid_body(plant).equivalent_length_m());
     return {pick(size, 0.1, 0.3, 0.7), between(random, 3.0, 10.0) * swing_radps / (2.0 * std::numbers::pi),
             between(random, 0.01, 0.1)};
   }

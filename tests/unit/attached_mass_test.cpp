@@ -204,7 +204,7 @@ TYPED_TEST(AttachedMassMotion, FlexibleRodKeepsTheEnergy) {
   EXPECT_GT(std::abs(e.state().attached_m - start.attached_m), 1e-3);
 }
 
-// Dry friction holds the pivot until the rod pulls harder, and the cart until the pendulum does.
+// Dry friction holds the pivot until the rod pulls harder. The cart stays where it is.
 TYPED_TEST(AttachedMassMotion, FlexibleRodVibratesOnAStickingPivot) {
   constexpr double share = 0.6, frequency_hz = 5.0, damping_ratio = 0.04;
   Plant plant = plant_with_rod(share, frequency_hz, damping_ratio);

@@ -42,6 +42,9 @@ bool is_dry(const PlantEffect& effect);
 /// Whether an effect attaches a mass with a motion of its own to the plant (attached_mass.hpp).
 bool attaches_mass(std::size_t effect);
 
+/// Whether an effect has no meaning without a pendulum.
+bool needs_pendulum(std::size_t effect);
+
 /// Rigid body, motor and effects.
 struct Plant {
   double cart_mass_kg = 0.0;         ///< of the cart alone [kg]
