@@ -319,17 +319,20 @@ std::vector<double> noise_objectives(const FitData& data, const Plant& plant,
   const auto objectives = estimated_states(plant) == state_count
                               ? objectives_with_noise<state_count>
                               : objectives_with_noise<LinearStep::rigid_states>;
+  std::vector<FilterNoise<Lanes>> together;
+  for (std::size_t first = 0; first < noises.size(); first += lane_count)
+    together.push_back(noise_of_filters(noises.data() + first, std::min(lane_count, noises.size() - first)));
+  std::vector<std::array<double, lane_count>> parts(data.segments.size() * together.size());
+  parallel_for(parts.size(), [&](std::size_t i) {
+    const std::size_t s = i / together.size();
+    const Measurement& run = (*data.runs)[data.segments[s].run];
+    parts[i] = objectives(linearised[s].steps, run, plant, together[i % together.size()]).values();
+  });
   std::vector<double> sums(noises.size(), 0.0);
-  for (std::size_t first = 0; first < noises.size(); first += lane_count) {
-    const std::size_t count = std::min(lane_count, noises.size() - first);
-    const FilterNoise<Lanes> together = noise_of_filters(noises.data() + first, count);
-    std::vector<std::array<double, lane_count>> parts(data.segments.size());
-    parallel_for(parts.size(), [&](std::size_t s) {
-      parts[s] =
-          objectives(linearised[s].steps, (*data.runs)[data.segments[s].run], plant, together).values();
-    });
-    for (const auto& part : parts)
-      for (std::size_t i = 0; i < count; ++i) sums[first + i] += part[i];
+  for (std::size_t i = 0; i < parts.size(); ++i) {
+    const std::size_t first = i % together.size() * lane_count;
+    for (std::size_t n = first; n < std::min(first + lane_count, noises.size()); ++n)
+      sums[n] += parts[i][n - first];
   }
   for (double& sum : sums)
     if (!std::isfinite(sum)) sum = std::numeric_limits<double>::infinity();
