@@ -10,6 +10,7 @@
 
 #include "base/angle_units.hpp"
 #include "base/median.hpp"
+#include "base/parallel.hpp"
 #include "column_timing.hpp"
 #include "data_hypotheses.hpp"
 #include "dataset_file.hpp"
@@ -434,11 +435,13 @@ std::optional<DataMistake> mistake_in(const Measurement& run, const Plant& plant
 }  // namespace
 
 std::vector<DataMistake> find_mistakes(const std::vector<Measurement>& runs, const Plant& plant) {
+  std::vector<std::optional<DataMistake>> of_runs(runs.size());
+  parallel_for(runs.size(), [&](std::size_t r) {
+    if (runs[r].size() >= 2) of_runs[r] = mistake_in(runs[r], plant, r);
+  });
   std::vector<DataMistake> mistakes;
-  for (std::size_t r = 0; r < runs.size(); ++r) {
-    if (runs[r].size() < 2) continue;
-    if (auto mistake = mistake_in(runs[r], plant, r)) mistakes.push_back(std::move(*mistake));
-  }
+  for (std::optional<DataMistake>& mistake : of_runs)
+    if (mistake) mistakes.push_back(std::move(*mistake));
   return mistakes;
 }
 
