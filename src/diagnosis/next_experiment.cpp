@@ -4,8 +4,8 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
-#include <span>
 
+#include "base/parallel.hpp"
 #include "experiment/experiment.hpp"
 #include "upright/base/error.hpp"
 #include "upright/sim/simulator.hpp"
@@ -65,6 +65,52 @@ Trace follow(const Plant& plant, const Piece& piece, const std::vector<LogRecord
   return trace;
 }
 
+/// The noise of the sensors, by which differences of their signals are measured.
+struct OutputNoise {
+  double cart_m = 1e-5, theta_rad = 5e-4;
+};
+
+OutputNoise noise_of(const std::vector<Measurement>& runs) {
+  OutputNoise noise;
+  for (const Measurement& run : runs) {
+    if (run.has_cart()) noise.cart_m = run.cart_noise_m();
+    if (run.has_theta()) noise.theta_rad = run.theta_noise_rad();
+  }
+  return noise;
+}
+
+/// How far the signals of the nearest alternative are from those of the chosen plant in an experiment: root
+/// mean square [sensor noise]. Absent where the chosen plant cannot do the experiment.
+std::optional<double> distance_to_nearest(const Experiment& experiment, const Plant& chosen,
+                                          const std::vector<std::pair<std::size_t, Plant>>& alternatives,
+                                          const OutputNoise& noise) {
+  if (!chosen.pendulum && experiment.pieces.front().kind->needs_pendulum()) return std::nullopt;
+  const ExperimentSetup setup = setup_for(experiment, chosen);
+  std::vector<Piece> pieces;
+  try {
+    pieces = plan_pieces(setup);
+  } catch (const ConfigError&) {
+    return std::nullopt;  // this plant cannot do it within the travel
+  }
+  std::vector<double> sums(alternatives.size(), 0.0);
+  std::size_t samples = 0;
+  for (const Piece& piece : pieces) {
+    const std::vector<LogRecord> rows = rehearse(piece, setup).rows;
+    const Trace base = follow(chosen, piece, rows);
+    samples += rows.size();
+    for (std::size_t i = 0; i < alternatives.size(); ++i) {
+      const Trace other = follow(alternatives[i].second, piece, rows);
+      for (std::size_t k = 0; k < rows.size(); ++k)
+        sums[i] += std::pow((base.cart_m[k] - other.cart_m[k]) / noise.cart_m, 2) +
+                   std::pow((base.theta_rad[k] - other.theta_rad[k]) / noise.theta_rad, 2);
+    }
+  }
+  double nearest = std::numeric_limits<double>::infinity();
+  for (const double sum : sums)
+    nearest = std::min(nearest, std::sqrt(sum / static_cast<double>(std::max<std::size_t>(samples, 1))));
+  return nearest;
+}
+
 }  // namespace
 
 std::vector<LibraryExperiment> experiment_library() {
@@ -77,39 +123,17 @@ std::vector<LibraryExperiment> experiment_library() {
 std::optional<NextExperiment> choose_experiment(
     const Plant& chosen, const std::vector<std::pair<std::size_t, Plant>>& alternatives,
     const std::vector<Measurement>& runs) {
-  double cart_noise = 1e-5, theta_noise = 5e-4;
-  for (const Measurement& run : runs) {
-    if (run.has_cart()) cart_noise = run.cart_noise_m();
-    if (run.has_theta()) theta_noise = run.theta_noise_rad();
-  }
+  const OutputNoise noise = noise_of(runs);
+  const std::vector<LibraryExperiment> library = experiment_library();
+  std::vector<std::optional<double>> distances(library.size());
+  parallel_for(library.size(), [&](std::size_t i) {
+    distances[i] = distance_to_nearest(library[i].experiment, chosen, alternatives, noise);
+  });
   std::optional<NextExperiment> best;
-  for (const LibraryExperiment& item : experiment_library()) {
-    const ExperimentSetup setup = setup_for(item.experiment, chosen);
-    if (!chosen.pendulum && item.experiment.pieces.front().kind->needs_pendulum()) continue;
-    std::vector<Piece> pieces;
-    try {
-      pieces = plan_pieces(setup);
-    } catch (const ConfigError&) {
-      continue;  // this plant cannot do it within the travel
-    }
-    double nearest = std::numeric_limits<double>::infinity();
-    std::vector<double> sums(alternatives.size(), 0.0);
-    std::size_t samples = 0;
-    for (const Piece& piece : pieces) {
-      const std::vector<LogRecord> rows = rehearse(piece, setup).rows;
-      const Trace base = follow(chosen, piece, rows);
-      samples += rows.size();
-      for (std::size_t i = 0; i < alternatives.size(); ++i) {
-        const Trace other = follow(alternatives[i].second, piece, rows);
-        for (std::size_t k = 0; k < rows.size(); ++k)
-          sums[i] += std::pow((base.cart_m[k] - other.cart_m[k]) / cart_noise, 2) +
-                     std::pow((base.theta_rad[k] - other.theta_rad[k]) / theta_noise, 2);
-      }
-    }
-    for (const double sum : sums)
-      nearest = std::min(nearest, std::sqrt(sum / static_cast<double>(std::max<std::size_t>(samples, 1))));
-    if (!best || nearest > best->distance)
-      best = NextExperiment{item.experiment.name, item.experiment.why, item.file, nearest};
+  for (std::size_t i = 0; i < library.size(); ++i) {
+    const LibraryExperiment& item = library[i];
+    if (distances[i] && (!best || *distances[i] > best->distance))
+      best = NextExperiment{item.experiment.name, item.experiment.why, item.file, *distances[i]};
   }
   return best;
 }
