@@ -11,13 +11,14 @@
 namespace upright {
 namespace {
 
-Plant rig_plant() {
+/// So many times as heavy, with a motor and friction so many times as strong, it moves as the light plant.
+Plant rig_plant(double times = 1.0) {
   Plant plant;
-  plant.cart_mass_kg = 0.8;
-  plant.pendulum = Pendulum{0.2, 0.3, {}};
-  plant.motor = {1.7, 7.7};
-  plant.set("viscous_friction", {3.0});
-  plant.set("coulomb_friction", {0.4});
+  plant.cart_mass_kg = 0.8 * times;
+  plant.pendulum = Pendulum{0.2 * times, 0.3, {}};
+  plant.motor = {1.7 * times, 7.7 * times};
+  plant.set("viscous_friction", {3.0 * times});
+  plant.set("coulomb_friction", {0.4 * times});
   plant.set("input_delay", {0.003});
   return plant;
 }
@@ -50,20 +51,23 @@ TEST(SimulateSegments, OfTheTruePlantLeavesTheEncodersSteps) {
   }
 }
 
+/// A fit from the estimated start alone ends elsewhere in 13 of the 18 segments of each plant.
 TEST(SimulateSegments, FindsTheBasinOfTheStartOnACoggedTrack) {
-  blind::Rig rig{.plant = rig_plant()};
-  rig.plant.remove(effect_number("coulomb_friction"));
-  rig.plant.set("cogging_force", {0.58, 0.0156, -2.3});
-  std::vector<Measurement> runs;
-  for (unsigned seed = 1; seed <= 6; ++seed) {
-    blind::Plan plan = short_plan(blind::Experiment::multisine);
-    plan.duration_s = 6.0;
-    plan.amplitude_v = 0.6;
-    plan.seed = seed;
-    runs.push_back(measure(rig, plan, "run"));
+  for (const double times : {1.0, 100.0}) {
+    blind::Rig rig{.plant = rig_plant(times)};
+    rig.plant.remove(effect_number("coulomb_friction"));
+    rig.plant.set("cogging_force", {1.0 * times, 0.005, -2.3});
+    std::vector<Measurement> runs;
+    for (unsigned seed = 1; seed <= 6; ++seed) {
+      blind::Plan plan = short_plan(blind::Experiment::multisine);
+      plan.duration_s = 6.0;
+      plan.amplitude_v = 1.0;
+      plan.seed = seed;
+      runs.push_back(measure(rig, plan, "run"));
+    }
+    for (const SimulatedSegment& trace : simulate_segments(rig.plant, runs, cut_segments(runs)))
+      EXPECT_LT(rms_of_difference(trace.cart_m, trace.simulated_cart_m), rig.cart_step_m);
   }
-  for (const SimulatedSegment& trace : simulate_segments(rig.plant, runs, cut_segments(runs)))
-    EXPECT_LT(rms_of_difference(trace.cart_m, trace.simulated_cart_m), rig.cart_step_m);
 }
 
 TEST(SimulateSegments, OfAnotherPlantIsOff) {
