@@ -155,11 +155,16 @@ bool is_recognised(const json& r) {
   return is_described(r) || (!is_failed(r) && r.at("verdict") == "unexplained");
 }
 
+bool has_number(const json& r, const char* name) {
+  return r.contains(name) && r.at(name).is_number();
+}
+
+double number_in(const json& r, const char* name) {
+  return has_number(r, name) ? r.at(name).get<double>() : std::nan("");
+}
+
 double shrinking_of(const json& r) {
-  const auto gap = [&](const char* name) {
-    return r.contains(name) && r.at(name).is_number() ? r.at(name).get<double>() : std::nan("");
-  };
-  return gap("gap_before") / gap("gap_after");
+  return number_in(r, "gap_before") / number_in(r, "gap_after");
 }
 
 std::vector<Estimate> estimates_of(const json& r, const char* truths) {

@@ -47,6 +47,9 @@ bool names_a_structure(const nlohmann::json& record);
 /// The verdict says that something is there that no effect explains.
 bool is_recognised(const nlohmann::json& record);
 bool is_described(const nlohmann::json& record);
+bool has_number(const nlohmann::json& record, const char* name);
+/// A number of a record; NaN where there is none.
+double number_in(const nlohmann::json& record, const char* name);
 /// How many times smaller the held-out gap is with the model found; NaN without a gap.
 double shrinking_of(const nlohmann::json& record);
 

@@ -114,10 +114,6 @@ Figure coverage_figure(const Share& share, double low, double high) {
   return figure;
 }
 
-bool has_number(const json& r, const char* name) {
-  return r.contains(name) && r.at(name).is_number();
-}
-
 bool shown_single(const json& r) {
   return is_single(r) && is_shown(r);
 }
@@ -145,7 +141,7 @@ bool is_described_well(const json& r) {
 
 /// A gap is 1 at the noise floor, so a smaller one than this cannot shrink so much.
 bool may_be_described_well(const json& r) {
-  return described_unknown(r) && r.at("gap_before").get<double>() >= described_shrinking;
+  return described_unknown(r) && number_in(r, "gap_before") >= described_shrinking;
 }
 
 Records of_condition(const Records& records, const std::string& condition, bool timing = false) {
@@ -357,11 +353,9 @@ void write_spreads(std::ostringstream& out, const Records& records) {
   const std::vector<Goals> conditions = measured_conditions(records);
   out << "\nMedian, 90th percentile and largest value over cases with a result:\n\n";
   write_header(out, "value", conditions, false);
-  const auto field = [](const char* name) {
-    return [=](const json& r) { return has_number(r, name) ? r.at(name).get<double>() : std::nan(""); };
-  };
-  const auto ratio = [=](const char* above, const char* below) {
-    return [=](const json& r) { return field(above)(r) / field(below)(r); };
+  const auto field = [](const char* name) { return [=](const json& r) { return number_in(r, name); }; };
+  const auto ratio = [](const char* above, const char* below) {
+    return [=](const json& r) { return number_in(r, above) / number_in(r, below); };
   };
   const auto of = [](const Question& asked, const std::function<double(const json&)>& value) {
     return [=](const json& r) { return asked(r) ? value(r) : std::nan(""); };
