@@ -183,7 +183,9 @@ bool lanes_can_run(const LoopSetup& setup) {
     return false;
   if (setup.model.cart_locked || !setup.model.has_pendulum) return false;
   const Dynamics<double> physics(setup.model);
-  if (physics.changes_with_time() || physics.depends_on_load() || physics.has_attached_mass()) return false;
+  if (physics.changes_with_time() || physics.depends_on_load() || physics.has_attached_mass() ||
+      physics.loses_counts())
+    return false;
   const double pivot_nm = physics.pivot_dry_level();
   if (!setup.sampled && (physics.has_motor_lag() || pivot_nm > 0.0)) return false;
   if (setup.model.smoothing > 0.0 && pivot_nm > largest_smoothed_pivot_nm) return false;

@@ -163,6 +163,8 @@ std::vector<FreeParameter> free_parameters(std::size_t effect, const DataRange& 
       // The critical damping of the cart on the stiffest bristles. A damper that is much stronger holds the
       // cart as a rigid contact does, and is followed in tiny steps.
       p.high = 2.0 * std::sqrt(prior.max_bristle_stiffness_n_per_m * range.cart_mass_kg);
+    } else if (is_named(effect, "lost_counts") && name == "share") {
+      p.low = prior.min_lost_share;
     } else if (is_named(effect, "input_delay")) {
       p.high = prior.max_delay_s;
     } else if (is_named(effect, "motor_lag")) {
@@ -304,6 +306,11 @@ std::vector<std::vector<double>> bristle_starts(const EffectInfo& info, const Da
   return starts;
 }
 
+/// A counter that loses one count or two of each beyond its fastest rate shows no faster motion.
+std::vector<std::vector<double>> lost_counts_starts(double largest_counted_mps) {
+  return {{1.0, 0.9 * largest_counted_mps}, {2.0, largest_counted_mps}};
+}
+
 }  // namespace
 
 std::vector<std::size_t> candidate_effects(const Plant& plant, const DataRange& range) {
@@ -341,6 +348,7 @@ std::vector<std::vector<double>> search_starts(std::size_t effect, const DataRan
     const double time_constant_s = 0.3 * range.longest_run_s;
     return {{force_n, time_constant_s}, {-force_n, time_constant_s}};
   }
+  if (effect == effect_index<effects::LostCounts>()) return lost_counts_starts(speed);
   if (info.enters == Enters::sensor) return {{info.parameters[0].neutral}};
   std::vector<double> start;
   for (const ParameterInfo& parameter : info.parameters)

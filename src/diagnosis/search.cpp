@@ -168,8 +168,8 @@ bool Search::is_plausible(const Hypothesis& h, std::size_t effect) const {
 }
 
 bool Search::is_admissible(const Hypothesis& h, std::size_t effect) const {
-  // A vibration at the slow or the fast end is none, so an attached mass has no parameter at an end.
-  const bool all = attaches_mass(effect);
+  // A vibration at the slow or the fast end is none, and a counter that loses little is another effect.
+  const bool all = attaches_mass(effect) || effect == effect_index<effects::LostCounts>();
   for (const FreeParameter& p : h.free) {
     if (p.effect != effect || (p.index != 0 && !all)) continue;
     const double value = h.train.point.plant.find(effect)->values[p.index];

@@ -248,6 +248,10 @@ struct PriorPolicy {
   /// [N/m] The stiffest bristles. Stiffer ones are indistinguishable from a rigid contact. Bristles have at
   /// most the critical damping of the cart on the stiffest. Scaled as the softest. Chosen.
   double max_bristle_stiffness_n_per_m = 3e4;
+  /// [1] The fewest counts that a counter loses of each count beyond its fastest rate. It loses one if it
+  /// stays at that rate, and two if it takes a jump over two counts for none. Less may be friction: on
+  /// aau-cart, 0.08 and 0.24 were found at two of six places, beyond speeds that exclude each other.
+  double min_lost_share = 0.5;
   /// [s] The longest delay of the input. Chosen.
   double max_delay_s = 0.2;
   /// [sample periods] The shortest lag of the motor. Shorter ones are not visible.

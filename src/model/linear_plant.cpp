@@ -109,7 +109,8 @@ Plant without_dead_zones(Plant plant, LinearPlant& linear) {
 
 void record_ideal_sensors(const Plant& plant, LinearPlant& linear) {
   for (const auto& [kind, note] : {std::pair{"drive_compliance", "the drive is taken as stiff"},
-                                   std::pair{"encoder_eccentricity", "the encoder is taken to run true"}})
+                                   std::pair{"encoder_eccentricity", "the encoder is taken to run true"},
+                                   std::pair{"lost_counts", "the counter is taken to lose nothing"}})
     if (plant.find(kind) != nullptr) linear.notes.push_back(std::string(kind) + ": " + note);
 }
 

@@ -133,6 +133,8 @@ std::vector<double> values_for(const std::string& kind, Size size, const Plant& 
   if (kind == "encoder_eccentricity")
     return {pick(size, 0.005, 0.02, 0.06) * between(random, 0.8, 1.25),
             s.travel_m / between(random, 4.0, 12.0), between(random, -3.0, 3.0)};
+  if (kind == "lost_counts")
+    return {between(random, 1.0, 2.0), s.speed_mps * pick(size, 1.8, 1.5, 1.1) * between(random, 0.8, 1.25)};
   if (kind == "drive_compliance") return {pick(size, 0.0002, 0.0006, 0.002) * s.travel_m / s.force_n};
   if (kind == "sprung_mass") {
     const double radps = between(random, 1.0, 6.0) / time_constant_s(plant);

@@ -57,6 +57,7 @@ std::vector<Subject> subjects() {
   add("pivot", exponential, E{"pivot_coulomb_friction", {0.003}}, E{"pivot_viscous_friction", {0.001}});
   add("sensors", exponential, E{"angle_scale", {1.02}}, E{"cart_scale", {0.98}}, E{"angle_offset", {0.002}});
   add("eccentric", exponential, E{"encoder_eccentricity", {0.03, 0.02, 0.4}}, E{"cart_scale", {0.98}});
+  add("counter", exponential, E{"lost_counts", {0.5, 0.2}}, E{"cart_scale", {0.98}});
   add("drive", exponential, E{"drive_compliance", {2e-4}}, E{"motor_lag", {0.004}});
   add("base", dynamic, E{"cart_mass", {1.1}}, E{"pendulum_mass", {0.9}}, E{"pendulum_length", {1.05}},
       E{"back_emf", {0.95}});

@@ -287,6 +287,16 @@ const std::map<std::string, std::function<void()>>& answers() {
          const Physics shifted = with("encoder_eccentricity", {0.03, turn_m, 0.5});
          EXPECT_EQ(shifted.measure({}).cart_m, 0.0);
        }},
+      {"lost_counts",
+       [] {
+         const Physics p = with("lost_counts", {0.5, 0.4});
+         EXPECT_TRUE(p.loses_counts());
+         for (const double v : {0.3, 0.8, -0.8}) {
+           PlantState<double> s;
+           s.cart_mps = v;
+           EXPECT_DOUBLE_EQ(p.derivative(s, 0.0, {}).cart_m, v == 0.3 ? 0.3 : std::copysign(0.6, v)) << v;
+         }
+       }},
       {"cart_scale", [] { EXPECT_DOUBLE_EQ(shown(with("cart_scale", {1.02})).cart_m, 0.102); }},
       {"angle_scale", [] { EXPECT_DOUBLE_EQ(shown(with("angle_scale", {0.98})).theta_rad, 0.196); }},
       {"cart_mass", [] { EXPECT_DOUBLE_EQ(with("cart_mass", {1.1}).base().cart_mass_kg, 1.1 * 0.815); }},
@@ -350,7 +360,7 @@ INSTANTIATE_TEST_SUITE_P(All, Effect, testing::Range(std::size_t{0}, effect_coun
 });
 
 TEST(Registry, IsWhole) {
-  EXPECT_EQ(effect_count, 37u);
+  EXPECT_EQ(effect_count, 38u);
   std::set<std::string_view> kinds;
   std::size_t offset = 0;
   for (std::size_t i = 0; i < effect_count; ++i) {

@@ -52,6 +52,7 @@ class Dynamics {
       if constexpr (has_cart_level<E, S>) cart_dry_ = cart_dry_ || acts_as_cart_level<E>(p<I>());
       if constexpr (has_level_of_time<E, S>) cart_dry_ = changes_with_time_ = true;
       if constexpr (has_level_of_load<E, S>) cart_dry_ = depends_on_load_ = true;
+      if constexpr (has_lost_counts<E, S>) loses_counts_ = true;
       if constexpr (has_pivot_level<E, S>) pivot_dry_ = model.has_pendulum;
       if constexpr (requires { E::kink_at_cart_rest; }) cart_kink_ = true;
       if constexpr (requires { E::kink_at_pivot_rest; }) pivot_kink_ = model.has_pendulum;
@@ -75,6 +76,7 @@ class Dynamics {
   bool has_motor_lag() const { return lag_; }                    ///< whether `motor_v` is a state
   bool has_bristle_state() const { return bristles_; }           ///< whether `bristle_m` is a state
   bool has_attached_mass() const { return attached_.exists(); }  ///< whether `attached_m` is a state
+  bool loses_counts() const { return loses_counts_; }            ///< `cart_m` may be slower than the cart
   bool has_pendulum() const { return model_.has_pendulum; }      ///< false: the cart is alone
   bool cart_locked() const { return model_.cart_locked; }        ///< true: only the pendulum moves
 
@@ -167,6 +169,7 @@ class Dynamics {
     const bool pivot_rests = !model_.has_pendulum || (contacts.pivot == Contact::stick && pivot_can_stick());
     accelerate(state, force, torque, cart_rests, pivot_rests, rate);
     rate.cart_m = cart_rests ? S(0.0) : state.cart_mps;
+    if (loses_counts_) rate.cart_m = counted_mps(model_, rate.cart_m);
     rate.theta_rad = pivot_rests ? S(0.0) : state.theta_radps;
     if (attached_.exists()) move_attached_mass(state, motor_v, rate);
     return rate;
@@ -588,7 +591,7 @@ class Dynamics {
   Divisor<S> inertia_{S(1.0)}, mass_{S(1.0)};  ///< about the pivot, and of both bodies
   S level_of_time_{0.0};                       ///< of the cart's dry friction at the time that was set
   bool bristles_ = false, cart_dry_ = false, pivot_dry_ = false, cart_kink_ = false, pivot_kink_ = false,
-       lag_ = false, changes_with_time_ = false, depends_on_load_ = false;
+       lag_ = false, changes_with_time_ = false, depends_on_load_ = false, loses_counts_ = false;
 };
 
 }  // namespace upright

@@ -28,6 +28,7 @@
 //                                                   oscillation from the pivot
 //   S drive_deflection_m(p, force)                  position of the motor relative to the cart [m]
 //   S encoder_error_m(p, x)                         what the cart's encoder shows too much [m]
+//   S lost_mps(p, v)                                velocity that the cart's counter loses of v [m/s]
 //   void measure(p, Outputs<S>&)                    one linear stage of the sensors, by `sensor_stage`
 //   void correct(p, BaseParameters<S>&)             the true base parameters from the model's
 //   double rate_radps(p, v, mass)                   its greatest rate [1/s], by which engines choose

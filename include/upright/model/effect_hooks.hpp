@@ -37,6 +37,11 @@ template <class E, class S>
 constexpr bool has_bristles = requires(const S* p) {
   E::bristle_stiffness(p);
 };
+/// A counter of the cart's position that loses counts.
+template <class E, class S>
+constexpr bool has_lost_counts = requires(const S* p) {
+  E::lost_mps(p, *p);
+};
 /// A rod that bends: a share of the pendulum with states of its own.
 template <class E, class S>
 constexpr bool has_bending_rod = requires(const S* p) {

@@ -9,7 +9,7 @@ namespace upright {
 /// `attached_m` and `attached_mps` with sprung_mass, backlash or flexible_rod only.
 template <class S>
 struct PlantState {
-  S cart_m{};        ///< position of the cart [m]
+  S cart_m{};        ///< position of the cart, with lost_counts as its counter shows it [m]
   S theta_rad{};     ///< angle of the pendulum [rad], 0 upright
   S cart_mps{};      ///< velocity of the cart [m/s]
   S theta_radps{};   ///< rate of the pendulum [rad/s]

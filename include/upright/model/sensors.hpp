@@ -1,6 +1,7 @@
 // What the sensors show of the position of the drive and the angle of the pendulum, before quantisation.
 #pragma once
 
+#include "upright/model/effect_hooks.hpp"
 #include "upright/model/plant_model.hpp"
 
 namespace upright {
@@ -30,6 +31,18 @@ S encoder_error_m(const PlantModel<S>& model, const S& drive_m) {
         error_m = error_m + E::encoder_error_m(model.template of<I>(), drive_m);
   });
   return error_m;
+}
+
+/// The velocity that the counter of the cart's position shows [m/s].
+template <class S>
+S counted_mps(const PlantModel<S>& model, S cart_mps) {
+  const S true_mps = cart_mps;
+  for_each_effect([&]<std::size_t I>() {
+    if constexpr (has_lost_counts<EffectAt<I>, S>)
+      if (model.present.template has<I>())
+        cart_mps = cart_mps - EffectAt<I>::lost_mps(model.template of<I>(), true_mps);
+  });
+  return cart_mps;
 }
 
 /// The outputs of the sensors.

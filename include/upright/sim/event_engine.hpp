@@ -365,7 +365,8 @@ class EventEngine {
   }
 
   bool linearises_in_middle() const {
-    if (dynamics_.has_bristle_state() || dynamics_.has_attached_mass()) return false;
+    if (dynamics_.has_bristle_state() || dynamics_.has_attached_mass() || dynamics_.loses_counts())
+      return false;
     return !std::is_same_v<S, double> && options_.quick_derivatives;
   }
 

@@ -21,6 +21,7 @@
 #include "upright/model/effects/friction_asymmetry.hpp"
 #include "upright/model/effects/input_delay.hpp"
 #include "upright/model/effects/load_dependent_friction.hpp"
+#include "upright/model/effects/lost_counts.hpp"
 #include "upright/model/effects/motor_lag.hpp"
 #include "upright/model/effects/pendulum_length.hpp"
 #include "upright/model/effects/pendulum_mass.hpp"
@@ -76,6 +77,7 @@ using AllEffects =
                effects::DriveCompliance,
                effects::AngleOffset,
                effects::EncoderEccentricity,
+               effects::LostCounts,
                effects::CartScale,
                effects::AngleScale,
                effects::CartMass,
