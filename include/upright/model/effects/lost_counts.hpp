@@ -15,8 +15,7 @@ struct LostCounts {
   /// Its parameters, in the order of a plant file.
   static constexpr ParameterInfo parameters[] = {
       {"share", "1", (Range{0.0, 3.0}), 0.0, 1.0, "s: of each count beyond that speed, how many are lost"},
-      {"speed_mps", "m/s", Range::positive(), no_neutral, 0.5,
-       "v1: of the cart, up to which no count is lost"},
+      {"speed_mps", "m/s", Range::positive(), no_neutral, 0.5, "v1: of the cart, at which the loss sets in"},
   };
   /// Its entry in the registry.
   static constexpr EffectInfo info{
