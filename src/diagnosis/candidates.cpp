@@ -306,7 +306,8 @@ std::vector<std::vector<double>> bristle_starts(const EffectInfo& info, const Da
   return starts;
 }
 
-/// A counter that loses one count or two of each beyond its fastest rate shows no faster motion.
+/// A counter that loses one count or two of each beyond its fastest rate shows no faster motion. Noise makes
+/// the largest speed too large, and beyond all speeds nothing is lost, so one start is below it.
 std::vector<std::vector<double>> lost_counts_starts(double largest_counted_mps) {
   return {{1.0, 0.9 * largest_counted_mps}, {2.0, largest_counted_mps}};
 }

@@ -11,32 +11,6 @@
 namespace upright {
 namespace {
 
-/// The effect that is named alone, with the values that were found.
-PlantEffect only_named(const Plant& believed, const Plant& truth) {
-  const Diagnosis d = diagnose(believed, three_runs({.plant = truth}, 6.0, 5), {});
-  EXPECT_EQ(d.verdict, Verdict::explained);
-  EXPECT_EQ(d.effects.size(), 1u);
-  if (d.effects.size() != 1) return {};
-  return *d.model.find(d.effects.front().effect);
-}
-
-void expect_values(const PlantEffect& found, std::string_view kind, std::initializer_list<double> values,
-                   double tolerance) {
-  ASSERT_EQ(kind_of(found.number), kind);
-  std::size_t i = 0;
-  for (const double value : values) {
-    EXPECT_NEAR(found.values[i], value, tolerance * value) << i;
-    ++i;
-  }
-}
-
-/// A cart with friction that carries a pendulum.
-Plant cart_with_pendulum() {
-  Plant plant = cart_with_friction();
-  plant.pendulum = Pendulum{0.21, 0.305, {}};
-  return plant;
-}
-
 TEST(AttachedMassSearch, FindsASprungMass) {
   const auto values = {0.1, 4.0, 0.08};
   Plant truth = cart_with_friction();

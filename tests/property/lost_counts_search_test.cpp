@@ -13,14 +13,8 @@ Plant with_counter(Plant plant, double share, double speed_mps) {
 }
 
 void expect_found(const Plant& believed, double share, double speed_mps) {
-  const blind::Rig rig{.plant = with_counter(believed, share, speed_mps)};
-  const Diagnosis d = diagnose(believed, three_runs(rig, 6.0, 5), {});
-  EXPECT_EQ(d.verdict, Verdict::explained);
-  ASSERT_EQ(d.effects.size(), 1u);
-  ASSERT_EQ(kind_of(d.effects.front().effect), "lost_counts");
-  const PlantEffect& found = *d.model.find(d.effects.front().effect);
-  EXPECT_NEAR(found.values[0], share, 0.05 * share);
-  EXPECT_NEAR(found.values[1], speed_mps, 0.05 * speed_mps);
+  const PlantEffect found = only_named(believed, with_counter(believed, share, speed_mps));
+  expect_values(found, "lost_counts", {share, speed_mps}, 0.05);
 }
 
 TEST(LostCountsSearch, FindsACounterThatFollowsNoFaster) {
@@ -32,9 +26,7 @@ TEST(LostCountsSearch, FindsACounterThatLosesMostOfIt) {
 }
 
 TEST(LostCountsSearch, FindsItBelowAPendulum) {
-  Plant believed = cart_with_friction();
-  believed.pendulum = Pendulum{0.21, 0.305, {}};
-  expect_found(believed, 1.0, 0.15);
+  expect_found(cart_with_pendulum(), 1.0, 0.15);
 }
 
 TEST(LostCountsSearch, NamesNothingWhereTheCartIsSlow) {

@@ -1,9 +1,13 @@
 // What a diagnosis names beside corrections of the plant file's numbers, and short runs of a cart for it. A
-// force that it draws as a curve has no name.
+// force that it draws as a curve has no name. Tests that expect one effect alone compare its values here.
 #pragma once
 
+#include <gtest/gtest.h>
+
+#include <initializer_list>
 #include <set>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "blind_run.hpp"
@@ -31,6 +35,13 @@ inline Plant cart_with_friction() {
   return plant;
 }
 
+/// A cart with friction that carries a pendulum.
+inline Plant cart_with_pendulum() {
+  Plant plant = cart_with_friction();
+  plant.pendulum = Pendulum{0.21, 0.305, {}};
+  return plant;
+}
+
 /// Three runs of a rig at 200 Hz that move its cart in two ways.
 inline std::vector<Measurement> three_runs(const blind::Rig& rig, double duration_s, unsigned seed) {
   std::vector<Measurement> runs;
@@ -43,6 +54,26 @@ inline std::vector<Measurement> three_runs(const blind::Rig& rig, double duratio
     runs.push_back(measure(rig, plan, std::string("run").append(std::to_string(r))));
   }
   return runs;
+}
+
+/// The effect that is named alone, with the values that were found.
+inline PlantEffect only_named(const Plant& believed, const Plant& truth) {
+  const Diagnosis d = diagnose(believed, three_runs({.plant = truth}, 6.0, 5), {});
+  EXPECT_EQ(d.verdict, Verdict::explained);
+  EXPECT_EQ(d.effects.size(), 1u);
+  if (d.effects.size() != 1) return {};
+  return *d.model.find(d.effects.front().effect);
+}
+
+/// Each value within a share of it.
+inline void expect_values(const PlantEffect& found, std::string_view kind,
+                          std::initializer_list<double> values, double tolerance) {
+  ASSERT_EQ(kind_of(found.number), kind);
+  std::size_t i = 0;
+  for (const double value : values) {
+    EXPECT_NEAR(found.values[i], value, tolerance * value) << i;
+    ++i;
+  }
 }
 
 }  // namespace upright

@@ -7,6 +7,7 @@
 #include <numbers>
 #include <set>
 #include <string>
+#include <utility>
 
 #include "plants.hpp"
 #include "upright/model/dynamics.hpp"
@@ -291,10 +292,11 @@ const std::map<std::string, std::function<void()>>& answers() {
        [] {
          const Physics p = with("lost_counts", {0.5, 0.4});
          EXPECT_TRUE(p.loses_counts());
-         for (const double v : {0.3, 0.8, -0.8}) {
+         for (const auto& [cart_mps, counted_mps] :
+              {std::pair{0.3, 0.3}, std::pair{0.8, 0.6}, std::pair{-0.8, -0.6}}) {
            PlantState<double> s;
-           s.cart_mps = v;
-           EXPECT_DOUBLE_EQ(p.derivative(s, 0.0, {}).cart_m, v == 0.3 ? 0.3 : std::copysign(0.6, v)) << v;
+           s.cart_mps = cart_mps;
+           EXPECT_DOUBLE_EQ(p.derivative(s, 0.0, {}).cart_m, counted_mps) << cart_mps;
          }
        }},
       {"cart_scale", [] { EXPECT_DOUBLE_EQ(shown(with("cart_scale", {1.02})).cart_m, 0.102); }},

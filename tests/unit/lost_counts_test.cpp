@@ -25,7 +25,8 @@ using Engines = testing::Types<EventEngine<double>, CvodeEngine>;
 TYPED_TEST_SUITE(LostCounts, Engines);
 
 // At a constant acceleration a, the cart is (v - v1)^2 / (2 a) ahead of its counter, and a little more as the
-// loss sets in early: the integral of (u + 1)^3 (3 - u) / 16 from -1 to 1 is 0.6, that of max(u, 0) is 0.5.
+// loss sets in early: the integral of (u + 1)^3 (3 - u) / 16 from -1 to 1 is 0.6, that of max(u, 0) is 0.5,
+// and u is 1 a tenth of v1 beyond v1.
 TYPED_TEST(LostCounts, AreMissingOfTheWayOfACartThatAccelerates) {
   constexpr double v1_mps = 0.5, volts = 1.0, duration_s = 0.5;
   for (const double share : {1.0, 0.3, 2.0})
