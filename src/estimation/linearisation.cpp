@@ -31,6 +31,14 @@ EngineOptions engine_options() {
   return options;
 }
 
+/// Whether a filter has lost the plant, by its steps from one sample to the next. What holds its speed may be
+/// missing in a trial point. A speed without limit then crosses a force of the place in steps without number.
+bool is_lost(double period_s, std::uint64_t steps) {
+  constexpr double shortest_mean_step_s = 1e-5;  // 4 m/s across the shortest pitch that is searched, 0.5 mm
+  constexpr double extra_steps = 100.0;          // more than any sample begins with
+  return static_cast<double>(steps) > extra_steps + period_s / shortest_mean_step_s;
+}
+
 double measured(const Measurement& run, int channel, std::size_t k) {
   return channel == 0 ? run.cart_m[k] : run.theta_rad[k];
 }
@@ -212,6 +220,10 @@ class SegmentLineariser {
 
   const Dynamics<Dual>& dynamics() const { return simulator_.engine().dynamics(); }
 
+  std::uint64_t steps_without_event() const {
+    return simulator_.engine().step_count() - simulator_.engine().event_count();
+  }
+
   std::array<const Dual*, state_count> reached_state() const { return as_array(simulator_.engine().state()); }
 
   void start_sensitivity(const PlantState<double>& start) {
@@ -238,10 +250,12 @@ class SegmentLineariser {
     }
     // Each sample starts with fresh unit derivatives.
     simulator_.engine().seed();
+    const std::uint64_t steps_before = steps_without_event();
     if (!first) {
       command_from(k - 1, run_, simulator_);
       simulator_.advance_to(run_.time_s[k]);
     }
+    const bool lost = is_lost(step.period_s, steps_without_event() - steps_before);
     const PlantState<Dual>& reached = simulator_.engine().state();
     const std::array<const Dual*, state_count> end = reached_state();
     std::fill_n(&step.transition[0][0], state_count * state_count, 0.0);
@@ -260,6 +274,7 @@ class SegmentLineariser {
       step.weight[channel] = weight_of(run_, channel, k);
       step.residual[channel] =
           covariance_.present(channel) ? measured(run_, channel, k) - simulated[channel] : 0.0;
+      if (lost) step.residual[channel] = std::numeric_limits<double>::infinity();
     }
     step.rate[0] = value_of(reached.cart_mps);
     step.rate[1] = value_of(reached.theta_radps);

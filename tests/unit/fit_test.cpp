@@ -49,6 +49,22 @@ TEST(Fit, TakesSlidingWhereTheModelRestsForAForce) {
   EXPECT_LT(noise.force, 1.0);
 }
 
+// A trial point may lack what holds the speed, for example with a counter that stays at its fastest rate. The
+// speed grew to 460 m/s on a record of a ball screw, and one trial took a minute.
+TEST(Fit, HasNoObjectiveWhereTheFilterLosesThePlant) {
+  Plant plant = cart_alone();
+  plant.set("cogging_force", {0.1, 5e-4, 0.0});
+  const std::vector<Measurement> runs = square_and_multisine({.plant = plant}, 250.0, 4.0, 3.0);
+  const FitData data{&runs, cut_segments(runs)};
+  FitPoint start{plant, estimate_initial_states(runs, data.segments, plant), {.force = 0.1}};
+  const auto objective_with = [&](double cart_mps) {
+    for (PlantState<double>& state : start.starts) state.cart_mps = cart_mps;
+    return fit(data, start, {}, steps_with_fixed_noise(0)).objective;
+  };
+  EXPECT_TRUE(std::isfinite(objective_with(3.0)));
+  EXPECT_EQ(objective_with(100.0), std::numeric_limits<double>::infinity());
+}
+
 // A prediction linearises where the fit of a candidate begins.
 TEST(Fit, ContinuesFromKnownEquationsAsFromThePoint) {
   Plant plant = cart_alone();
