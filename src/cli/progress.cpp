@@ -17,7 +17,9 @@ using namespace std::chrono_literals;
 
 constexpr auto quiet_on_terminal = 1s;  ///< what takes no longer shows nothing
 constexpr auto redraw_pause = 200ms;
-constexpr auto line_pause = 10s;  ///< where stderr is no terminal: logs stay short
+constexpr auto line_pause = 10s;     ///< where stderr is no terminal: logs stay short
+constexpr double nearly_done = 0.9;  ///< from this share on the end is in sight
+constexpr double rounding = 1e-6;    ///< of shares
 constexpr int bar_columns = 20;
 constexpr std::size_t usual_columns = 80;
 constexpr std::size_t longest_line = 240;  ///< where stderr is no terminal
@@ -91,6 +93,7 @@ void Progress::begin(std::string step, double takes_s) {
   step_ = std::move(step);
   detail_.clear();
   share_ = first_share_ = unknown;
+  begun_again_ = false;
   several_steps_ = true;
 }
 
@@ -99,6 +102,11 @@ void Progress::report(double share, const std::string& detail) {
   detail_ = detail;
   if (!std::isfinite(share)) return;
   share = std::clamp(share, 0.0, 1.0);
+  if (share_ >= nearly_done && share < share_ - rounding) begun_again_ = true;
+  if (begun_again_) {
+    share_ = first_share_ = unknown;
+    return;
+  }
   if (std::isnan(first_share_)) {
     first_share_ = share;
     first_report_ = std::chrono::steady_clock::now();

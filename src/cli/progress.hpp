@@ -34,7 +34,9 @@ class Progress {
 
   /// The next step: the elapsed time goes on, the share and the estimate begin anew.
   void begin(std::string step, double takes_s = unknown);
-  /// `share` of the step that is done, 0 to 1, or `unknown`; `detail`: a few words about it.
+  /// `share` of the step that is done, 0 to 1, or `unknown`; `detail`: a few words about it. If the share of
+  /// a step that was nearly done falls, a part of the work has begun again. Nobody knows how long that takes,
+  /// so the rest of the step shows neither a share nor an estimate.
   void report(double share, const std::string& detail = {});
   /// The same by count: "12 of 40 runs".
   void report(std::size_t done, std::size_t known, const std::string& things);
@@ -63,6 +65,7 @@ class Progress {
   bool closing_ = false;
   std::string step_, detail_;
   bool several_steps_ = false;
+  bool begun_again_ = false;
   double share_ = unknown;
   double first_share_ = unknown;  ///< of this step: what was done before took no time now
   Time first_report_{};
