@@ -390,7 +390,7 @@ ExitCode run_diagnose(const DiagnoseFlags& flags) {
   options.search_bound = flags.effort;
   options.quick = flags.quick;
   progress.begin("diagnose");
-  options.progress = progress.callback();
+  options.progress = [&](double share, const std::string& what) { progress.report_search(share, what); };
   Diagnosis diagnosis = diagnose(plant, runs, options);
   diagnosis.notes.insert(diagnosis.notes.begin(), named.left_out.begin(), named.left_out.end());
   if (!unseen.empty()) {

@@ -19,7 +19,6 @@ constexpr auto quiet_on_terminal = 1s;  ///< what takes no longer shows nothing
 constexpr auto redraw_pause = 200ms;
 constexpr auto line_pause = 10s;     ///< where stderr is no terminal: logs stay short
 constexpr double nearly_done = 0.9;  ///< from this share on the end is in sight
-constexpr double rounding = 1e-6;    ///< of shares
 constexpr int bar_columns = 20;
 constexpr std::size_t usual_columns = 80;
 constexpr std::size_t longest_line = 240;  ///< where stderr is no terminal
@@ -102,11 +101,6 @@ void Progress::report(double share, const std::string& detail) {
   detail_ = detail;
   if (!std::isfinite(share)) return;
   share = std::clamp(share, 0.0, 1.0);
-  if (share_ >= nearly_done && share < share_ - rounding) begun_again_ = true;
-  if (begun_again_) {
-    share_ = first_share_ = unknown;
-    return;
-  }
   if (std::isnan(first_share_)) {
     first_share_ = share;
     first_report_ = std::chrono::steady_clock::now();
@@ -118,6 +112,19 @@ void Progress::report(double share, const std::string& detail) {
 void Progress::report(std::size_t done, std::size_t known, const std::string& things) {
   const double share = known > 0 ? static_cast<double>(done) / static_cast<double>(known) : unknown;
   report(share, std::to_string(done) + " of " + std::to_string(known) + " " + things);
+}
+
+void Progress::report_search(double share, const std::string& detail) {
+  {
+    const std::lock_guard lock(mutex_);
+    begun_again_ = begun_again_ || (share_ >= nearly_done && share < share_);
+    if (begun_again_) {
+      detail_ = detail;
+      share_ = first_share_ = unknown;
+      return;
+    }
+  }
+  report(share, detail);
 }
 
 ProgressCallback Progress::callback() {

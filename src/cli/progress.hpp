@@ -34,10 +34,11 @@ class Progress {
 
   /// The next step: the elapsed time goes on, the share and the estimate begin anew.
   void begin(std::string step, double takes_s = unknown);
-  /// `share` of the step that is done, 0 to 1, or `unknown`; `detail`: a few words about it. If the share of
-  /// a step that was nearly done falls, a part of the work has begun again. Nobody knows how long that takes,
-  /// so the rest of the step shows neither a share nor an estimate.
+  /// `share` of the step that is done, 0 to 1, or `unknown`; `detail`: a few words about it.
   void report(double share, const std::string& detail = {});
+  /// The same for a search. If its share falls when it was nearly done, the search has begun again. Nobody
+  /// knows how long that takes, so the rest of the step shows neither a share nor an estimate.
+  void report_search(double share, const std::string& detail);
   /// The same by count: "12 of 40 runs".
   void report(std::size_t done, std::size_t known, const std::string& things);
   /// Takes the line off the terminal for good: before the results are printed.
