@@ -9,6 +9,7 @@
 #include <numeric>
 #include <utility>
 
+#include "attached_start.hpp"
 #include "base/parallel.hpp"
 #include "model/dense_algebra.hpp"
 #include "parameter_equations.hpp"
@@ -129,6 +130,10 @@ GaussNewton::GaussNewton(const FitData& data, const FitPoint& start, const std::
 }
 
 void GaussNewton::linearise(std::size_t s) {
+  const Segment& segment = data_.segments[s];
+  if (is_driven_by_cart(point_.plant))
+    point_.starts[s] =
+        with_attached_start((*data_.runs)[segment.run], segment, point_.plant, point_.starts[s]);
   linearise_segment(data_, s, point_, free_, linearised_[s].steps, &linearised_[s].normal);
 }
 

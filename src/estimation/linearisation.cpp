@@ -6,7 +6,9 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <optional>
 
+#include "attached_start.hpp"
 #include "model/rigid_body.hpp"
 #include "segment_start.hpp"
 #include "state_vector.hpp"
@@ -143,6 +145,7 @@ class SegmentLineariser {
     for (std::size_t channel = 0; channel < 2; ++channel)
       worth_less_[channel] = sensors_[channel].v / sensors_[channel].a;
     start_sensitivity(start);
+    if (is_driven_by_cart(point.plant)) start_attached_sensitivity(point.plant, start, free);
   }
 
   /// With the normal equations, or for a null pointer without.
@@ -238,6 +241,31 @@ class SegmentLineariser {
     sensitivity_[1] -= shown.theta_rad.v / sensors_[1].a;
     sensitivity_[2] -= start.cart_mps * worth_less_[0];
     sensitivity_[3] -= start.theta_radps * worth_less_[1];
+  }
+
+  /// The start of a mass on the cart depends on that of the cart, and on its own parameters.
+  void start_attached_sensitivity(const Plant& plant, const PlantState<double>& start,
+                                  const std::vector<FreeParameter>& free) {
+    const std::optional<AttachedStart> at = attached_start(run_, segment_, plant, start);
+    if (!at) return;
+    Row &place = sensitivity_[attached_state], &speed = sensitivity_[attached_state + 1];
+    place = speed = Row{};
+    if (!at->is_moved) return;
+    place -= sensitivity_[0];
+    speed -= sensitivity_[2];
+    for (std::size_t j = 0; j < free.size(); ++j) {
+      if (!attaches_mass(free[j].effect)) continue;
+      constexpr double step_of_scale = 1e-5;
+      const double step = step_of_scale * free[j].scale;
+      PlantEffect further = *plant.find(free[j].effect);
+      further.values[free[j].index] += step;
+      Plant other = plant;
+      other.set(free[j].effect, further.values);
+      const std::optional<AttachedStart> there = attached_start(run_, segment_, other, start);
+      const int column = states_ + static_cast<int>(j);
+      place.set(column, (there->attached_m - at->attached_m) / step);
+      speed.set(column, (there->attached_mps - at->attached_mps) / step);
+    }
   }
 
   /// Simulates to sample k, and fills what of its step does not depend on the filter.

@@ -11,6 +11,7 @@ namespace upright {
 
 constexpr int state_count = LinearStep::states;
 constexpr int bristle_state = LinearStep::rigid_states - 1;  ///< its number
+constexpr int attached_state = LinearStep::rigid_states;     ///< of an attached mass; then its speed
 
 /// Pointers to the numbers of a state, constant or not.
 template <class State>

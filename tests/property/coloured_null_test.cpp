@@ -47,11 +47,13 @@ struct NullCase {
 };
 
 /// Rigs of a laboratory on which nothing is hidden. With white noise alone, a constant force was named on the
-/// first. On the second, a slow sprung mass was named: short segments of a balance run hold less than a
-/// period.
+/// first, and a sprung mass on the others. It could begin each segment with another swing, even one ten times
+/// faster than the cart.
 TEST(ColouredNull, ADisturbedRigWithoutAnEffectGetsNone) {
   for (const NullCase& null : {NullCase{blind::seed_of_case(906, 10), blind::Request{}.max_samples},
-                               NullCase{blind::seed_of_case(20261211, 327), 6000.0}}) {
+                               NullCase{blind::seed_of_case(20261211, 327), 6000.0},
+                               NullCase{blind::seed_of_case(20270305, 106), 6000.0},
+                               NullCase{blind::seed_of_case(20270305, 297), 6000.0}}) {
     blind::Request request = blind::laboratory_request(null.seed);
     request.size = static_cast<blind::Size>(std::mt19937_64(request.seed)() % 3);
     request.max_samples = null.max_samples;
