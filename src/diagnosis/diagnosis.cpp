@@ -206,22 +206,23 @@ class Diagnostician {
   /// Where more than noise is left, the search goes on.
   ResidualTests search_further(ResidualTests left) {
     if (left.structured && selection_.renew_initial_states()) left = settle();
-    if (left.structured) left = with_attached_mass(left);
+    if (left.structured || left.beyond_sensors) left = with_attached_mass(left);
     if (left.structured && selection_.find_pairs_of_all()) left = settle();
     if (left.structured && selection_.find_without_each()) left = settle();
     if (left.beyond_sensors && selection_.find_thoroughly(left.structured)) left = settle();
     return left;
   }
 
-  /// A mass on a spring fits a part of most of what is left, so it stays only if nothing is left beside it,
-  /// or beside it and what else the data then show.
+  /// A mass that may swing as it likes fits a part of most of what is left, so unless it is certain it stays
+  /// only if nothing is left beside it, or beside it and what else the data then show.
   ResidualTests with_attached_mass(const ResidualTests& left) {
-    if (!selection_.find_attached_mass()) return left;
+    if (!selection_.find_attached_mass(left.structured)) return left;
     ResidualTests with = settle();
     if (with.structured) {
       selection_.find_again();
       with = settle();
     }
+    if (selection_.has_certain_attached_mass()) return with;
     if (selection_.has_attached_mass() && !beside_coloured_noise(with).structured) return with;
     selection_.give_up_attached_mass();
     return settle();

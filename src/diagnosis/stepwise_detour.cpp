@@ -6,6 +6,7 @@
 #include <limits>
 #include <utility>
 
+#include "estimation/attached_start.hpp"
 #include "stepwise_selection.hpp"
 
 namespace upright {
@@ -72,17 +73,19 @@ bool StepwiseSelection::is_out_of_reach_of(const std::vector<ScreenedCandidate>&
   return is_out_of_reach(objective - goal.on_subset, gain, rounds_left);
 }
 
-bool StepwiseSelection::find_attached_mass() {
+bool StepwiseSelection::find_attached_mass(bool certainly_missing) {
   const int round = 4 * budget_.max_rounds;
   const double to_beat = search_.on_screening_subset(current_).train.objective;
   without_attached_mass_.emplace(Checkpoint{std::exchange(current_, given_), std::exchange(found_, {})});
   try {
-    std::vector<ScreenedCandidate> screened = screen(round, false, Candidates::attached_masses);
+    std::vector<ScreenedCandidate> screened =
+        screen(round, false, certainly_missing ? Candidates::attached_masses : Candidates::driven_masses);
     std::erase_if(screened,
                   [&](const ScreenedCandidate& s) { return !(s.hypothesis.train.objective < to_beat); });
     if (add_best_of(screened, round, false)) {
       converge(current_);
-      if (explains_more_than(without_attached_mass_->hypothesis)) return true;
+      const bool may_be_better = certainly_missing || has_certain_attached_mass();
+      if (may_be_better && explains_more_than(without_attached_mass_->hypothesis)) return true;
     }
   } catch (...) {  // the search may end at any time: what was found before it counts
     give_up_attached_mass();
@@ -101,6 +104,11 @@ bool StepwiseSelection::explains_more_than(Hypothesis& other) {
 
 bool StepwiseSelection::has_attached_mass() const {
   return std::any_of(found_.begin(), found_.end(), attaches_mass);
+}
+
+bool StepwiseSelection::has_certain_attached_mass() const {
+  const double evidence = without_attached_mass_->hypothesis.train.objective - current_.train.objective;
+  return is_driven_by_cart(current_.train.point.plant) && evidence > policy_.acceptance.overwhelming_evidence;
 }
 
 void StepwiseSelection::give_up_attached_mass() {

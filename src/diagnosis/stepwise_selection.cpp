@@ -6,6 +6,7 @@
 #include <numeric>
 #include <sstream>
 
+#include "estimation/attached_start.hpp"
 #include "residual_location.hpp"
 #include "upright/base/error.hpp"
 
@@ -88,12 +89,14 @@ void StepwiseSelection::hold(std::size_t number) {
 }
 
 std::vector<std::size_t> StepwiseSelection::open_candidates(Candidates which) const {
-  const bool usual = which != Candidates::attached_masses;
+  const bool usual = which != Candidates::attached_masses && which != Candidates::driven_masses;
   std::vector<std::size_t> candidates =
       (usual ? candidate_effects : attached_mass_candidates)(current_.train.point.plant, search_.range());
   for (const std::size_t effect : search_.nuisances())
     if (usual && !current_.added.contains(effect)) candidates.push_back(effect);
   std::erase_if(candidates, [&](std::size_t effect) { return withdrawn_.contains(effect); });
+  if (which == Candidates::driven_masses)
+    std::erase_if(candidates, [](std::size_t effect) { return !is_driven_by_cart(effect); });
   if (which == Candidates::best_of_last_round)
     std::erase_if(candidates, [&](std::size_t effect) { return !best_of_last_round_.contains(effect); });
   return candidates;

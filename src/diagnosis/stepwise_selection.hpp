@@ -43,11 +43,15 @@ class StepwiseSelection {
   /// without it; one effect after the other, until a better model is found. Whether one was.
   bool find_without_each();
 
-  /// What is left is certainly more than noise: in the place of all that was found, a mass with a motion of
-  /// its own on the cart. Whether one is better. Until then no candidate is one.
-  bool find_attached_mass();
+  /// What is left is more than noise: in the place of all that was found, a mass with a motion of its own.
+  /// Whether one is better. Until then no candidate is one. Unless something is certainly missing, only one
+  /// is sought that would be certain.
+  bool find_attached_mass(bool certainly_missing);
   /// Whether one stands among what was found.
   bool has_attached_mass() const;
+  /// Whether it is one of which the cart's motion says how it swings, and the evidence against all that stood
+  /// before is overwhelming.
+  bool has_certain_attached_mass() const;
   /// Back to what stood before it was sought.
   void give_up_attached_mass();
 
@@ -118,7 +122,7 @@ class StepwiseSelection {
   };
 
   /// `best_of_last_round`: of the usual ones, the few that gained most in the last round.
-  enum class Candidates { usual, attached_masses, best_of_last_round };
+  enum class Candidates { usual, attached_masses, driven_masses, best_of_last_round };
 
   std::vector<std::size_t> open_candidates(Candidates which) const;
   /// A candidate that promises less is not screened: the least evidence is out of its reach.

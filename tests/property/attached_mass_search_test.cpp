@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include "blind_case.hpp"
 #include "diagnosis/candidates.hpp"
 #include "diagnosis/plant_scale.hpp"
 #include "named_effects.hpp"
@@ -41,6 +42,21 @@ TEST(AttachedMassSearch, FindsASprungMassOnAHeavyRig) {
   Plant truth = heavy;
   truth.set("sprung_mass", {0.1 * factor, 4.0, 0.08});
   expect_values(only_named(heavy, truth), "sprung_mass", {0.1 * factor, 4.0, 0.08}, 0.1);
+}
+
+/// A random force accounts for the swing of the first mass, so that nothing seems to be missing. On the
+/// second rig, something is left beside the mass too.
+TEST(AttachedMassSearch, NamesASprungMassThatIsCertain) {
+  for (const std::uint64_t number : {12, 2}) {
+    blind::Request request;
+    request.hidden = {"sprung_mass"};
+    request.seed = blind::seed_of_case(20270401, number);
+    request.size = number == 12 ? blind::Size::weak : blind::Size::strong;
+    request.max_samples = 6000.0;
+    const blind::Case blind = make_case(request);
+    EXPECT_EQ(named_effects(measure_all(blind), blind.believed), std::set<std::string>{"sprung_mass"})
+        << number;
+  }
 }
 
 TEST(AttachedMassSearch, BeginsWithinItsLimits) {
