@@ -59,6 +59,15 @@ TEST(AttachedMassSearch, NamesASprungMassThatIsCertain) {
   }
 }
 
+/// Plain simulations are hardly better with the mass, since a random force moves them too.
+TEST(AttachedMassSearch, NamesASprungMassBesideADisturbance) {
+  blind::Request request = blind::laboratory_request(blind::seed_of_case(20270402, 23), {"sprung_mass"});
+  request.size = blind::Size::weak;
+  request.max_samples = 6000.0;
+  const blind::Case blind = make_case(request);
+  EXPECT_EQ(named_effects(measure_all(blind), blind.believed), std::set<std::string>{"sprung_mass"});
+}
+
 TEST(AttachedMassSearch, BeginsWithinItsLimits) {
   Plant plant = cart_with_pendulum();
   const std::vector<Measurement> runs = three_runs({.plant = plant}, 6.0, 1);
