@@ -91,15 +91,11 @@ bool begins_at_rest(const Measurement& run) {
   return std::abs(initial_speed_mps(run)) <= little * usual_speed_mps(run);
 }
 
-/// The sample after the last gap before a segment, or the first one of the run.
-std::size_t begin_of_motion(const Measurement& run, const Segment& segment) {
-  constexpr double periods_of_gap = 5.0;  // as in gaps_in(), but of the mean period
-  const double gap_s =
-      periods_of_gap * (run.time_s.back() - run.time_s.front()) / static_cast<double>(run.size());
-  std::size_t begin = segment.first;
-  while (begin > 0 && run.time_s[begin] - run.time_s[begin - 1] <= gap_s &&
-         !std::binary_search(run.breaks.begin(), run.breaks.end(), begin))
-    --begin;
+/// The sample after the last gap before a sample, or the first one of the run.
+std::size_t begin_of_motion(const Measurement& run, std::size_t end) {
+  const double mean_period_s = (run.time_s.back() - run.time_s.front()) / static_cast<double>(run.size());
+  std::size_t begin = end;
+  while (begin > 0 && !is_gap(run, begin, mean_period_s)) --begin;
   return begin;
 }
 
@@ -120,36 +116,36 @@ bool is_driven_by_cart(const Plant& plant) {
                              [](const PlantEffect& effect) { return is_driven_by_cart(effect.number); });
 }
 
-std::optional<AttachedStart> attached_start(const Measurement& run, const Segment& segment,
-                                            const Plant& plant, const PlantState<double>& start) {
+MotionBefore::MotionBefore(const Measurement& run, const Segment& segment)
+    : run_(run), begin_(segment.first), end_(segment.first) {
   // A usual chain (3 Hz, damping ratio 0.05) has lost 94 % of a swing after this time.
   constexpr double settles_within_s = 3.0;
-  if (!run.has_cart()) return AttachedStart{};
-  const std::size_t begin = begin_of_motion(run, segment);
-  const bool is_recent = run.time_s[segment.first] - run.time_s[begin] < settles_within_s;
-  if (is_recent && (begin > 0 || !begins_at_rest(run))) return std::nullopt;
-  if (begin == segment.first) return AttachedStart{};
+  if (!run.has_cart()) return;
+  begin_ = begin_of_motion(run, end_);
+  const bool is_recent = run.time_s[end_] - run.time_s[begin_] < settles_within_s;
+  is_known_ = !is_recent || (begin_ == 0 && begins_at_rest(run));
+}
+
+PlantState<double> MotionBefore::with_mass(const Plant& plant, PlantState<double> start) const {
+  if (!is_known_) return start;
+  if (is_empty()) {
+    start.attached_m = start.attached_mps = 0.0;
+    return start;
+  }
   const PlantModel<double> model = make_model<double>(plant);
   const Dynamics<double> dynamics(model);
   const SprungMassMotion motion(dynamics);
-  const double gain = SensorLine<double>(model).cart_gain;
-  std::size_t k = segment.first;
-  while (k > begin && run.time_s[segment.first] - run.time_s[k] < motion.memory_s()) --k;
+  const double gain = SensorLine<double>(model).cart_gain, memory_s = motion.memory_s();
+  std::size_t k = end_;
+  while (k > begin_ && run_.time_s[end_] - run_.time_s[k] < memory_s) --k;
   Swing swing{0.0, 0.0};
-  for (; k < segment.first; ++k) {
-    const double period_s = run.time_s[k + 1] - run.time_s[k];
-    motion.advance((run.cart_m[k + 1] - run.cart_m[k]) / (gain * period_s), period_s, swing);
+  for (; k < end_; ++k) {
+    const double period_s = run_.time_s[k + 1] - run_.time_s[k];
+    motion.advance((run_.cart_m[k + 1] - run_.cart_m[k]) / (gain * period_s), period_s, swing);
   }
-  const double ahead_m = (run.cart_m[segment.first] - dynamics.measure(start).cart_m) / gain;
-  return AttachedStart{swing.q_m + ahead_m, swing.w_mps - start.cart_mps, true};
-}
-
-PlantState<double> with_attached_start(const Measurement& run, const Segment& segment, const Plant& plant,
-                                       PlantState<double> start) {
-  const std::optional<AttachedStart> at = attached_start(run, segment, plant, start);
-  if (!at) return start;
-  start.attached_m = at->attached_m;
-  start.attached_mps = at->attached_mps;
+  const double ahead_m = (run_.cart_m[end_] - dynamics.measure(start).cart_m) / gain;
+  start.attached_m = swing.q_m + ahead_m;
+  start.attached_mps = swing.w_mps - start.cart_mps;
   return start;
 }
 

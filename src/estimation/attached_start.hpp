@@ -3,7 +3,7 @@
 // disturbance near its frequency.
 #pragma once
 
-#include <optional>
+#include <cstddef>
 
 #include "segments.hpp"
 #include "upright/measurement/measurement.hpp"
@@ -18,21 +18,25 @@ bool is_driven_by_cart(const Plant& plant);
 /// Whether the mass that an effect attaches is one.
 bool is_driven_by_cart(std::size_t effect);
 
-/// The state of such a mass at the start of a segment.
-struct AttachedStart {
-  double attached_m = 0.0, attached_mps = 0.0;  ///< as in PlantState
-  /// Whether it follows from a motion before the segment. Then it falls behind by as much as the cart's own
-  /// start is further. Otherwise it is at rest on the cart.
-  bool is_moved = false;
+/// The measured motion of the cart before a segment: it says where such a mass is at the start.
+class MotionBefore {
+ public:
+  /// Keeps a reference to the run.
+  MotionBefore(const Measurement& run, const Segment& segment);
+
+  /// Whether it is known for long enough. Soon after missing rows, or after the beginning of a run in motion,
+  /// it is not: then the start of the mass is free.
+  bool is_known() const { return is_known_; }
+  /// Whether there is none: then the mass is at rest on the cart. Otherwise it falls behind by as much as the
+  /// cart's own start is further.
+  bool is_empty() const { return begin_ == end_; }
+  /// A start with the mass of a plant where it is if all other states are these; unchanged where it is free.
+  PlantState<double> with_mass(const Plant& plant, PlantState<double> start) const;
+
+ private:
+  const Measurement& run_;
+  std::size_t begin_, end_;
+  bool is_known_ = true;
 };
-
-/// Of the mass of a plant in a segment where all other states are these. Nothing soon after missing rows, or
-/// after the beginning of a run in motion: then the start is free.
-std::optional<AttachedStart> attached_start(const Measurement& run, const Segment& segment,
-                                            const Plant& plant, const PlantState<double>& start);
-
-/// A start with the mass where it is then; unchanged where it is free.
-PlantState<double> with_attached_start(const Measurement& run, const Segment& segment, const Plant& plant,
-                                       PlantState<double> start);
 
 }  // namespace upright

@@ -133,7 +133,7 @@ void GaussNewton::linearise(std::size_t s) {
   const Segment& segment = data_.segments[s];
   if (is_driven_by_cart(point_.plant))
     point_.starts[s] =
-        with_attached_start((*data_.runs)[segment.run], segment, point_.plant, point_.starts[s]);
+        MotionBefore((*data_.runs)[segment.run], segment).with_mass(point_.plant, point_.starts[s]);
   linearise_segment(data_, s, point_, free_, linearised_[s].steps, &linearised_[s].normal);
 }
 

@@ -6,7 +6,6 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <optional>
 
 #include "attached_start.hpp"
 #include "model/rigid_body.hpp"
@@ -246,13 +245,14 @@ class SegmentLineariser {
   /// The start of a mass on the cart depends on that of the cart, and on its own parameters.
   void start_attached_sensitivity(const Plant& plant, const PlantState<double>& start,
                                   const std::vector<FreeParameter>& free) {
-    const std::optional<AttachedStart> at = attached_start(run_, segment_, plant, start);
-    if (!at) return;
+    const MotionBefore motion(run_, segment_);
+    if (!motion.is_known()) return;
     Row &place = sensitivity_[attached_state], &speed = sensitivity_[attached_state + 1];
     place = speed = Row{};
-    if (!at->is_moved) return;
+    if (motion.is_empty()) return;
     place -= sensitivity_[0];
     speed -= sensitivity_[2];
+    const PlantState<double> at = motion.with_mass(plant, start);
     for (std::size_t j = 0; j < free.size(); ++j) {
       if (!attaches_mass(free[j].effect)) continue;
       constexpr double step_of_scale = 1e-5;
@@ -261,10 +261,10 @@ class SegmentLineariser {
       further.values[free[j].index] += step;
       Plant other = plant;
       other.set(free[j].effect, further.values);
-      const std::optional<AttachedStart> there = attached_start(run_, segment_, other, start);
+      const PlantState<double> there = motion.with_mass(other, start);
       const int column = states_ + static_cast<int>(j);
-      place.set(column, (there->attached_m - at->attached_m) / step);
-      speed.set(column, (there->attached_mps - at->attached_mps) / step);
+      place.set(column, (there.attached_m - at.attached_m) / step);
+      speed.set(column, (there.attached_mps - at.attached_mps) / step);
     }
   }
 

@@ -48,16 +48,17 @@ void cut_run(const Measurement& run, std::size_t number, double longest_s, std::
 
 }  // namespace
 
-std::vector<std::size_t> gaps_in(const Measurement& run) {
+bool is_gap(const Measurement& run, std::size_t k, double period_s) {
   constexpr double longest_periods = 5.0;
-  const double longest_s = longest_periods * run.median_period_s();
+  return run.time_s[k] - run.time_s[k - 1] > longest_periods * period_s ||
+         std::binary_search(run.breaks.begin(), run.breaks.end(), k);
+}
+
+std::vector<std::size_t> gaps_in(const Measurement& run) {
+  const double period_s = run.median_period_s();
   std::vector<std::size_t> gaps;
-  auto next_break = run.breaks.begin();
-  for (std::size_t k = 1; k < run.size(); ++k) {
-    while (next_break != run.breaks.end() && *next_break < k) ++next_break;
-    if (run.time_s[k] - run.time_s[k - 1] > longest_s || (next_break != run.breaks.end() && *next_break == k))
-      gaps.push_back(k);
-  }
+  for (std::size_t k = 1; k < run.size(); ++k)
+    if (is_gap(run, k, period_s)) gaps.push_back(k);
   return gaps;
 }
 

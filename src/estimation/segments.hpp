@@ -16,8 +16,12 @@ struct Segment {
   std::size_t last = 0;   ///< its last sample
 };
 
-/// The samples before which rows are missing: those of `breaks`, and those after more than five periods
-/// without a row. What was commanded in a gap is not known.
+/// Whether rows are missing before sample k: it is one of `breaks`, or comes more than five of these periods
+/// after the one before it.
+bool is_gap(const Measurement& run, std::size_t k, double period_s);
+
+/// The samples before which rows are missing: those that is_gap() finds with the median period. What was
+/// commanded in a gap is not known.
 std::vector<std::size_t> gaps_in(const Measurement& run);
 
 /// Cuts runs into segments: at gaps in the record, and short enough that the instability of the upright

@@ -44,6 +44,13 @@ TEST(AttachedMassSearch, FindsASprungMassOnAHeavyRig) {
   expect_values(only_named(heavy, truth), "sprung_mass", {0.1 * factor, 4.0, 0.08}, 0.1);
 }
 
+std::set<std::string> named_in(blind::Request request, blind::Size size) {
+  request.size = size;
+  request.max_samples = 6000.0;
+  const blind::Case blind = make_case(request);
+  return named_effects(measure_all(blind), blind.believed);
+}
+
 /// A random force accounts for the swing of the first mass, so that nothing seems to be missing. On the
 /// second rig, something is left beside the mass too.
 TEST(AttachedMassSearch, NamesASprungMassThatIsCertain) {
@@ -51,21 +58,15 @@ TEST(AttachedMassSearch, NamesASprungMassThatIsCertain) {
     blind::Request request;
     request.hidden = {"sprung_mass"};
     request.seed = blind::seed_of_case(20270401, number);
-    request.size = number == 12 ? blind::Size::weak : blind::Size::strong;
-    request.max_samples = 6000.0;
-    const blind::Case blind = make_case(request);
-    EXPECT_EQ(named_effects(measure_all(blind), blind.believed), std::set<std::string>{"sprung_mass"})
-        << number;
+    const blind::Size size = number == 12 ? blind::Size::weak : blind::Size::strong;
+    EXPECT_EQ(named_in(request, size), std::set<std::string>{"sprung_mass"}) << number;
   }
 }
 
 /// Plain simulations are hardly better with the mass, since a random force moves them too.
 TEST(AttachedMassSearch, NamesASprungMassBesideADisturbance) {
-  blind::Request request = blind::laboratory_request(blind::seed_of_case(20270402, 23), {"sprung_mass"});
-  request.size = blind::Size::weak;
-  request.max_samples = 6000.0;
-  const blind::Case blind = make_case(request);
-  EXPECT_EQ(named_effects(measure_all(blind), blind.believed), std::set<std::string>{"sprung_mass"});
+  const auto request = blind::laboratory_request(blind::seed_of_case(20270402, 23), {"sprung_mass"});
+  EXPECT_EQ(named_in(request, blind::Size::weak), std::set<std::string>{"sprung_mass"});
 }
 
 TEST(AttachedMassSearch, BeginsWithinItsLimits) {

@@ -1,4 +1,4 @@
-// The start of an attached mass within a record follows from the measured motion of what carries it.
+// The start of a sprung mass within a record follows from the measured motion of the cart.
 #include "estimation/attached_start.hpp"
 
 #include <gtest/gtest.h>
@@ -58,8 +58,8 @@ Plant with_sprung_mass() {
 
 constexpr std::size_t samples_per_s = 500;
 
-/// The starts that the motion gives after so many seconds, where the mass was and how far it swings at most.
-void expect_starts_of(const Plant& plant) {
+TEST(AttachedStart, FollowsFromTheMotionOfTheCart) {
+  const Plant plant = with_sprung_mass();
   const Record record = record_of(plant);
   double most_m = 0.0, most_mps = 0.0;
   for (const PlantState<double>& state : record.states) {
@@ -69,23 +69,23 @@ void expect_starts_of(const Plant& plant) {
   for (std::size_t first = samples_per_s / 2; first + 1 < record.states.size(); first += samples_per_s / 2) {
     PlantState<double> start = record.states[first];
     start.attached_m = start.attached_mps = 0.0;
-    const auto at = attached_start(record.runs.front(), {0, first, first + 1}, plant, start);
-    ASSERT_TRUE(at);
-    EXPECT_NEAR(at->attached_m, record.states[first].attached_m, 0.01 * most_m) << first;
-    EXPECT_NEAR(at->attached_mps, record.states[first].attached_mps, 0.01 * most_mps) << first;
+    const MotionBefore motion(record.runs.front(), {0, first, first + 1});
+    ASSERT_TRUE(motion.is_known());
+    const PlantState<double> at = motion.with_mass(plant, start);
+    EXPECT_NEAR(at.attached_m, record.states[first].attached_m, 0.01 * most_m) << first;
+    EXPECT_NEAR(at.attached_mps, record.states[first].attached_mps, 0.01 * most_mps) << first;
   }
-}
-
-TEST(AttachedStart, FollowsFromTheMotionOfTheCart) {
-  expect_starts_of(with_sprung_mass());
 }
 
 TEST(AttachedStart, IsAtRestWhereARunBeginsAtRest) {
   const Record record = record_of(with_sprung_mass());
-  const auto first = attached_start(record.runs.front(), {0, 0, 10}, with_sprung_mass(), record.states[0]);
-  ASSERT_TRUE(first);
-  EXPECT_EQ(first->attached_m, 0.0);
-  EXPECT_EQ(first->attached_mps, 0.0);
+  const MotionBefore motion(record.runs.front(), {0, 0, 10});
+  ASSERT_TRUE(motion.is_known());
+  PlantState<double> start = record.states[0];
+  start.attached_m = start.attached_mps = 0.1;
+  const PlantState<double> first = motion.with_mass(with_sprung_mass(), start);
+  EXPECT_EQ(first.attached_m, 0.0);
+  EXPECT_EQ(first.attached_mps, 0.0);
 }
 
 // What the cart did in a gap is not known, nor before a record that begins in motion.
@@ -94,7 +94,7 @@ TEST(AttachedStart, IsFreeSoonAfterAnUnknownMotion) {
   Record record = record_of(with_sprung_mass());
   Measurement& run = record.runs.front();
   const auto is_free_at = [&](std::size_t first) {
-    return !attached_start(run, {0, first, first + 10}, with_sprung_mass(), record.states[first]);
+    return !MotionBefore(run, {0, first, first + 10}).is_known();
   };
   EXPECT_FALSE(is_free_at(gap));
   for (std::size_t k = gap; k < run.size(); ++k) run.time_s[k] += 0.1;
@@ -119,7 +119,9 @@ TEST(AttachedStart, IsFreeForOtherMasses) {
 
 /// The slope of the objective by the parameters of the mass is that of the normal equations, also in a
 /// segment that begins within the motion. Without process noise no gain depends on a parameter.
-void expect_slopes_of(const Plant& plant, std::size_t effect) {
+TEST(AttachedStart, HasTheSlopesOfTheObjective) {
+  const Plant plant = with_sprung_mass();
+  const std::size_t effect = effect_number("sprung_mass");
   const Record record = record_of(plant);
   const FitData data{&record.runs, {{0, 2 * samples_per_s, 3 * samples_per_s}}};
   FitPoint point{plant, {record.states[2 * samples_per_s]}, Noise{}};
@@ -149,10 +151,6 @@ void expect_slopes_of(const Plant& plant, std::size_t effect) {
     const auto row = static_cast<Eigen::Index>(equations.score.size() - 3 + static_cast<Eigen::Index>(index));
     EXPECT_NEAR(-2.0 * equations.score[row] / slope, 1.0, 0.02) << index;
   }
-}
-
-TEST(AttachedStart, HasTheSlopesOfTheObjective) {
-  expect_slopes_of(with_sprung_mass(), effect_number("sprung_mass"));
 }
 
 }  // namespace
