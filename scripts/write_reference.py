@@ -55,8 +55,10 @@ def commands_of(program):
     return lines
 
 
-def number_of(expression):
-    """A number of C++ as readers write it; of a ratio, as it stands."""
+def value_of(expression):
+    """A number or a list of names of C++ as readers write it; of a ratio, as it stands."""
+    if expression.startswith("{"):
+        return ", ".join(f"`{name}`" for name in re.findall(r'"(.*?)"', expression))
     return f"{float(expression):g}" if re.fullmatch(r"[\d.e+-]+", expression) else re.sub(r"(\d)\.0\b", r"\1", expression)
 
 
@@ -65,16 +67,17 @@ def limits_of(header):
     text = header.read_text()
     parts = dict(re.findall(r"^struct (\w+) \{\n(.*?)^\};", text, re.MULTILINE | re.DOTALL))
     comments = dict((name, comment) for comment, name in re.findall(r"((?:^/// .*\n)+)^struct (\w+)", text, re.MULTILINE))
+    member_line = r"^  (?:double|int|std::size_t|std::array<std::string_view, \d+>) (\w+) =\s+([^;]*);"
     lines = []
     for part, name in re.findall(r"^  (\w+) (\w+);$", parts["SelectionPolicy"], re.MULTILINE):
         lines += ["", f"### {name.capitalize()}", "", plain(comments[part]), "", "| limit | value | unit | meaning |", "|---|---|---|---|"]
-        members = re.findall(r"^  (?:double|int|std::size_t) (\w+) = (.*);", parts[part], re.MULTILINE)
-        commented = re.findall(r"((?:^  /// .*\n)+)^  (?:double|int|std::size_t) (\w+) = (.*);", parts[part], re.MULTILINE)
+        members = re.findall(member_line, parts[part], re.MULTILINE)
+        commented = re.findall(rf"((?:^  /// .*\n)+){member_line}", parts[part], re.MULTILINE)
         if [member for member, _ in members] != [member for _, member, _ in commented]:
             sys.exit(f"{header}: a member of {part} has no comment of its own")
         for comment, member, value in commented:
             unit, meaning = re.fullmatch(r"\[(.*?)\] (.*)", plain(comment)).groups()
-            lines.append(f"| `{member}` | {number_of(value)} | {'-' if unit == '1' else unit} | {cell(meaning)} |")
+            lines.append(f"| `{member}` | {value_of(value)} | {'-' if unit == '1' else unit} | {cell(meaning)} |")
     return lines
 
 
