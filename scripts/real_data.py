@@ -140,16 +140,32 @@ def rms_off(file):
     return {q: (math.sqrt(b / n), math.sqrt(a / n)) for q, (b, a, n) in sums.items() if n}
 
 
+# What a force_table lies over, in a sentence.
+CURVE_OVER = {"velocity": "velocity", "position": "position", "position_and_direction": "position, against the motion",
+              "position_and_velocity": "position, times the velocity"}
+
+
+def curve_in_words(over, begin, end, forces):
+    """A force_table by what it lies over, where, and its extremes: 13 nodes do not fit into a table."""
+    return (f"force_table over the {CURVE_OVER[over]}, from {begin:.4g} to {end:.4g}"
+            f" {'m/s' if over == 'velocity' else 'm'}, of {min(forces):.3g} to {max(forces):.3g} N")
+
+
 def in_words(effect):
+    if "curve" in effect:
+        curve = effect["curve"]
+        return curve_in_words(curve["over"], curve["at"][0], curve["at"][-1], curve["force_n"])
     values = []
     for name, p in effect["parameters"].items():
         low, high = p["ci95"]
         unit = "" if p["unit"] == "1" else " " + p["unit"]
         values.append(f"{name} {p['value']:.4g} ({low:.4g} to {high:.4g}){unit}")
-    text = f"{effect['kind']} {', '.join(values)}"
-    if effect["confusable_with"]:
-        text += f" [or {', '.join(effect['confusable_with'])}]"
-    return text
+    return f"{effect['kind']} {', '.join(values)}"
+
+
+def with_alternatives(effect):
+    others = effect["confusable_with"]
+    return in_words(effect) + (f" [or {', '.join(others)}]" if others else "")
 
 
 def table(out):
@@ -170,7 +186,7 @@ def table(out):
     print("\n| data | effects found, with 95 % intervals | residual | authors, or the ladder of SOURCE.md |")
     print("|---|---|---|---|")
     for name, said, found, _, _ in rows:
-        named = "; ".join(in_words(effect) for effect in found["effects"]) or "nothing"
+        named = "; ".join(with_alternatives(effect) for effect in found["effects"]) or "nothing"
         print(f"| {name} | {named} | {in_plain_words(found['residual'])} | {said} |")
 
 

@@ -20,6 +20,7 @@ import record
 import rigs
 import scorer
 import upright_program
+from rigs import real_data
 
 # The textbook terms of a regression. The cut-off of its filters is chosen on the training runs.
 CART_TERMS = ("viscous", "coulomb", "constant")
@@ -95,19 +96,11 @@ def print_scores(rows, names, channel):
     print()
 
 
-def in_words(effect):
-    values = []
-    for name, p in effect["parameters"].items():
-        low, high = p["ci95"]
-        values.append(f"{name} {p['value']:.4g} ({low:.4g} to {high:.4g})")
-    return f"{effect['kind']} " + ", ".join(values)
-
-
 def print_named(found):
     print("| from | verdict | named, with 95 % intervals | numbers of the file, fitted | helps here only | CPU seconds |")
     print("|---|---|---|---|---|---|")
     for model, (result, folder) in found.items():
-        named = "; ".join(in_words(effect) for effect in result["effects"]) or "nothing"
+        named = "; ".join(real_data.in_words(effect) for effect in result["effects"]) or "nothing"
         numbers = "; ".join(f"{n['number']} {n['fitted']:.4g}" for n in result["numbers"])
         here_only = ", ".join(effect["kind"] for effect in result["helps_here_only"])
         print(f"| {model} | {result['verdict']} | {named} | {numbers} | {here_only} |"
@@ -127,7 +120,9 @@ def print_agreement(found, trained_on):
         pairs = [(a, b) for a, b in itertools.combinations(models, 2)
                  if not rigs.share_data(trained_on[a], trained_on[b])]
         shares = []
-        for name in next(iter(models.values())) if pairs else []:
+        # The nodes of two force tables lie at different places, so their intervals are not compared.
+        comparable = pairs and kind != "force_table"
+        for name in next(iter(models.values())) if comparable else []:
             intervals = [(models[a][name]["ci95"], models[b][name]["ci95"]) for a, b in pairs]
             overlapping = sum(a[0] <= b[1] and b[0] <= a[1] for a, b in intervals)
             shares.append(f"{name} {overlapping} of {len(pairs)}")

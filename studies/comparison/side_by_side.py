@@ -23,6 +23,7 @@ import rigs
 import scorer
 import sindy
 import upright_program
+from rigs import real_data
 
 CUTOFFS_HZ = (5.0, 10.0, 20.0, 50.0)
 # Steps of the ladder of plain regression: how many of the terms, in order.
@@ -189,6 +190,10 @@ def sindy_row(bench):
 def in_words(plant):
     parts = [f"M {plant['cart_mass_kg']:.4g}"]
     for effect in plant["effects"]:
+        if effect["kind"] == "force_table":
+            forces = [value for key, value in effect.items() if key.startswith("force_")]
+            parts.append(real_data.curve_in_words(effect["over"], effect["from"], effect["to"], forces))
+            continue
         numbers = [value for key, value in effect.items() if key != "kind"]
         parts.append(f"{effect['kind']} " + ", ".join(f"{x:.4g}" if isinstance(x, float) else str(x) for x in numbers))
     return "; ".join(parts)

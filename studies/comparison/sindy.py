@@ -33,7 +33,7 @@ PENDULUM = {"1": "1.0", "V": "u", "v": "v[0]", "sgn v": "d[0]", "sin th": "np.si
             "V cos th": "u * np.cos(q[1])", "v cos th": "v[0] * np.cos(q[1])", "sgn v cos th": "d[0] * np.cos(q[1])",
             "w cos th": "v[1] * np.cos(q[1])", "cos th": "np.cos(q[1])", "v|v|": "v[0] * np.abs(v[0])",
             "w|w|": "v[1] * np.abs(v[1])", "x": "q[0]"}
-LIBRARIES = {("cart",): (CART, (4, 7)), ("cart", "theta"): (PENDULUM, (13, 17))}
+LIBRARIES = {("cart",): (CART, (4, 7)), ("cart", "theta"): (PENDULUM, (7, 13, 17))}
 # The term that is the sign of a channel's own velocity.
 SIGN_TERMS = ("sgn v", "sgn w")
 
