@@ -16,16 +16,21 @@ class HeldOutSimulation {
 
   /// With these effects and the numbers of the plant file as given.
   FreeRunSimulation as_given(const std::vector<std::size_t>& effects) const { return of(effects, false); }
-  /// The same with the numbers within what is believed of them, but for one that may be as given.
-  FreeRunSimulation settled(const std::vector<std::size_t>& effects,
-                            std::optional<std::size_t> as_given = {}) const {
-    return of(effects, true, as_given);
+  /// The same with the numbers within what is believed of them.
+  FreeRunSimulation settled(const std::vector<std::size_t>& effects) const { return of(effects, true); }
+  /// The same with a number as given, of a model with fewer effects. Absent if it makes one of them
+  /// impossible.
+  std::optional<FreeRunSimulation> of_less(const std::vector<std::size_t>& effects,
+                                           std::optional<std::size_t> as_given = {}) const {
+    Hypothesis h = search_.fitted_separately(effects, judged_, &noise_, true, as_given);
+    for (const std::size_t effect : effects)
+      if (search_.is_admissible(judged_, effect) && !search_.is_admissible(h, effect)) return std::nullopt;
+    return search_.simulate(h);
   }
 
  private:
-  FreeRunSimulation of(const std::vector<std::size_t>& effects, bool settled,
-                       std::optional<std::size_t> held = {}) const {
-    Hypothesis h = search_.fitted_separately(effects, judged_, &noise_, settled, held);
+  FreeRunSimulation of(const std::vector<std::size_t>& effects, bool settled) const {
+    Hypothesis h = search_.fitted_separately(effects, judged_, &noise_, settled);
     return search_.simulate(h);
   }
 
@@ -47,7 +52,7 @@ std::vector<std::size_t> without(std::vector<std::size_t> effects, std::size_t g
 }
 
 /// The suspect without which the error is lowest, if it is lower by more than chance there.
-/// `simulated_without(suspect)`: the simulation to compare.
+/// `simulated_without(suspect)`: the simulation to compare, absent if that model cannot be.
 template <class Simulate>
 std::optional<std::size_t> raising(const std::vector<std::size_t>& suspects,
                                    const FreeRunSimulation& complete, const SelectionPolicy& policy,
@@ -55,7 +60,8 @@ std::optional<std::size_t> raising(const std::vector<std::size_t>& suspects,
   std::optional<std::size_t> raises;
   double largest = 0.0;
   for (const std::size_t suspect : suspects) {
-    const double rise = certain_rise(simulated_without(suspect), complete, policy);
+    const std::optional<FreeRunSimulation> simulated = simulated_without(suspect);
+    const double rise = simulated ? certain_rise(*simulated, complete, policy) : 0.0;
     if (!(rise > largest)) continue;
     largest = rise;
     raises = suspect;
@@ -121,11 +127,11 @@ Listing list_effects(Search& search, const Hypothesis& judged, const ListedModel
   if (model.effects.empty()) return listing;
   const SelectionPolicy& policy = search.policy();
   listing.number_raises = raising(far, complete, policy, [&](std::size_t number) {
-    return simulation.settled(without(model.effects, number), number);
+    return simulation.of_less(without(model.effects, number), number);
   });
   if (listing.number_raises || raised.empty()) return listing;
   listing.raises = raising(raised, complete, policy, [&](std::size_t effect) {
-    return simulation.settled(without(model.effects, effect));
+    return simulation.of_less(without(model.effects, effect));
   });
   if (!listing.raises && certain_rise(given, complete, policy) > 0.0) listing.raises = raised.back();
   return listing;

@@ -183,8 +183,7 @@ bool Search::bristles_are_short(const Hypothesis& h) const {
   const Dynamics<double> dynamics(make_model<double>(plant));
   const double breakaway_n = dynamics.cart_dry_level(range_.cart_mean_m, 0.0, 1.0);
   const double stiffness_n_per_m = plant.find(effect_number("bristle_friction"))->values[0];
-  return are_bristles_short(breakaway_n, stiffness_n_per_m, range_.cart_high_m - range_.cart_low_m,
-                            policy_.prior);
+  return are_bristles_short(breakaway_n, stiffness_n_per_m, range_.longest_travel_m, policy_.prior);
 }
 
 double Search::certainty(const Hypothesis& h, std::size_t effect) const {

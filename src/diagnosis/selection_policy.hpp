@@ -239,8 +239,9 @@ struct PriorPolicy {
   /// [m] Half a track: the standard deviation of the centre of a spring about the mean position of the cart.
   /// For the track of a small cart, and scaled to other plants. Chosen.
   double spring_center_m = 0.5;
-  /// [1] Bristles that bend over more than this share of the travel before they slide act as a spring and are
-  /// rejected. Bristles of 14 N/m with 5 N of friction had been found in place of a spring (canterbury data).
+  /// [1] Bristles that bend over more than this share of the longest travel of one run before they slide act
+  /// as a spring and are rejected. Bristles of 14 N/m with 5 N of friction had been found in place of a
+  /// spring (canterbury data).
   double bristle_share_of_travel = 0.1;
   /// [N/m] The softest bristles. Softer ones act as a spring. For a small cart, and scaled to other plants.
   /// Chosen.

@@ -145,6 +145,59 @@ TEST(Listing, BlamesNoCorrectionWithinWhatIsBelievedForARise) {
   EXPECT_FALSE(listing.number_raises);
 }
 
+/// One run has bristles and a spring, the held-out one only bristles. Without the spring, softer bristles
+/// hold the cart of the first run.
+class SpringOfOneRun {
+ public:
+  SpringOfOneRun() : runs_{run(true, 1), run(false, 2)}, train_{&runs_, {}}, held_{&runs_, {}} {
+    for (const Segment& segment : cut_segments(runs_))
+      (segment.run == 0 ? train_ : held_).segments.push_back(segment);
+  }
+
+  /// What a simulation of the held-out run speaks against, if bristles may bend over this share of the
+  /// travel.
+  std::optional<std::size_t> raises(double longest_bristles) const {
+    SelectionPolicy policy;
+    policy.prior.bristle_share_of_travel = longest_bristles;
+    const SearchBudget budget;
+    Search search(file_plant(), runs_, train_, held_, policy, budget);
+    Hypothesis base = search.baseline();
+    base.train.point.plant = rig(true).plant;
+    const std::vector<std::size_t> effects = {effect_number("coulomb_friction"),
+                                              effect_number("bristle_friction"), spring_};
+    const Hypothesis judged = search.fitted_separately(effects, base, nullptr, true);
+    return list_effects(search, judged, {.effects = effects, .corrections = {}}).raises;
+  }
+
+  static constexpr const char* spring = "cable_spring";
+
+ private:
+  static blind::Rig rig(bool with_spring) {
+    blind::Rig rig{.plant = file_plant()};
+    rig.plant.set("coulomb_friction", {0.5});
+    rig.plant.set("bristle_friction", {400.0, 10.0});
+    if (with_spring) rig.plant.set(spring, {6.0, 0.0});
+    return rig;
+  }
+  static Measurement run(bool with_spring, unsigned seed) {
+    blind::Plan plan;
+    plan.rate_hz = 200.0;
+    plan.duration_s = 24.0;
+    plan.seed = seed;
+    return measure(rig(with_spring), plan, "run" + std::to_string(seed));
+  }
+
+  const std::size_t spring_ = effect_number(spring);
+  std::vector<Measurement> runs_;
+  FitData train_, held_;
+};
+
+TEST(Listing, BlamesNoEffectWithoutWhichAnotherIsImpossible) {
+  const SpringOfOneRun data;
+  EXPECT_EQ(data.raises(0.1), effect_number(SpringOfOneRun::spring));
+  EXPECT_FALSE(data.raises(0.03));
+}
+
 TEST(Halves, TakeEverySecondSegmentOfOneRun) {
   const std::vector<Measurement> runs = {run_with(0.0, 1)};
   const FitData data{&runs, cut_segments(runs)};
@@ -166,6 +219,32 @@ TEST(Halves, DoNotDependOnTheOrderOfRuns) {
   };
   EXPECT_EQ(names(runs), (std::set<std::string>{"run1", "run3"}));
   EXPECT_EQ(names(turned), names(runs));
+}
+
+/// Bristles of 5 mm in a travel of 30 cm, and in one of 2 cm whether or not another run is far away.
+TEST(Bristles, AreComparedWithTheTravelOfOneRun) {
+  const auto are_admissible = [](double amplitude_m, double apart_m) {
+    std::vector<Measurement> runs(2);
+    for (std::size_t r = 0; r < 2; ++r)
+      for (int k = 0; k < 200; ++k) {
+        const double t = 0.01 * k;
+        runs[r].time_s.push_back(t);
+        runs[r].voltage_v.push_back(0.0);
+        runs[r].cart_m.push_back(amplitude_m * std::sin(6.0 * t) + apart_m * static_cast<double>(r));
+      }
+    const FitData train{&runs, cut_segments(runs)};
+    const SelectionPolicy policy;
+    const SearchBudget budget;
+    const Search search(file_plant(), runs, train, {&runs, {}}, policy, budget);
+    Hypothesis h;
+    h.train.point.plant = file_plant();
+    h.train.point.plant.set("coulomb_friction", {0.5});
+    h.train.point.plant.set("bristle_friction", {100.0, 0.0});
+    return search.is_admissible(h, effect_number("bristle_friction"));
+  };
+  EXPECT_TRUE(are_admissible(0.15, 0.0));
+  EXPECT_FALSE(are_admissible(0.01, 0.0));
+  EXPECT_FALSE(are_admissible(0.01, 0.5));
 }
 
 TEST(Pitch, IsShownByOneRunNotByPlacesFarApart) {
