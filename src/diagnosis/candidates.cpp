@@ -88,6 +88,9 @@ DataRange range_of(const std::vector<Measurement>& runs, const Plant& plant, con
     range.longest_run_s = std::max(range.longest_run_s, run.time_s.back() - run.time_s.front());
     range.theta_measured = range.theta_measured || run.has_theta();
     range.theta_resolution_rad = std::max(range.theta_resolution_rad, run.theta_resolution_rad);
+    // The error of steps is as large as a noise of step / sqrt(12).
+    if (run.has_theta())
+      range.theta_step_rad = std::max(range.theta_step_rad, std::sqrt(12.0) * run.theta_noise_rad());
     range.shortest_period_s = std::min(range.shortest_period_s, run.median_period_s());
     double square = 0.0;
     for (const double v : run.voltage_v) {

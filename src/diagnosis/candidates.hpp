@@ -29,6 +29,7 @@ struct DataRange {
   double cart_mean_m = 0.0;
   double shortest_period_s = 0.0;
   double theta_resolution_rad = 0.0;
+  double theta_step_rad = 0.0;       ///< of an encoder as precise as the sensor of the angle
   double gravity_torque_nm = 0.0;    ///< the largest on the pendulum; 0 without one
   double pendulum_rate_radps = 0.0;  ///< of its small swings while it hangs
 };

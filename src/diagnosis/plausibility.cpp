@@ -67,8 +67,8 @@ bool is_doubtful(double scale, const PriorPolicy& policy) {
   return !(std::abs(std::log(scale)) < policy.doubtful_scale);
 }
 
-bool shows_on_encoder(double offset_rad, double resolution_rad, const CorrectionPolicy& policy) {
-  return !(std::abs(offset_rad) < policy.min_angle_offset_steps * resolution_rad);
+bool shows_on_encoder(double offset_rad, double step_rad, const CorrectionPolicy& policy) {
+  return !(std::abs(offset_rad) < policy.min_angle_offset_steps * step_rad);
 }
 
 bool are_bristles_short(double breakaway_n, double stiffness_n_per_m, double travel_m,

@@ -37,8 +37,9 @@ inline constexpr double end_tolerance = 1e-3;
 /// A number of the plant file that is off by more than a data sheet is.
 bool is_doubtful(double scale, const PriorPolicy& policy);
 
-/// An offset of the angle that its encoder shows.
-bool shows_on_encoder(double offset_rad, double resolution_rad, const CorrectionPolicy& policy);
+/// An offset of the angle that its encoder shows. Of another sensor, `step_rad` is that of an encoder as
+/// precise.
+bool shows_on_encoder(double offset_rad, double step_rad, const CorrectionPolicy& policy);
 
 /// Bristles that bend over a good part of the track before they slide are a spring by another name.
 bool are_bristles_short(double breakaway_n, double stiffness_n_per_m, double travel_m,

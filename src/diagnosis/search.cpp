@@ -161,7 +161,7 @@ bool Search::is_plausible(const Hypothesis& h, std::size_t effect) const {
     const double value = h.train.point.plant.find(effect)->values[p.index];
     if (p.index == 0 && value == effect_registry()[effect].parameters[0].neutral) return false;
     if (kind_of(effect).starts_with("angle_offset") &&
-        !shows_on_encoder(value, range_.theta_resolution_rad, policy_.correction))
+        !shows_on_encoder(value, range_.theta_step_rad, policy_.correction))
       return false;
   }
   return is_admissible(h, effect);

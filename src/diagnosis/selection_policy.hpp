@@ -83,7 +83,8 @@ struct CorrectionPolicy {
   /// [1] The factor by which priors are widened in the final fits. The plant file still has weight there, but
   /// less, where the data correct it. Chosen.
   double prior_widening = 4.0;
-  /// [encoder steps] A smaller offset of the angle is not visible in the encoder's counts. Chosen.
+  /// [encoder steps] A smaller offset of the angle is not visible in the encoder's counts. A sensor without
+  /// steps is compared with an encoder of the same noise. Chosen.
   double min_angle_offset_steps = 1.5;
 };
 

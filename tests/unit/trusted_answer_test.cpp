@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 #include <optional>
+#include <random>
 #include <set>
 
 #include "blind_case.hpp"
@@ -264,6 +265,25 @@ TEST(Pitch, IsShownByOneRunNotByPlacesFarApart) {
   };
   EXPECT_DOUBLE_EQ(longest_pitch({here, far}), longest_pitch({here}));
   EXPECT_NEAR(longest_pitch({here}), 0.06 / policy.prior.crests_of_pitch, 1e-4);
+}
+
+TEST(AngleStep, IsThatOfAnEncoderAsPreciseAsTheSensor) {
+  const auto step_of = [](double encoder_step_rad, double noise_rad) {
+    Measurement run;
+    std::mt19937_64 random(1);
+    std::normal_distribution<double> noise(0.0, noise_rad);
+    for (int k = 0; k < 2000; ++k) {
+      const double t = 0.005 * k, theta = 0.3 * std::sin(4.0 * t) + (noise_rad > 0.0 ? noise(random) : 0.0);
+      run.time_s.push_back(t);
+      run.voltage_v.push_back(0.0);
+      run.theta_rad.push_back(encoder_step_rad > 0.0 ? encoder_step_rad * std::round(theta / encoder_step_rad)
+                                                     : theta);
+    }
+    run.theta_resolution_rad = encoder_step_rad;
+    return range_of({run}, file_plant(), SelectionPolicy{}.excitation).theta_step_rad;
+  };
+  EXPECT_NEAR(step_of(2e-3, 0.0), 2e-3, 1e-12);
+  EXPECT_NEAR(step_of(0.0, 1e-3), std::sqrt(12.0) * 1e-3, 2e-4);
 }
 
 TEST(Phase, IsWithinHalfATurn) {
