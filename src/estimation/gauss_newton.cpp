@@ -7,7 +7,6 @@
 #include <iterator>
 #include <limits>
 #include <numeric>
-#include <optional>
 #include <utility>
 
 #include "attached_start.hpp"
@@ -397,42 +396,33 @@ void GaussNewton::move_start_positions(const Eigen::VectorXd& delta, Step& resul
 }
 
 /// Solves for the parameters. One that would go beyond its range, or further than makes sense, goes as far as
-/// it may, and the others are solved again for that: parameters that are one force change together. Of
-/// several the one that is cut most is the first. The others may stay within their limits then.
+/// it may, and the others are solved again for that: parameters that are one force change together.
 Eigen::VectorXd GaussNewton::bounded_step(const ReducedEquations& reduced, double damping,
                                           bool& cut_short) const {
   const Eigen::Index np = reduced.score.size();
   Eigen::VectorXd delta = Eigen::VectorXd::Zero(np);
   std::vector<Eigen::Index> moving(static_cast<std::size_t>(np));
   std::iota(moving.begin(), moving.end(), Eigen::Index{0});
-  while (!moving.empty()) {
+  for (bool again = true; again && !moving.empty();) {
     for (const Eigen::Index j : moving) delta[j] = 0.0;
     const Eigen::VectorXd solved = solve_for(moving, delta, reduced, damping);
-    std::optional<std::size_t> most_cut;
-    double least_share = 1.0;
+    std::vector<Eigen::Index> free;
     for (std::size_t a = 0; a < moving.size(); ++a) {
       const Eigen::Index j = moving[a];
       const FreeParameter& p = free_[static_cast<std::size_t>(j)];
+      const double value = point_.plant.find(p.effect)->values[p.index], limit = longest_step(p, value);
       const double at = solved[static_cast<Eigen::Index>(a)], wanted = std::isfinite(at) ? at * p.scale : 0.0;
-      delta[j] = step_within_limits(j, wanted);
-      if (delta[j] == wanted || !(delta[j] / wanted < least_share)) continue;
-      least_share = delta[j] / wanted;
-      most_cut = a;
+      const double to_low = std::min(p.low - value, 0.0), to_high = std::max(p.high - value, 0.0);
+      delta[j] = std::clamp(wanted, std::max(-limit, to_low), std::min(limit, to_high));
+      if (delta[j] == wanted) free.push_back(j);
+      // What the data hold at an end of its range is where it should be.
+      const bool is_held = delta[j] == 0.0 && (to_low == 0.0 || to_high == 0.0);
+      cut_short = cut_short || (delta[j] != wanted && !is_held);
     }
-    if (!most_cut) break;
-    // What the data hold at an end of its range is where it should be.
-    cut_short = cut_short || least_share > 0.0;
-    moving.erase(moving.begin() + static_cast<std::ptrdiff_t>(*most_cut));
+    again = free.size() < moving.size();
+    moving = std::move(free);
   }
   return delta;
-}
-
-/// How far a parameter goes of the way that it wants to.
-double GaussNewton::step_within_limits(Eigen::Index parameter, double wanted) const {
-  const FreeParameter& p = free_[static_cast<std::size_t>(parameter)];
-  const double value = point_.plant.find(p.effect)->values[p.index], limit = longest_step(p, value);
-  const double to_low = std::min(p.low - value, 0.0), to_high = std::max(p.high - value, 0.0);
-  return std::clamp(wanted, std::max(-limit, to_low), std::min(limit, to_high));
 }
 
 /// Of the `moving` parameters, in units of their scales. The others go by `delta`.

@@ -99,7 +99,6 @@ class GaussNewton {
   void move_initial_states(const ReducedEquations& reduced, const Eigen::VectorXd& delta, Step& result) const;
   void move_start_positions(const Eigen::VectorXd& delta, Step& result) const;
   Eigen::VectorXd bounded_step(const ReducedEquations& reduced, double damping, bool& cut_short) const;
-  double step_within_limits(Eigen::Index parameter, double wanted) const;
   Eigen::VectorXd solve_for(const std::vector<Eigen::Index>& moving, const Eigen::VectorXd& delta,
                             const ReducedEquations& reduced, double damping) const;
 

@@ -8,7 +8,6 @@
 #include <limits>
 
 #include "blind_case.hpp"
-#include "estimation/gauss_newton.hpp"
 
 namespace upright {
 namespace {
@@ -307,33 +306,6 @@ TEST(Fit, FollowsTheBeliefWhereTheDataLeaveItOpen) {
   const Plant found = fit(data, start, free, few_steps).point.plant;
   EXPECT_NEAR(found.find(back_emf)->values[0], 1.0, 0.005);
   EXPECT_NEAR(found.find(friction)->values[0], truth.find(friction)->values[0], 0.1);
-}
-
-// The step is longer than either may go. Were both cut at once, their sum would change.
-TEST(GaussNewton, KeepsASumThatTheDataKnowWhereItCutsAStep) {
-  Plant truth = cart_alone();
-  truth.set("viscous_friction", {10.0});
-  const std::vector<Measurement> runs =
-      square_and_multisine({.plant = truth, .cart_step_m = 2e-6}, 500.0, 20.0, 6.0);
-  const FitData data{&runs, cut_segments(runs)};
-  const std::size_t friction = effect_number("viscous_friction"), back_emf = effect_number("back_emf");
-  const auto sum_n_per_mps = [&](const Plant& plant) {
-    return plant.find(friction)->values[0] + plant.find(back_emf)->values[0] * truth.motor.back_emf_n_per_mps;
-  };
-  Plant guess = truth;
-  guess.set("viscous_friction", {10.0 - 1.2 * truth.motor.back_emf_n_per_mps});
-  guess.set("back_emf", {2.2});
-  const std::vector<FreeParameter> free = {
-      {.effect = friction, .low = 0.0, .high = 100.0, .scale = 1.0},
-      {.effect = back_emf, .low = 0.1, .high = 10.0, .scale = 0.1, .prior_mean = 1.0, .prior_sigma = 0.05}};
-  const FitPoint start{guess, estimate_initial_states(runs, data.segments, guess), {.force = 0.1}};
-  const FitOptions options;
-  GaussNewton solver(data, start, free, options);
-  solver.evaluate();
-  const GaussNewton::Step step = solver.further_step();
-  EXPECT_TRUE(step.cut_short);
-  EXPECT_NEAR(step.point.plant.find(friction)->values[0] - guess.find(friction)->values[0], 4.0, 1e-9);
-  EXPECT_NEAR(sum_n_per_mps(step.point.plant), sum_n_per_mps(guess), 0.2);
 }
 
 }  // namespace
