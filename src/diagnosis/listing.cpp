@@ -23,8 +23,7 @@ class HeldOutSimulation {
   std::optional<FreeRunSimulation> of_less(const std::vector<std::size_t>& effects,
                                            std::optional<std::size_t> as_given = {}) const {
     Hypothesis h = search_.fitted_separately(effects, judged_, &noise_, true, as_given);
-    for (const std::size_t effect : effects)
-      if (search_.is_admissible(judged_, effect) && !search_.is_admissible(h, effect)) return std::nullopt;
+    if (search_.bends_one_of(effects, judged_, h, &Search::is_admissible)) return std::nullopt;
     return search_.simulate(h);
   }
 

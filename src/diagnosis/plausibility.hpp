@@ -41,7 +41,8 @@ bool is_doubtful(double scale, const PriorPolicy& policy);
 /// precise.
 bool shows_on_encoder(double offset_rad, double step_rad, const CorrectionPolicy& policy);
 
-/// Bristles that bend over a good part of the track before they slide are a spring by another name.
+/// Bristles that bend over a good part of the longest travel of one run before they slide are a spring by
+/// another name.
 bool are_bristles_short(double breakaway_n, double stiffness_n_per_m, double travel_m,
                         const PriorPolicy& policy);
 

@@ -178,6 +178,13 @@ bool Search::is_admissible(const Hypothesis& h, std::size_t effect) const {
   return kind_of(effect) != "bristle_friction" || bristles_are_short(h);
 }
 
+bool Search::bends_one_of(const std::vector<std::size_t>& effects, const Hypothesis& before,
+                          const Hypothesis& after, Holds holds) const {
+  return std::any_of(effects.begin(), effects.end(), [&](std::size_t effect) {
+    return (this->*holds)(before, effect) && !(this->*holds)(after, effect);
+  });
+}
+
 bool Search::bristles_are_short(const Hypothesis& h) const {
   const Plant& plant = h.train.point.plant;
   const Dynamics<double> dynamics(make_model<double>(plant));

@@ -179,6 +179,11 @@ class Search {
   /// The second half of that: no size at the end of its range, no bristles that are a spring, no attached
   /// mass that does not vibrate.
   bool is_admissible(const Hypothesis& h, std::size_t effect) const;
+  /// One of these two.
+  using Holds = bool (Search::*)(const Hypothesis&, std::size_t) const;
+  /// Whether it holds for one of these effects before a change of the model, and not after it.
+  bool bends_one_of(const std::vector<std::size_t>& effects, const Hypothesis& before,
+                    const Hypothesis& after, Holds holds) const;
   /// How many standard errors the size of an effect is from nothing: from what the plant file says, of a
   /// correction. Its other parameters (a shape, a place) are held: without a size they mean nothing.
   double certainty(const Hypothesis& h, std::size_t effect) const;

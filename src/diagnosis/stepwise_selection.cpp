@@ -570,10 +570,10 @@ void StepwiseSelection::eliminate_backward() {
   }
 }
 
-bool StepwiseSelection::bends_another(const Hypothesis& h, std::size_t effect, Holds holds) const {
-  return std::any_of(found_.begin(), found_.end(), [&](std::size_t other) {
-    return other != effect && (search_.*holds)(current_, other) && !(search_.*holds)(h, other);
-  });
+bool StepwiseSelection::bends_another(const Hypothesis& h, std::size_t effect, Search::Holds holds) const {
+  std::vector<std::size_t> others = found_;
+  std::erase(others, effect);
+  return search_.bends_one_of(others, current_, h, holds);
 }
 
 bool StepwiseSelection::is_found(std::size_t effect) const {

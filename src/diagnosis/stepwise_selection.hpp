@@ -219,10 +219,8 @@ class StepwiseSelection {
   bool find_without(std::size_t effect);
   /// Backward deletion: what is no longer needed once others are there goes.
   void eliminate_backward();
-  /// What the search says of one effect of a hypothesis.
-  using Holds = bool (Search::*)(const Hypothesis&, std::size_t) const;
   /// Whether it holds of another effect that was found now, and no longer with `h`.
-  bool bends_another(const Hypothesis& h, std::size_t effect, Holds holds) const;
+  bool bends_another(const Hypothesis& h, std::size_t effect, Search::Holds holds) const;
   bool is_found(std::size_t effect) const;
 
   Search& search_;

@@ -30,17 +30,27 @@ Plant file_plant() {
   return plant;
 }
 
+Measurement run_of(const blind::Rig& rig, double duration_s, unsigned seed, double amplitude_v = 2.0) {
+  blind::Plan plan;
+  plan.rate_hz = 200.0;
+  plan.duration_s = duration_s;
+  plan.amplitude_v = amplitude_v;
+  plan.seed = seed;
+  return measure(rig, plan, "run" + std::to_string(seed));
+}
+
 /// One run of the rig of the file with a constant force beside it.
 Measurement run_with(double force_n, unsigned seed, double amplitude_v = 2.0, double load_kg = 0.0) {
   blind::Rig rig{.plant = file_plant()};
   rig.plant.cart_mass_kg += load_kg;
   if (force_n != 0.0) rig.plant.set("constant_force", {force_n});
-  blind::Plan plan;
-  plan.rate_hz = 200.0;
-  plan.duration_s = 6.0;
-  plan.amplitude_v = amplitude_v;
-  plan.seed = seed;
-  return measure(rig, plan, "run" + std::to_string(seed));
+  return run_of(rig, 6.0, seed, amplitude_v);
+}
+
+/// The first run is fitted, the others are held out.
+void hold_out_all_but_first(const std::vector<Measurement>& runs, FitData& train, FitData& held) {
+  for (const Segment& segment : cut_segments(runs))
+    (segment.run == 0 ? train : held).segments.push_back(segment);
 }
 
 /// Two runs, the first fitted and the second held out, with a constant force in the model of both, and
@@ -49,8 +59,7 @@ class Fitted {
  public:
   explicit Fitted(std::vector<Measurement> runs, std::vector<std::size_t> corrections = {})
       : runs_(std::move(runs)), corrections_(std::move(corrections)), train_{&runs_, {}}, held_{&runs_, {}} {
-    for (const Segment& segment : cut_segments(runs_))
-      (segment.run == 0 ? train_ : held_).segments.push_back(segment);
+    hold_out_all_but_first(runs_, train_, held_);
     search_.emplace(file_plant(), runs_, train_, held_, policy_, budget_);
     Hypothesis base = search_->baseline();
     base.train.point.plant.set(force, std::vector<double>{0.1});
@@ -148,55 +157,31 @@ TEST(Listing, BlamesNoCorrectionWithinWhatIsBelievedForARise) {
 
 /// One run has bristles and a spring, the held-out one only bristles. Without the spring, softer bristles
 /// hold the cart of the first run.
-class SpringOfOneRun {
- public:
-  SpringOfOneRun() : runs_{run(true, 1), run(false, 2)}, train_{&runs_, {}}, held_{&runs_, {}} {
-    for (const Segment& segment : cut_segments(runs_))
-      (segment.run == 0 ? train_ : held_).segments.push_back(segment);
-  }
-
-  /// What a simulation of the held-out run speaks against, if bristles may bend over this share of the
-  /// travel.
-  std::optional<std::size_t> raises(double longest_bristles) const {
+TEST(Listing, BlamesNoEffectWithoutWhichAnotherIsImpossible) {
+  blind::Rig rig{.plant = file_plant()};
+  rig.plant.set("coulomb_friction", {0.5});
+  rig.plant.set("bristle_friction", {400.0, 10.0});
+  blind::Rig with_spring = rig;
+  with_spring.plant.set("cable_spring", {6.0, 0.0});
+  const std::vector<Measurement> runs = {run_of(with_spring, 24.0, 1), run_of(rig, 24.0, 2)};
+  FitData train{&runs, {}}, held{&runs, {}};
+  hold_out_all_but_first(runs, train, held);
+  const std::size_t spring = effect_number("cable_spring");
+  const std::vector<std::size_t> effects = {effect_number("coulomb_friction"),
+                                            effect_number("bristle_friction"), spring};
+  // What the simulation speaks against, if bristles may bend over this share of the travel.
+  const auto raises = [&](double longest_bristles) {
     SelectionPolicy policy;
     policy.prior.bristle_share_of_travel = longest_bristles;
     const SearchBudget budget;
-    Search search(file_plant(), runs_, train_, held_, policy, budget);
+    Search search(file_plant(), runs, train, held, policy, budget);
     Hypothesis base = search.baseline();
-    base.train.point.plant = rig(true).plant;
-    const std::vector<std::size_t> effects = {effect_number("coulomb_friction"),
-                                              effect_number("bristle_friction"), spring_};
+    base.train.point.plant = with_spring.plant;
     const Hypothesis judged = search.fitted_separately(effects, base, nullptr, true);
     return list_effects(search, judged, {.effects = effects, .corrections = {}}).raises;
-  }
-
-  static constexpr const char* spring = "cable_spring";
-
- private:
-  static blind::Rig rig(bool with_spring) {
-    blind::Rig rig{.plant = file_plant()};
-    rig.plant.set("coulomb_friction", {0.5});
-    rig.plant.set("bristle_friction", {400.0, 10.0});
-    if (with_spring) rig.plant.set(spring, {6.0, 0.0});
-    return rig;
-  }
-  static Measurement run(bool with_spring, unsigned seed) {
-    blind::Plan plan;
-    plan.rate_hz = 200.0;
-    plan.duration_s = 24.0;
-    plan.seed = seed;
-    return measure(rig(with_spring), plan, "run" + std::to_string(seed));
-  }
-
-  const std::size_t spring_ = effect_number(spring);
-  std::vector<Measurement> runs_;
-  FitData train_, held_;
-};
-
-TEST(Listing, BlamesNoEffectWithoutWhichAnotherIsImpossible) {
-  const SpringOfOneRun data;
-  EXPECT_EQ(data.raises(0.1), effect_number(SpringOfOneRun::spring));
-  EXPECT_FALSE(data.raises(0.03));
+  };
+  EXPECT_EQ(raises(0.1), spring);
+  EXPECT_FALSE(raises(0.03));
 }
 
 TEST(Halves, TakeEverySecondSegmentOfOneRun) {
